@@ -42,7 +42,8 @@ def walk(footfalls, trains, seed=0):
 
 def whole(cone, pattern, targets):
     """State 6.14 with every row; return a function that solves it and keeps the least objective."""
-    tau, n = cone.tau, len(pattern)
+    neuron, n = cone.neuron, len(pattern)
+    tau = neuron.tau
 
     def rows(points, since):
         out = np.zeros((len(points), n), np.float64)
@@ -58,14 +59,14 @@ def whole(cone, pattern, targets):
         return np.where(k >= 0, targets[np.maximum(k, 0)], -np.inf)
 
     def theta(points):
-        past = points - last(points) - cone.refractory
-        return cone.theta_0 + np.where(past >= -1e-9, cone.theta_plus * np.exp(-np.abs(past) / (2 * tau)), 0.0)
+        past = points - last(points) - neuron.refractory
+        return neuron.theta_0 + np.where(past >= -1e-9, neuron.theta_plus * np.exp(-np.abs(past) / (2 * tau)), 0.0)
 
-    grid = np.arange(pattern.start, pattern.stop + 1e-9, cone.step_ms)
+    grid = np.arange(pattern.start, pattern.stop + 1e-9, neuron.step_ms)
     nearest = np.searchsorted(targets, grid, side="right") - 1
-    free = (nearest >= 0) & (grid - targets[np.maximum(nearest, 0)] <= cone.refractory)
+    free = (nearest >= 0) & (grid - targets[np.maximum(nearest, 0)] <= neuron.refractory)
     silent = grid[~free]
-    lost = cone.refractory
+    lost = neuron.refractory
     d, limit = rows(silent, last(silent) + lost), theta(silent)
     c, threshold = rows(targets, last(targets) + lost), theta(targets)
     b = rows(targets + 0.1 * tau, last(targets) + lost)

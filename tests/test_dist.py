@@ -47,7 +47,17 @@ def test_the_source_package_holds_what_a_build_needs_and_no_more() -> None:
         inside = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     needed = {
-        path for path in tracked if path.startswith(("crates/taxel-core/src", "crates/taxel-live/src", "python/taxel/"))
+        path
+        for path in tracked
+        if path.startswith(
+            (
+                "crates/taxel-core/src",
+                "crates/taxel-live/src",
+                "crates/taxel-panel/src",
+                "crates/taxel-panel/web",
+                "python/taxel/",
+            )
+        )
     }
     assert needed | {"Cargo.lock", "pyproject.toml", "README.md", "LICENSE"} <= inside
     assert not {name for name in inside if name.startswith((".venv", "target"))}
@@ -82,8 +92,9 @@ def test_the_wheel_runs_the_demo_in_a_bare_environment(tmp_path: Path) -> None:
     assert (tmp_path / "report" / "report.html").stat().st_size > 100_000
     where = bare.run("python", "-c", "import taxel; print(taxel.__file__)")
     assert where.stdout.startswith(str(tmp_path))
-    program = "from taxel import _core; print(hasattr(_core, 'Live'), hasattr(_core, 'test_hook'))"
-    hooks = bare.run("python", "-c", program)
+    hooks = bare.run(
+        "python", "-c", "from taxel import _core; print(hasattr(_core, 'Live'), hasattr(_core, 'test_hook'))"
+    )
     assert hooks.stdout == "True False\n", "what only tests call does not ship"
     without = bare.run("taxel", "study", "fig6.1", "--size", "toy")
     assert without.returncode == 2

@@ -22,7 +22,7 @@ events = taxel.Events(t, x, y, random.random(5000) < .5, intensity=random.intege
 data = taxel.wire.encode(events)
 again = taxel.wire.decode(data)
 spikes = taxel.encode.FA1().encode(events)
-print(_core.instructions(), len(again), again.t.sum(), again.intensity.sum(), len(spikes.times), repr(spikes.times.sum()))
+print(_core.instructions(), len(again), again.t.sum(), again.intensity.sum(), len(spikes.times), spikes.times.sum())
 """
 
 

@@ -61,9 +61,9 @@ NONSENSE: dict[str, Any] = {
     "half of a surrogate pair": "\ud800",
     "a masked value": np.ma.masked,
     "an array of which one number is repeated": np.broadcast_to(np.float64(1.0), 10**9),
-    "a list that holds itself": [1.0],
+    "a list that holds itself": [],
 }
-NONSENSE["a list that holds itself"] += [NONSENSE["a list that holds itself"]] * 2
+NONSENSE["a list that holds itself"].append(NONSENSE["a list that holds itself"])
 
 #: Drawn on again and again; where it is None a new one is made, which pyplot keeps.
 AXES = Figure().add_subplot()
@@ -328,6 +328,11 @@ SOUND: dict[str, Sound] = {
     ),
     "taxel.detect.score": plain(taxel.detect.score, found=FOUND, truth={"a": [10], "b": [25]}, window_ms=50.0),
     "taxel.detect.Spread.of": plain(taxel.detect.Spread.of, values=[1.0, 2.0]),
+    "taxel.detect.Part": plain(taxel.detect.Part, **dict.fromkeys(inspect.signature(taxel.detect.Part).parameters)),
+    "taxel.detect.Fold": plain(taxel.detect.Fold, **dict.fromkeys(inspect.signature(taxel.detect.Fold).parameters)),
+    "taxel.detect.Trained": plain(
+        taxel.detect.Trained, **dict.fromkeys(inspect.signature(taxel.detect.Trained).parameters)
+    ),
     "taxel.detect.Recipe": plain(
         taxel.detect.Recipe,
         encoder=LEVELS,
@@ -968,6 +973,9 @@ LEFT_OUT = {
     "taxel.simulate.Pipe.registers": "of a pipe",
     "taxel.Clock.host_ns": "of a recording",
     "taxel.detect.Judged": "of judge",
+    "taxel.detect.Trained": "of judge",
+    "taxel.detect.Fold": "checked by judge",
+    "taxel.detect.Part": "checked by judge",
     "taxel.Clock.board_us_at": "of a recording",
     "taxel.Datagrams": "of a recording",
     "taxel.Health": "a result",

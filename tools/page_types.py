@@ -43,7 +43,9 @@ def main() -> int:
             print(f"page: types not checked: {TYPESCRIPT} could not be fetched")
             return 0
         kept.touch()
-    return subprocess.run([node, str(TSC), "-p", str(ROOT / "crates/taxel-live/tsconfig.json")], check=False).returncode
+    return subprocess.run(
+        [node, str(TSC), "-p", str(ROOT / "crates/taxel-panel/tsconfig.json")], check=False
+    ).returncode
 
 
 if __name__ == "__main__":

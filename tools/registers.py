@@ -131,7 +131,7 @@ def rust_rules(source: Table, *, warns: bool) -> str:
                 arguments.append(written)
         text = f'"{shown} (rule {rule["number"]})"'
         found = f"({rule['number']}, format!(\n            {text},\n            {', '.join(arguments)}\n        ))"
-        give = f"said.push({found});" if warns else f"return Some({found});"
+        give = f"warnings.push({found});" if warns else f"return Some({found});"
         lines.append(f"    if {broken(parsed(rule['holds']))} {{\n        {give}\n    }}")
     return "\n".join(lines)
 
@@ -172,14 +172,14 @@ def rust_field(f: Table) -> str:
     )
 
 
-def rust(source: Table) -> str:
-    """Write the table that the core reads, as the formatter has it."""
+def as_formatted(text: str) -> str:
+    """Return Rust as the formatter has it."""
     command = ["rustfmt", "--edition", "2024", "--config-path", str(Path(__file__).parents[1])]
-    return subprocess.run(command, input=rust_table(source), capture_output=True, text=True, check=True).stdout
+    return subprocess.run(command, input=f"//! {HEAD}\n\n{text}", capture_output=True, text=True, check=True).stdout
 
 
 def rust_table(source: Table) -> str:
-    """Write the table that the core reads."""
+    """Write the struct that holds the registers, and its words."""
     fields = source["field"]
     struct, defaults = [], []
     for field in fields:
@@ -222,15 +222,8 @@ def rust_table(source: Table) -> str:
         words.append(f"            {register} => {' | '.join(parts)},")
         masks.append(f"            {register} => {mask:#x},")
         stores.append(f"            {register} => {{\n" + "\n".join(takes) + "\n            }")
-    rows = [rust_field(f) for f in fields if "register" in f]
     newline = "\n"
-    law = power_law(source)
-    table = newline.join("    " + " ".join(f"{entry}," for entry in law[k : k + 12]) for k in range(0, len(law), 12))
-    return f"""//! {HEAD}
-
-use serde::{{Deserialize, Serialize}};
-
-use super::field::{{Field, Scanned, us}};
+    return as_formatted(f"""use serde::{{Deserialize, Serialize}};
 
 /// What the registers hold, in the registers' own units (Table 5.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -239,30 +232,10 @@ pub struct Registers {{
 {newline.join(struct)}
 }}
 
-/// A set of registers by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Preset {{
-    /// What it is called.
-    pub name: &'static str,
-    /// For how many sense lines it is made.
-    pub sense_lines: u16,
-    /// What the registers hold.
-    pub registers: Registers,
-}}
-
 /// What fields that older files lack hold at reset.
 mod at_reset {{
 {newline.join(defaults)}
 }}
-
-pub(super) const FIELDS: [Field; {len(rows)}] = [
-{newline.join(rows)}
-];
-
-/// The presets, in the order of the reference; the first for an array's size is what its board holds at reset.
-pub const PRESETS: [Preset; {len(source["preset"])}] = [
-{newline.join(rust_preset(source, preset) for preset in source["preset"])}
-];
 
 impl Registers {{
     /// Register `n` as the board holds it; 0 where it has no such register.
@@ -291,6 +264,48 @@ impl Registers {{
         }}
     }}
 }}
+""")
+
+
+def rust_fields(source: Table) -> str:
+    """Write where each field lies in the registers."""
+    rows = [rust_field(f) for f in source["field"] if "register" in f]
+    newline = "\n"
+    return as_formatted(f"""use super::field::Field;
+
+pub(super) const FIELDS: [Field; {len(rows)}] = [
+{newline.join(rows)}
+];
+""")
+
+
+def rust_presets(source: Table) -> str:
+    """Write the presets."""
+    newline = "\n"
+    return as_formatted(f"""use super::table::Registers;
+
+/// A set of registers by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Preset {{
+    /// What it is called.
+    pub name: &'static str,
+    /// For how many sense lines it is made.
+    pub sense_lines: u16,
+    /// What the registers hold.
+    pub registers: Registers,
+}}
+
+/// The presets, in the order of the reference; the first for an array's size is what its board holds at reset.
+pub const PRESETS: [Preset; {len(source["preset"])}] = [
+{newline.join(rust_preset(source, preset) for preset in source["preset"])}
+];
+""")
+
+
+def rust_checks(source: Table) -> str:
+    """Write the rules that refuse and those that warn."""
+    return as_formatted(f"""use super::field::{{Scanned, us}};
+use super::table::Registers;
 
 /// The first rule that refuses these registers, with its numbers.
 pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {{
@@ -301,20 +316,26 @@ pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, S
 
 /// What is allowed but hardly meant.
 pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {{
-    let mut said = vec![];
+    let mut warnings = vec![];
 {rust_values(source, warns=True)}
 {rust_rules(source, warns=True)}
-    said
+    warnings
 }}
+""")
 
-/// Bits behind the point of [`POWER_LAW`].
+
+def rust_power_law(source: Table) -> str:
+    """Write the power law as the logic looks it up."""
+    law = power_law(source)
+    table = "\n".join("    " + " ".join(f"{entry}," for entry in law[k : k + 12]) for k in range(0, len(law), 12))
+    return as_formatted(f"""/// Bits behind the point of [`POWER_LAW`].
 pub const POWER_LAW_FRACTION: u32 = {source["power_law"]["fraction_bits"]};
 
 /// Ticks to the power of {source["power_law"]["exponent"]} (5.1), in fixed point, as the logic looks it up.
 pub const POWER_LAW: [u32; {len(law)}] = [
 {table}
 ];
-"""
+""")
 
 
 def javascript(source: Table) -> str:
@@ -503,8 +524,12 @@ def schema(source: Table) -> str:
 
 
 MADE = {
-    "crates/taxel-core/src/wire/registers/table.rs": rust,
-    "crates/taxel-live/web/registers.js": javascript,
+    "crates/taxel-core/src/wire/registers/table.rs": rust_table,
+    "crates/taxel-core/src/wire/registers/fields.rs": rust_fields,
+    "crates/taxel-core/src/wire/registers/presets.rs": rust_presets,
+    "crates/taxel-core/src/wire/registers/rules.rs": rust_checks,
+    "crates/taxel-core/src/wire/registers/power_law.rs": rust_power_law,
+    "crates/taxel-panel/web/registers.js": javascript,
     "crates/taxel-live/src/recording/schemas/Registers.json": schema,
     "docs/registers.md": docs,
 }

@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from taxel._base.drawing import draw_by
 from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
 from taxel.array import Array
 from taxel.calibration import Calibration, Load
@@ -16,13 +17,14 @@ from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
 if TYPE_CHECKING:
-    from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire, wire_v2
+    from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire
     from taxel.detect import Readout
     from taxel.recording import BoardChange, Datagrams, Note, Recording, Zeroing
     from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
     from taxel.recording.convert import convert
+    from taxel.recording.cut import cut
     from taxel.recording.health import Health, health
-    from taxel.recording.parts import cut, merge
+    from taxel.recording.merge import merge
 
 __version__ = "0.1.0"
 
@@ -81,6 +83,10 @@ _RECORDING = (
 )  # fmt: skip
 _ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
 _ELSEWHERE |= {"open": ("taxel.recording", "open_any"), "Readout": ("taxel.detect", "Readout")}
+
+
+# A noun's `plot` loads the plots, and matplotlib with them, when it is first called.
+draw_by(lambda: import_module("taxel.plot"))
 
 
 def __getattr__(name: str) -> Any:

@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import column, fields, nth, shown, window
+from taxel._base.arguments import bare, column, fields, nth, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept, own
+from taxel._base.drawing import draw
 from taxel._base.files import write_whole
+from taxel._base.header_table import HeaderTable, text_of
 from taxel._core import FormatError, ProblemError
 
 if TYPE_CHECKING:
@@ -134,7 +136,7 @@ class Detections(Columns):
         repaired: ArrayLike | None,
     ) -> None:
         try:
-            labels = np.asarray(label)
+            labels = np.asarray(bare("label", label))
             labels = labels.astype(np.str_) if labels.size == 0 else labels
         except (TypeError, ValueError) as error:
             raise ProblemError(f"label: {error}") from None
@@ -279,26 +281,19 @@ class Detections(Columns):
         FormatError : another header, or a value that makes no sense (names the line)
         FileNotFoundError : no such file
         """
+        place = Path(checked_path("path", path))
+        table = HeaderTable.read(place, text_of(place))
+        more: dict[str, list[int]] = {name: [] for name in (_SAID, _REPAIRED) if name in table.header}
+        if table.header != (*_CSV, *more):
+            raise FormatError(f"{place}, line 1: {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}")
         rows: list[tuple[str, int, int, float]] = []
-        more: dict[str, list[int]] = {}
-        try:
-            with open(checked_path("path", path), newline="", encoding="utf-8") as file:
-                table = csv.reader(file)
-                header = tuple(next(table, ()))
-                more = {name: [] for name in (_SAID, _REPAIRED) if name in header}
-                if header != (*_CSV, *more):
-                    raise FormatError(f"{path}, line 1: {','.join(header) or 'nothing'}; must be {','.join(_CSV)}")
-                for row in table:
-                    if len(row) != len(header):
-                        raise FormatError(f"{path}, line {table.line_num}: {len(row)} values; must be {len(header)}")
-                    try:
-                        rows.append((row[0], int(row[1]), int(row[2]), float(row[3])))
-                        for name, value in zip(more, row[4:], strict=True):
-                            more[name].append(int(value))
-                    except ValueError as error:
-                        raise FormatError(f"{path}, line {table.line_num}: {error}") from None
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise FormatError(f"{path}: not a table of text: {error}") from None
+        for line, row in table.rows:
+            try:
+                rows.append((row[0], int(row[1]), int(row[2]), float(row[3])))
+                for name, value in zip(more, row[4:], strict=True):
+                    more[name].append(int(value))
+            except ValueError as error:
+                raise FormatError(f"{place}, line {line}: {error}") from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())
         repaired = [value != 0 for value in more[_REPAIRED]] if _REPAIRED in more else None
         return cls._of(label, t, known, slope, more.get(_SAID), repaired)
@@ -335,14 +330,10 @@ class Detections(Columns):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each label's detections as marks over time (s)."""
-        from taxel.plot import detections  # noqa: PLC0415  matplotlib loads slowly
-
-        return detections(self, ax)
+        return draw("detections", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def _parts(
         self,

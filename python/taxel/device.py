@@ -194,7 +194,7 @@ class Cable:
         raise self._silence()
 
     def greeting(self) -> Greeting:
-        """Ask the board what it is (a write of 8 to REG6), as the line that it sends at reset may not have been received.
+        """Ask the board what it is (a write of 8 to REG6), as its line at reset may not have been received.
 
         Raises
         ------

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import column, fields, instance, nth, rows, shown, window
 from taxel._base.columns import Columns, frozen, kept
+from taxel._base.drawing import draw
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -310,14 +311,10 @@ class Events(Columns):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the event picture: how often each taxel rose, in one colour, and how often it fell, in another."""
-        from taxel.plot import event_picture  # noqa: PLC0415  matplotlib loads slowly
-
-        return event_picture(self, ax)
+        return draw("event_picture", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     @classmethod
     def _unchecked(

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import instance, number, shown, text, whole, window
 from taxel._base.columns import Columns, frozen, kept, kept_numbers
+from taxel._base.drawing import draw
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -234,14 +235,10 @@ class Frames(Columns):
 
     def plot(self, at: int | None = None, ax: Axes | None = None) -> Axes:
         """Draw the pressure map at `at` us, or of the picture with the largest sum."""
-        from taxel.plot import pressure_map  # noqa: PLC0415  matplotlib loads slowly
-
-        return pressure_map(self, at, ax)
+        return draw("pressure_map", self, at, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def _parts(self) -> _core._Frames:
         """Return what the compiled part reads in place."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown
 from taxel._base.files import whole_file
+from taxel._base.header_table import HeaderTable, text_of
 from taxel._core import FormatError, ProblemError
+from taxel.clock import Clock
+from taxel.recorded import Recorded
 
 __all__ = ["TURN_US", "Label", "Labels", "ahead_us", "beside", "write_labels"]
 
@@ -43,24 +46,6 @@ class Label(NamedTuple):
     label: str
     t_us: int
     host_ns: int | None = None
-
-
-class _Clock(Protocol):
-    @property
-    def board_us(self) -> NDArray[np.int64]: ...
-
-    def board_us_at(self, host_ns: int) -> int: ...
-
-
-@runtime_checkable
-class _Recorded(Protocol):
-    """What a `taxel.Recording` has that matters here."""
-
-    @property
-    def path(self) -> Path: ...
-
-    @property
-    def clock(self) -> _Clock | None: ...
 
 
 class Labels:
@@ -92,19 +77,11 @@ class Labels:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        place = checked_path("path", path)
-        try:
-            with open(place, newline="", encoding="utf-8-sig") as file:
-                table = csv.reader(file)
-                header = [name.strip() for name in next(table, [])]
-                known = {*_WANTED, *_OTHERS}
-                if not set(_WANTED) <= set(header) <= known or len(set(header)) < len(header):
-                    said = ",".join(header) or "nothing"
-                    raise FormatError(f"{place}, line 1: {said}; must be recording,label,t_us,host_ns or some of them")
-                rows = [_row(f"{place}, line {table.line_num}", header, cells) for cells in table if cells]
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise FormatError(f"{place}: not a table of text: {error}") from None
-        self.path, self.rows = Path(place), tuple(rows)
+        place = Path(checked_path("path", path))
+        table = HeaderTable.read(place, text_of(place))
+        table.has(_WANTED, _OTHERS)
+        rows = [_row(f"{place}, line {line}", cells) for line, cells in table]
+        self.path, self.rows = place, tuple(rows)
 
     @property
     def recordings(self) -> tuple[str, ...]:
@@ -117,7 +94,7 @@ class Labels:
         names = {row.recording for row in self.rows}
         return next((name for name in ("", str(recording), place.name, place.stem) if name in names), None)
 
-    def of(self, recording: _Recorded) -> dict[str, NDArray[np.int64]]:
+    def of(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
         """Return the events of a `taxel.Recording` by label, us on its own clock; none where it is not named.
 
         A recording that began in mid-stream counts from its first stamp, which is whole turns of the board's clock
@@ -127,14 +104,19 @@ class Labels:
         ------
         ProblemError : events whose host's time and board's time do not fit this recording
         """
-        if not isinstance(recording, _Recorded):
+        # Asked of the class, as the clock itself may take long to read.
+        if isinstance(recording, type) or not (hasattr(recording, "path") and hasattr(type(recording), "clock")):
             raise ProblemError(f"recording is {shown(recording)}: must be a taxel.Recording")
-        name = self.named(recording.path)
+        return self._of(recording.path, lambda: recording.clock)
+
+    def _of(self, path: Path, clock_of: Callable[[], Clock | None]) -> dict[str, NDArray[np.int64]]:
+        """Return the events of a recording of this path, whose clock is asked for where it matters."""
+        name = self.named(path)
         rows = [row for row in self.rows if row.recording == name]
-        clock = recording.clock if any(row.host_ns is not None for row in rows) else None
+        clock = clock_of() if any(row.host_ns is not None for row in rows) else None
         found: dict[str, list[int]] = {}
         for row in rows:
-            ahead = ahead_us(row, recording.path, clock, self.path)
+            ahead = ahead_us(row, path, clock, self.path)
             found.setdefault(row.label, []).append(row.t_us - ahead)
         return {label: np.sort(np.array(times, np.int64)) for label, times in found.items()}
 
@@ -142,7 +124,7 @@ class Labels:
         return f"Labels({len(self.rows)} events of {', '.join(self.recordings) or 'one recording'}, {self.path})"
 
 
-def ahead_us(row: Label, recording: Path, clock: _Clock | None, table: Path) -> int:
+def ahead_us(row: Label, recording: Path, clock: Clock | None, table: Path) -> int:
     """Return by how many us (whole turns of its clock) a board is ahead of a recording's time; 0 where none can tell.
 
     Raises
@@ -157,7 +139,7 @@ def ahead_us(row: Label, recording: Path, clock: _Clock | None, table: Path) -> 
             f"{table}: {row.label} at {row.t_us} us and {row.host_ns} ns is of another run than "
             f"{recording}: board's and host's time do not fit together"
         )
-    return round(turns) * TURN_US
+    return int(round(turns) * TURN_US)
 
 
 def beside(recording: str | os.PathLike[str]) -> Path:
@@ -194,10 +176,8 @@ def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int]]
         table.writerows(rows)
 
 
-def _row(place: str, header: list[str], cells: list[str]) -> Label:
-    if len(cells) != len(header):
-        raise FormatError(f"{place}: {len(cells)} values; must be {len(header)}")
-    values = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
+def _row(place: str, cells: Mapping[str, str]) -> Label:
+    values = {name: cell.strip() for name, cell in cells.items()}
     times: dict[str, int] = {}
     for name in ("t_us", "host_ns"):
         said = values.get(name, "")

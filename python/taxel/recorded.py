@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel.clock import Clock
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 
@@ -17,6 +19,16 @@ T = TypeVar("T")
 
 class Recorded(Protocol):
     """Hold events or pictures, as `taxel.Recording` does."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        ...
+
+    @property
+    def clock(self) -> Clock | None:
+        """Arrival times against the board's time; None where there are none."""
+        ...
 
     @property
     def has_events(self) -> bool:

@@ -119,7 +119,7 @@ class Tare:
         if not isinstance(text, str):
             raise ProblemError(f"tare is {shown(text)}: must be JSON text")
         tare = cls.__new__(cls)
-        tare._text = _core.check_tare(text)
+        tare._text = _core.check_tare(checked_text("tare", text))
         values: dict[str, Any] = json.loads(tare._text)
         tare.array = Array._from_geometry(values["array"])
         tare.rest = np.array([np.nan if r is None else r for r in values["rest"]]).reshape(tare.array.shape)

@@ -13,6 +13,7 @@ from .scenes import frames_of, spikes_of, wander
 
 seeds = st.integers(0, 2**32 - 1)
 
+REPAIRED = "silent"
 #: What the laws of all encoders are tried on (test_laws.py).
 EXAMPLES = {
     "change": ChangeEvents(bits=4),

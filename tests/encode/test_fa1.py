@@ -13,6 +13,7 @@ from .scenes import frames_of, spikes_of, wander
 
 seeds = st.integers(0, 2**32 - 1)
 
+REPAIRED = "silent"
 #: What the laws of all encoders are tried on (test_laws.py).
 EXAMPLES = {
     "FA-1": FA1(period_ms=0.5),

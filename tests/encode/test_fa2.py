@@ -12,6 +12,7 @@ from taxel.encode import FA2
 from . import oracles
 from .test_sa1 import apart, of, smooth
 
+REPAIRED = "silent"
 #: What the laws of all encoders are tried on (test_laws.py).
 EXAMPLES = {
     "FA-2": FA2(),

@@ -3,7 +3,8 @@
 `tests/encode/test_NAME.py` has the examples of the encoder NAME, `EXAMPLES`, with the options that hold time back; and
 either `trains_of(encoder, taxels, of)`, the numbers of the trains of some of so many taxels, or, where no train belongs
 to one taxel, `turned(encoder)`, the trains as they stand when the array is turned by half a turn; or, where each train
-has a place of its own, `places(encoder, array)`, one (x, y) in mm a train.
+has a place of its own, `places(encoder, array)`, one (x, y) in mm a train. `REPAIRED` states what the encoder does with
+an event that a state repaired: "read" (as any other), "silent" (its reference moves, without a spike) or "both".
 """
 
 import json
@@ -63,6 +64,7 @@ def test_an_encoder_has_a_file_in_each_place_and_nothing_is_left_out():
     for name, file in FILES.items():
         examples = getattr(file, "EXAMPLES", {})
         assert examples, f"EXAMPLES in tests/encode/test_{name}.py"
+        assert getattr(file, "REPAIRED", None) in ("read", "silent", "both"), f"REPAIRED in tests/encode/test_{name}.py"
         assert {example.name for example in examples.values()} == {name}
         ways = [way for way in ("trains_of", "turned", "places") if hasattr(file, way)]
         assert len(ways) == 1, f"trains_of, turned or places in test_{name}.py"
@@ -133,10 +135,9 @@ def test_events_out_of_order_are_heard_as_a_stream_hears_them_or_refused(encoder
     encoder.encode(events.sorted())
 
 
-#: They tell changes, and of a value that a state repaired nobody knows when it changed.
-OF_CHANGE = {label: encoder for label, encoder in ENCODERS.items() if encoder.name in ("change_events", "fa1", "fa2")}
-#: They tell values alone; a skin tells both.
-OF_VALUES = {label: e for label, e in ENCODERS.items() if label not in OF_CHANGE and label not in PLACED}
+#: They signal changes, and of a value that a state repaired nobody knows when it changed.
+OF_CHANGE = {label: e for label, e in ENCODERS.items() if getattr(FILES[e.name], "REPAIRED", "") == "silent"}
+OF_VALUES = {label: e for label, e in ENCODERS.items() if getattr(FILES[e.name], "REPAIRED", "") == "read"}
 
 
 @pytest.mark.parametrize("encoder", OF_VALUES.values(), ids=OF_VALUES)

@@ -13,6 +13,7 @@ from .scenes import frames_of, spikes_of, wander
 
 seeds = st.integers(0, 2**32 - 1)
 
+REPAIRED = "read"
 #: What the laws of all encoders are tried on (test_laws.py).
 EXAMPLES = {
     "crossing": LevelCrossing([50.0, 60.0, 70.0], release_share=0.9),

@@ -18,6 +18,7 @@ ARRAY = Array(3, 4, 2.0)
 RANGES = {"area": (1, 12), "total": (3.0, 400.0), "peak": (2.0, 90.0), "displacement_mm": (0.1, 5.0)}
 
 
+REPAIRED = "read"
 #: What the laws of all encoders are tried on (test_laws.py).
 EXAMPLES = {
     "moments": Moments(levels=3, **RANGES, tare=rest(scenes.ARRAY)),

@@ -13,6 +13,7 @@ from .scenes import frames_of
 
 seeds = st.integers(0, 2**32 - 1)
 
+REPAIRED = "read"
 #: What the laws of all encoders are tried on (test_laws.py).
 EXAMPLES = {
     "SA-1": SA1(),

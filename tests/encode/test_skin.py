@@ -9,6 +9,7 @@ from taxel.encode import FA1, FA2, SA1, SA2, Skin
 
 from .scenes import frames_of
 
+REPAIRED = "both"
 #: What the laws of all encoders are tried on (test_laws.py).
 EXAMPLES = {
     "skin": Skin(),

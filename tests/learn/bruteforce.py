@@ -10,12 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 
-#: An input so short a time before a target, ms, counts as at it.
-AT = 0.99e-6
 
-
-def potential(neuron, weights, pattern, times, fired, target=None):
-    """The potential (6.7) at `times` behind `fired`, up to the next target; at a `target` with what counts there."""
+def potential(neuron, weights, pattern, times, fired):
+    """The potential (6.7) at `times` behind `fired`, up to the next target."""
     tau, refractory = neuron.tau, neuron.refractory
     tau_s = tau / 4 if neuron.tau_s is None else neuron.tau_s
     total = np.zeros(len(times))
@@ -24,8 +21,6 @@ def potential(neuron, weights, pattern, times, fired, target=None):
             if neuron.after_spike == "reset" and fired and s <= fired[-1] + refractory + 1e-6:
                 continue
             if neuron.after_spike == "ignore" and any(e + 1e-6 < s <= e + refractory + 1e-6 for e in fired):
-                continue
-            if target is not None and s > target - AT:
                 continue
             age = np.maximum(times - s, 0.0)
             if neuron.kernel == "alpha":
@@ -74,7 +69,7 @@ def looked_at(neuron, weights, pattern, targets, *, end=None):
         times = instants(begin, stop, neuron.tau, [*inputs, pattern.start + neuron.refractory])
         if k < len(targets):
             at = np.array([stop, stop - 1e-5])
-            u = potential(neuron, weights, pattern, at, fired, target=stop)
+            u = potential(neuron, weights, pattern, at, fired)
             theta = threshold(neuron, at, fired, pattern.start)
             missed = max(missed, abs(u[0] - theta[0]))
             slope = min(slope, ((u[0] - theta[0]) - (u[1] - theta[1])) / 1e-5)

@@ -26,8 +26,6 @@ def judged(cone, patterns, targets):
     if cone.status_ == "infeasible":
         assert check_certificate(cone.problem_, cone.certificate_), said
         return cone.status_
-    if cone.status_ == "stopped" and "it hears them too late" in cone.reason_:
-        return cone.status_
     assert cone.status_ == "solved", f"{said}: {cone.reason_}"
     assert min(cone.margin_) >= 0.499 * min(cone.problem_.margin), said
     for pattern, times in zip(patterns, targets, strict=True):
@@ -165,7 +163,7 @@ KINDS = {"paused": paused, "beside": beside, "just_before": just_before, "far_fr
 def test_what_says_solved_fires_at_its_targets_and_nowhere_else(kind):
     said = [judged(*KINDS[kind](seed)) for seed in [*range(QUICK), *FOUND.get(kind, [])]]
     assert said.count("solved") > QUICK / 3
-    assert said.count("stopped") < QUICK / 5 if kind == "just_before" else "stopped" not in said
+    assert "stopped" not in said
 
 
 @pytest.mark.slow

@@ -23,8 +23,8 @@ from taxel import ProblemError
 from taxel.cli import main
 from taxel.encode import ChangeEvents, ContactArea
 from taxel.live import Live, Panel, Said, Viewer
-from taxel.live._page import Note, Picture, Subject
-from taxel.live._viewing import MOST_OTHERS, MOST_PICTURES, Waiting
+from taxel.live._viewer_process import MOST_OTHERS, MOST_PICTURES, BoundedQueue
+from taxel.live.client import Note, Picture, Subject
 
 from .test_live import LOOPBACK, SMALL, play, presses, touch, wait_for
 
@@ -372,19 +372,19 @@ def test_a_rerun_that_comes_back_is_shown_what_comes_then(tmp_path: Path, port: 
 
 
 def test_what_waits_is_bounded_and_what_goes_is_counted() -> None:
-    waiting, one = Waiting(), Subject("board", 1, 1)
+    queue, one = BoundedQueue(), Subject("board", 1, 1)
     zero = np.zeros((1, 1), np.uint16)
     for t in range(3000):
-        waiting.put(one, Picture(t, zero, zero == 0, zero.astype(np.int8), 1, 1))
-        waiting.put(one, Note("here", t))
-    assert len(waiting) == MOST_PICTURES + MOST_OTHERS
-    assert waiting.lost == {"pictures": 3000 - MOST_PICTURES, "notes": 3000 - MOST_OTHERS}
-    kept = waiting.take(0.0)
-    assert [item.t for _, item in kept if isinstance(item, Picture)] == list(range(3000 - MOST_PICTURES, 3000))
-    assert [item.t for _, item in kept if isinstance(item, Note)] == list(range(3000 - MOST_OTHERS, 3000))
-    assert len(waiting) == len(kept)
-    waiting.settle()
-    assert (len(waiting), waiting.take(0.0)) == (0, [])
+        queue.put(one, Picture(t, zero, zero == 0, zero.astype(np.int8), 1, 1))
+        queue.put(one, Note("here", t))
+    assert len(queue) == MOST_PICTURES + MOST_OTHERS
+    assert queue.lost == {"pictures": 3000 - MOST_PICTURES, "notes": 3000 - MOST_OTHERS}
+    items = queue.take_all(0.0)
+    assert [item.t for _, item in items if isinstance(item, Picture)] == list(range(3000 - MOST_PICTURES, 3000))
+    assert [item.t for _, item in items if isinstance(item, Note)] == list(range(3000 - MOST_OTHERS, 3000))
+    assert len(queue) == len(items)
+    queue.done()
+    assert (len(queue), queue.take_all(0.0)) == (0, [])
 
 
 @foxglove

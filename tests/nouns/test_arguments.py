@@ -54,6 +54,8 @@ CLASSES = {
     "a scene": lambda value: taxel.simulate.Scene({"bodies": value}).motion(),
     "times": SpikeTrains.from_lists,
     "a column": lambda value: Detections(["a"], value, [1]),
+    "labels": lambda value: Detections(value, [1], [1]),
+    "chosen trains": SpikeTrains.from_lists([[1.0], [2.0]]).select,
     "an array's pitch": lambda value: taxel.Array(2, 2, pitch_mm=value),
     "an array's name": lambda value: taxel.Array(2, 2, name=value),
 }

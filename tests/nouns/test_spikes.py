@@ -237,7 +237,7 @@ def test_nonsense_in_an_argument_is_one_error_with_its_place(arguments: tuple, s
 
 def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
-    for module in ("spikes", "_base.columns"):
+    for module in ("spikes.trains", "_base.columns"):
         monkeypatch.setattr(f"taxel.{module}.column", lambda name, *rest: seen.append(name) or column(name, *rest))
     for lists in ([[0.5]] * 1000, np.full((1000, 1), 0.5), [np.array([0.5])] * 1000, [(1,), [], [True, 2.5]] * 333):
         trains = SpikeTrains.from_lists(lists, stop=3.0, values=[[1.0] * len(entry) for entry in lists])

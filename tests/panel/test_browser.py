@@ -173,7 +173,7 @@ def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Pat
     ):
         control = board.wait_for(r"commands are taken at (\S+)")
         page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
-        shows(page, "where-said", "no control line")
+        shows(page, "where-info", "no control line")
         assert not page.get_by_label("Noise floor", exact=True).is_enabled()
         # The machine's ports and addresses stand in the lists.
         until(lambda: page.locator("#udp-choice option[value^='127.0.0.1:']").count() == 1, "loopback is offered")
@@ -186,16 +186,16 @@ def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Pat
         shows(page, "control-why", "refused")
         page.locator("#control").fill(control)
         page.locator("#control-connect").click()
-        shows(page, "where-said", re.escape(control))
+        shows(page, "where-info", re.escape(control))
         until(lambda: page.get_by_label("Noise floor", exact=True).is_enabled(), "registers can be written")
         shows(page, "board-lines", "REG")
         page.locator("#control-drop").click()
-        shows(page, "where-said", "no control line")
+        shows(page, "where-info", "no control line")
         page.locator("#control-choice").select_option(control)
         assert page.locator("#control").input_value() == control
         page.locator("#delta-intensity").check()
         until(
-            lambda: page.locator("#delta-intensity").is_checked() and page.locator("#said").is_hidden(), "it is taken"
+            lambda: page.locator("#delta-intensity").is_checked() and page.locator("#notice").is_hidden(), "it is taken"
         )
         assert not page.errors
         page.context.close()
@@ -522,7 +522,7 @@ def test_spikes_of_an_encoder_are_shown_in_a_recording(replay: Any) -> None:
     still(replay)
     changes = replay.evaluate(PIXELS, "raster")
     replay.locator("#encoder").select_option("change_events")
-    shows(replay, "spikes-said", "change events, latency")
+    shows(replay, "spikes-info", "change events, latency")
     until(lambda: replay.evaluate(PIXELS, "raster") != changes, "the raster is of spikes")
     replay.locator("#encoder").select_option("")
     until(lambda: replay.evaluate(PIXELS, "raster") == changes, "and of changes again")
@@ -597,7 +597,7 @@ def test_a_stretch_is_cut_out_and_the_picture_saved(replay: Any, recording: Path
     press(replay, "]")
     replay.locator("#cut-name").fill("piece.mcap")
     replay.locator("#cut-write").click()
-    shows(replay, "said-text", r"wrote piece\.mcap")
+    shows(replay, "notice-text", r"wrote piece\.mcap")
     whole, piece = taxel.open(recording).events, taxel.open(recording.parent / "piece.mcap").events
     assert 0 < len(piece.t) < len(whole.t)
     with replay.expect_download() as download:

@@ -11,7 +11,7 @@ import taxel
 from taxel import _core
 
 ROOT = Path(__file__).resolve().parents[2]
-WEB = ROOT / "crates/taxel-live/web"
+WEB = ROOT / "crates/taxel-panel/web"
 PAGE = (ROOT / "docs/panel.md").read_text()
 SERVED = sorted(
     str(file.relative_to(WEB))

@@ -410,6 +410,28 @@ def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # n
         assert next(m for m in reversed(page.said) if m["type"] == "transport")["t_us"] == earlier
 
 
+def test_a_recording_of_the_panel_holds_all_sources_of_the_board(tmp_path):
+    sources = {"imu": "given,columns=t_us:ax"}
+    with (
+        Live(0, host="127.0.0.1", record_later=True, sources=sources) as live,
+        Panel(live, folder=tmp_path) as panel,
+        Client(panel) as page,
+    ):
+        live.sample("imu", [1.0, 0.0])
+        page.ask("record", name="walk")
+        page.since_asked("recorder", state="recording")
+        live.sample("imu", [2.0, 0.5])
+        sent = send([bytes.fromhex("c000050304")], *live.address, seconds=0.01)["datagrams"]
+        page.until("counters", events=sent)
+        live.sample("imu", [3.0, 1.5])
+        page.ask("stop")
+        done = page.since_asked("recorder", state="idle")
+        assert (done["error"], done["last"]["file"]) == (None, "walk.mcap")
+    recording = taxel.open(tmp_path / "walk.mcap")
+    assert len(recording.sources["board"].events) == sent
+    assert recording.sources["imu"].frames().values.reshape(-1).tolist() == [0.5, 1.5]
+
+
 def test_the_ports_and_addresses_of_the_machine_are_told(panel):
     with Client(panel) as page:
         assert page.ask("places")["type"] == "done"

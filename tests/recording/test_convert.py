@@ -51,7 +51,10 @@ def test_what_is_repaired_stays_so_in_tables(tmp_path: Path, kind: str) -> None:
         assert taxel.open(path).events == marked
         [cut] = taxel.cut(taxel.open(path), columns=slice(0, 40))
         assert np.array_equal(cut.events.repaired, marked[marked.x < 40].repaired)
-    assert "which events are repaired" in taxel.convert(marked, tmp_path / f"{kind[1:]}.mcap")
+        again = tmp_path / f"{intensity}{kind[1:]}.mcap"
+        assert taxel.convert(marked, again) == []
+        assert taxel.open(again).events == marked
+    assert "which events are repaired" in taxel.convert(marked, tmp_path / f"{kind[1:]}.lsa")
 
 
 @pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
@@ -91,7 +94,7 @@ def test_any_silence_and_any_start_survive_mcap(
     tmp_path: Path, gaps: list[int], start: int, seed: int, intensity: bool
 ) -> None:
     rng = np.random.default_rng(seed)
-    t = (start + np.cumsum(np.array([0, *gaps]))) // 100 * 100
+    t = start + np.cumsum(np.array([0, *gaps]))
     n = len(t)
     ticks = {"intensity": rng.integers(0, 65_536, n), "present": rng.random(n) < 0.5} if intensity else {}
     if intensity and not ticks["present"].any():
@@ -115,10 +118,15 @@ def test_what_a_target_cannot_hold_is_said(tmp_path: Path) -> None:
     for word in ("raw datagrams", "sensor", "2 markers", "2 notes", "1 detections", "registers"):
         assert word in lost[".csv"]
     fine = taxel.Events([0, 192], [1, 2], [3, 4], [True, False], array=THESIS)
-    assert taxel.convert(fine, tmp_path / "fine.mcap") == ["times finer than 100 us"]
-    assert taxel.open(tmp_path / "fine.mcap").events.t.tolist() == [0, 100]
-    back = taxel.Events([500_000, 0], [1, 2], [3, 4], [True, False], array=THESIS)
-    assert taxel.convert(back, tmp_path / "back.mcap") == ["the order of times that step back by more than 0.1 s"]
+    assert taxel.convert(fine, tmp_path / "fine.lsa") == ["times finer than 100 us"]
+    assert taxel.open(tmp_path / "fine.lsa").events.t.tolist() == [0, 100]
+    late = taxel.Events([7_000_000], [1], [3], [True], array=THESIS)
+    assert taxel.convert(late, tmp_path / "late.lsa") == ["whole turns of 6.5536 s in times"]
+    back = taxel.Events([500_001, 0], [1, 2], [3, 4], [True, False], array=THESIS)
+    for events in (fine, late, back):
+        assert taxel.convert(events, tmp_path / "table.mcap", overwrite=True) == []
+        assert taxel.open(tmp_path / "table.mcap").events == events
+        assert taxel.open(tmp_path / "table.mcap").verdict == "nothing lost"
 
 
 def test_a_npz_keeps_notes_detections_registers_and_the_sensor(tmp_path: Path) -> None:
@@ -185,11 +193,15 @@ def test_pictures_do_not_go_into_files_of_events(tmp_path: Path, kind: str) -> N
 
 def test_a_taxel_beyond_six_bits_is_refused_by_the_wire(tmp_path: Path) -> None:
     wide = taxel.Events([0], [64], [0], [True], array=taxel.Array(8, 100))
-    for kind in (".mcap", ".lsa"):
-        with pytest.raises(ProblemError, match="63"):
-            taxel.convert(wide, tmp_path / f"a{kind}")
-    assert taxel.convert(wide, tmp_path / "a.npz") == []
-    assert taxel.open(tmp_path / "a.npz").events == wide
+    with pytest.raises(ProblemError, match="63"):
+        taxel.convert(wide, tmp_path / "a.lsa")
+    for kind in (".npz", ".mcap"):
+        assert taxel.convert(wide, tmp_path / f"a{kind}") == []
+        assert taxel.open(tmp_path / f"a{kind}").events == wide
+    huge = taxel.Events([0], [64], [0], [True], array=taxel.Array(300, 300))
+    with pytest.raises(ProblemError, match="65536 positions"):
+        taxel.convert(huge, tmp_path / "b.mcap")
+    assert not (tmp_path / "b.mcap").exists()
 
 
 def test_a_slice_of_a_recording_is_converted_as_a_slice(tmp_path: Path) -> None:

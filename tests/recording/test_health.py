@@ -142,7 +142,8 @@ def test_noise_that_no_live_taxel_is_silent_in_shows_the_dead_ones() -> None:
 def test_what_lies_around_is_numpys_quantile(reach: int, share: float) -> None:
     rng = np.random.default_rng(7)
     grid = np.where(rng.random((9, 13)) < 0.6, np.nan, rng.integers(0, 50, (9, 13)))
-    found = _around(grid, reach, share)
+    counts = ~np.isnan(grid)
+    found = _around(np.nan_to_num(grid), counts, np.arange(grid.size), reach, share).reshape(grid.shape)
     for y, x in np.ndindex(grid.shape):
         near = grid[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1].ravel().tolist()
         own = grid[y, x]

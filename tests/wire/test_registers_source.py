@@ -14,9 +14,13 @@ import taxel
 from taxel.wire import PRESETS, Registers
 
 ROOT = Path(__file__).parents[2]
-PANEL = "crates/taxel-live/web/registers.js"
+PANEL = "crates/taxel-panel/web/registers.js"
 MADE = (
     "crates/taxel-core/src/wire/registers/table.rs",
+    "crates/taxel-core/src/wire/registers/fields.rs",
+    "crates/taxel-core/src/wire/registers/presets.rs",
+    "crates/taxel-core/src/wire/registers/rules.rs",
+    "crates/taxel-core/src/wire/registers/power_law.rs",
     "crates/taxel-live/src/recording/schemas/Registers.json",
     PANEL,
     "docs/registers.md",

@@ -1,6 +1,6 @@
 //! Times by train.
 
-use crate::{Result, problem};
+use crate::{Result, Stop, problem};
 
 /// A time of the wire, us, as neurons count it, ms.
 #[must_use]
@@ -106,8 +106,12 @@ impl SpikeTrains {
     }
 
     /// All spikes by time; at equal times the lower train first.
-    #[must_use]
-    pub fn by_time(&self) -> Vec<Spike> {
+    ///
+    /// # Errors
+    ///
+    /// `Interrupted` where the caller stops it.
+    pub fn by_time(&self, stop: Stop<'_>) -> Result<Vec<Spike>> {
+        stop.check()?;
         let mut all: Vec<Spike> = (0..self.len())
             .flat_map(|n| {
                 (self.offsets[n]..self.offsets[n + 1]).map(move |k| Spike {
@@ -117,8 +121,21 @@ impl SpikeTrains {
                 })
             })
             .collect();
-        all.sort_by(|a, b| a.t.total_cmp(&b.t));
-        all
+        for piece in all.chunks_mut(SORTED_AT_ONCE) {
+            stop.check()?;
+            piece.sort_by(|a, b| a.t.total_cmp(&b.t));
+        }
+        let mut sorted = SORTED_AT_ONCE;
+        while sorted < all.len() {
+            let mut merged = Vec::with_capacity(all.len());
+            for pair in all.chunks(2 * sorted) {
+                let (first, second) = pair.split_at(sorted.min(pair.len()));
+                merge(first, second, &mut merged, stop)?;
+            }
+            all = merged;
+            sorted *= 2;
+        }
+        Ok(all)
     }
 
     /// Signed trains as twice as many unsigned ones: first all ON (value above 0), then all OFF.
@@ -144,6 +161,29 @@ impl SpikeTrains {
     pub fn check(&self) -> Result<()> {
         check(&self.times, &self.offsets, self.values.as_ref().map(Vec::len), self.start, self.stop)
     }
+}
+
+/// So many spikes are sorted between two checks for Ctrl-C.
+const SORTED_AT_ONCE: usize = 1 << 18;
+
+/// Appends two sorted runs to `out`, sorted; at equal times those of the first come first.
+fn merge(first: &[Spike], second: &[Spike], out: &mut Vec<Spike>, stop: Stop<'_>) -> Result<()> {
+    let (mut i, mut j) = (0, 0);
+    while i < first.len() && j < second.len() {
+        if (i + j) % SORTED_AT_ONCE == 0 {
+            stop.check()?;
+        }
+        if second[j].t.total_cmp(&first[i].t).is_lt() {
+            out.push(second[j]);
+            j += 1;
+        } else {
+            out.push(first[i]);
+            i += 1;
+        }
+    }
+    out.extend_from_slice(&first[i..]);
+    out.extend_from_slice(&second[j..]);
+    Ok(())
 }
 
 /// [`SpikeTrains::check`] for columns wherever they lie; of the values their number matters.

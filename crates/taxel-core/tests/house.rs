@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Floors from the ground up; those of one line do not know of each other.
-const FLOORS: [(&str, &[&[&str]]); 3] = [
+const FLOORS: [(&str, &[&[&str]]); 4] = [
     (
         "taxel-core",
         &[
@@ -34,7 +34,23 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
             &["recording"],
             &["capture"],
             &["emulate", "pipeline"],
-            &["panel"],
+        ],
+    ),
+    (
+        "taxel-panel",
+        &[
+            &["assets", "clients", "connections", "limits", "options", "request", "time_columns"],
+            &["array_state", "encoded_spikes", "recorder", "taxel_history"],
+            &["keyframe_index"],
+            &["folder", "handler", "player"],
+            &["labels", "picture", "presets"],
+            &["live_source"],
+            &["messages"],
+            &["hub"],
+            &["recording_session", "registers"],
+            &["requests"],
+            &["session"],
+            &["server"],
         ],
     ),
     (

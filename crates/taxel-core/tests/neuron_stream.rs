@@ -37,7 +37,7 @@ fn neurons() -> impl Iterator<Item = Neuron> {
 fn in_pieces(neuron: &Neuron, weights: &[f64], trains: &SpikeTrains, cuts: &[f64]) -> Vec<OutputSpike> {
     let mut stream = neuron.stream(weights, 1.0, trains.start).unwrap();
     let (mut out, mut cut) = (Vec::new(), 0);
-    for spike in trains.by_time() {
+    for spike in trains.by_time(Stop::never()).unwrap() {
         while cut < cuts.len() && cuts[cut] <= spike.t {
             stream.advance(cuts[cut], &mut out);
             cut += 1;
@@ -108,7 +108,7 @@ fn a_factor_on_the_threshold_moves_the_crossing_to_where_the_potential_has_that_
     let trains = SpikeTrains::from_spikes(&[Spike { t: 0.0, train: 0, value: 1.0 }], 1, false, 0.0, 40.0).unwrap();
     for factor in [0.5, 0.9, 1.0] {
         let first = neuron.run(&[1.0], &trains, factor, Stop::never()).unwrap()[0];
-        let reached = neuron.potential(&[1.0], &trains, &[first.t], &[]).unwrap()[0];
+        let reached = neuron.potential(&[1.0], &trains, &[first.t], &[], Stop::never()).unwrap()[0];
         assert!((reached - 0.3 * factor).abs() < 1e-15);
         let x = first.t / 10.0;
         assert!((first.slope - (1.0 - x) * (-x).exp() / 10.0).abs() < 1e-14);

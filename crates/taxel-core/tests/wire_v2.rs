@@ -593,13 +593,16 @@ fn in_one_go(stream: &[u8], array: &Array) -> Told {
     let (mut p, mut present) = (vec![0; rows], vec![0; rows]);
     let room = Room::new(&mut t, [&mut x, &mut y, &mut ticks], [&mut p, &mut present]).unwrap();
     let told = v2::decode(stream, array.clone(), room, Stop::never()).unwrap();
-    let n = told.filled.rows;
+    let n = told.columns.filled.rows;
     let bools = |column: &[u8]| column[..n].iter().map(|&byte| byte == 1).collect::<Vec<bool>>();
     let mut events = Events::empty(array.clone());
     (events.t, events.x, events.y, events.p) = (t[..n].to_vec(), x[..n].to_vec(), y[..n].to_vec(), bools(&p));
-    events.intensity =
-        told.filled.paired.then(|| taxel_core::Intensities { ticks: ticks[..n].to_vec(), present: bools(&present) });
-    (events.repaired, events.markers) = (told.repaired, told.markers);
+    events.intensity = told
+        .columns
+        .filled
+        .paired
+        .then(|| taxel_core::Intensities { ticks: ticks[..n].to_vec(), present: bools(&present) });
+    (events.repaired, events.markers) = (told.columns.repaired, told.columns.markers);
     (events, told.counts, told.skipped)
 }
 

@@ -1,4 +1,4 @@
-//! Names of hosts to addresses, the same for who sends and who listens.
+//! Names of hosts to addresses, the same for senders and receivers.
 
 use std::net::{SocketAddr, ToSocketAddrs};
 

@@ -11,7 +11,7 @@ use crate::host_clock::HostOffset;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Bridged {
-    /// Parcels that came, the empty ones that say "still here" among them.
+    /// Parcels that came, empty ones, which only report that the bridge runs, included.
     pub parcels: u64,
     /// Datagrams that were sent over the bridge and never came.
     pub missing: u64,
@@ -25,11 +25,11 @@ pub struct Bridged {
     pub refused: u64,
     /// How often the bridge was begun anew while it was listened to.
     pub restarts: u64,
-    /// How often nothing was heard for a second or more.
+    /// How often nothing was received for a second or more.
     pub silences: u64,
-    /// Whether something was heard within the last second.
+    /// Whether something was received within the last second.
     pub heard: bool,
-    /// Whether the bridge said that it ends.
+    /// Whether the bridge reported its end.
     pub ended: bool,
     /// The other computer's clock against this one's.
     pub clock: Option<HostOffset>,

@@ -1,4 +1,4 @@
-//! The emulated board as a process of its own: frames felt, datagrams sent, commands heard, in real time.
+//! The emulated board as a process of its own: frames scanned, datagrams sent, commands carried out, in real time.
 
 mod control;
 mod feed;
@@ -39,7 +39,7 @@ const STEP: Duration = Duration::from_nanos(100);
 /// How often two clocks are read until both were read at once, as near as that comes.
 const READINGS: usize = 16;
 
-/// What an emulated board feels: a scene, a recording played again, noise.
+/// The touch that an emulated board scans: a scene, a recording played again, noise.
 pub trait Touch: Send {
     /// Writes the next frame's trip times (ticks of 1/300 us, one a taxel, by taxel index); false where there is none
     /// any more, or the caller stops it while it waits, and the board stops.
@@ -50,7 +50,7 @@ pub trait Touch: Send {
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool>;
 
     /// Whether the next frame can be written now, or there is none any more; waits for it some milliseconds at most, so
-    /// that a board which is shown nothing yet hears its commands.
+    /// that a board without a frame yet carries out its commands.
     ///
     /// # Errors
     ///
@@ -83,7 +83,7 @@ pub struct EmulatorOptions {
     pub to: SocketAddr,
     /// Send trains of datagrams in one call where the kernel can cut them (`UDP_SEGMENT`).
     pub segment: bool,
-    /// Frames take the time that they take on the board; else they go as fast as they can.
+    /// Frames take as long as on the board; else they are scanned as fast as possible.
     pub real_time: bool,
     /// Where the board takes its commands: TCP in place of the UART, bytes in, status lines out (`None`: nowhere). Port 0
     /// finds a free one.
@@ -94,7 +94,7 @@ pub struct EmulatorOptions {
     pub sync: Option<(PathBuf, bool)>,
     /// Commands of the schedule: before which frame, and which; ascending.
     pub commands: Vec<(u64, Command)>,
-    /// Whether the first frame is scanned for nobody ([`Board::arm`]).
+    /// Whether the first frame is scanned without sending ([`Board::arm`]).
     pub arms: bool,
     /// Whether the board marks a stop at the end, where a recording runs.
     pub marks_stop: bool,
@@ -201,7 +201,7 @@ impl Emulator {
         Ok(Self { board, array: array.clone(), sender, control, sync, network, crossed, flawed, options })
     }
 
-    /// Where commands are taken, if anywhere.
+    /// The address for commands, if any.
     #[must_use]
     pub fn control_address(&self) -> Option<SocketAddr> {
         self.control.address()
@@ -235,7 +235,7 @@ impl Emulator {
         let mut report = Report { began_ns, ..Report::default() };
         let host_s_per_us = 1e-6 / (1.0 + 1e-6 * self.options.drift_ppm);
         let mut due = begun;
-        // The board's time since its start, us: a reset takes the board's own back to 0.
+        // The board's time since its start, us: a reset sets the board's own clock back to 0.
         let mut before_reset_us = -started_us;
         let (mut looked, mut told) = (begun, begun);
         let mut last = false;
@@ -389,7 +389,7 @@ struct Pace {
 }
 
 impl Pace {
-    /// Waits until `due`, if it is not past; gives the time then.
+    /// Waits until `due`, if it is not past; returns the time then.
     fn wait_until(&mut self, due: Instant) -> Instant {
         let mut now = Instant::now();
         let Some(left) = due.checked_duration_since(now) else { return now };
@@ -398,7 +398,7 @@ impl Pace {
         {
             std::thread::sleep(sleep);
             let woken = Instant::now();
-            // Nine in ten wake in time; what takes longer is a core that was busy, which no waiting mends.
+            // Nine in ten wake in time; a later one had a busy core, which no waiting mends.
             self.sooner = if woken.saturating_duration_since(now + sleep) > self.sooner {
                 (self.sooner + 9 * STEP).min(MOST_AWAKE)
             } else {

@@ -2,7 +2,7 @@
 //!
 //! A question leaves here at t1, reaches the other at t2, its answer leaves there at t3 and is back at t4. Neither way takes
 //! less than no time, so the other clock is ahead by at most t2 - t1 and at least t3 - t4: an interval as wide as the round
-//! trip. Of each second the narrowest is kept (the filter of NTP, RFC 5905, section 10); the drift is the median slope
+//! trip. Of each second the narrowest is stored (the filter of NTP, RFC 5905, section 10); the drift is the median slope
 //! between their middles, and the offset is the middle of what all of the last seconds allow with that drift. It is wrong by
 //! half the difference between the shortest ways there and back, which no exchange can show, and by no more than
 //! [`HostOffset::within_ns`] beside the drift's own error.
@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-/// Of each stretch of this length the narrowest exchange is kept, ns ...
+/// Of each stretch of this length the narrowest exchange is stored, ns ...
 const STRETCH_NS: i64 = 1_000_000_000;
 /// ... for so many stretches, from which the drift comes ...
 const STRETCHES: usize = 64;
@@ -23,9 +23,9 @@ const BELIEVED: usize = 4;
 const MOST_DRIFT: f64 = 200e-6;
 /// An exchange that contradicts what was expected by more than this ...
 const ASTRAY_NS: i64 = 5_000_000;
-/// ... so often in a row says that a clock was set.
+/// ... so often in a row means that a clock was set.
 const ASTRAY: u32 = 4;
-/// A round trip that takes longer says nothing, ns.
+/// A longer round trip is ignored, ns.
 const LONGEST_NS: i64 = 2_000_000_000;
 
 /// What another computer's clock shows when this one's shows a time: a line.
@@ -53,7 +53,7 @@ impl HostOffset {
     }
 }
 
-/// The four times of a round trip, ns since 1970 of the clock of where they were taken.
+/// The four times of a round trip, ns since 1970, each by the clock of its computer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RoundTrip {
     /// The question left here.

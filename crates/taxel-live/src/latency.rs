@@ -6,7 +6,7 @@ use serde::Serialize;
 const FINE: u32 = 32;
 const BUCKETS: usize = (FINE * (64 - FINE.ilog2() + 1)) as usize;
 
-/// Durations, kept as a histogram whose buckets are 3 % wide; memory does not grow.
+/// A histogram of durations, with buckets 3 % wide; memory does not grow.
 #[derive(Debug, Clone)]
 pub struct Latencies {
     buckets: Box<[u64; BUCKETS]>,

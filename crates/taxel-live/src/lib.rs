@@ -6,12 +6,11 @@ pub mod clock;
 pub mod error;
 pub mod host_clock;
 mod latency;
-mod locked;
+pub mod locked;
 pub mod ports;
 
 pub mod capture;
 pub mod emulate;
-pub mod panel;
 pub mod pipeline;
 pub mod recording;
 

@@ -20,6 +20,7 @@ mod reader;
 mod receive;
 mod record;
 mod recorder;
+mod recordings;
 mod rest;
 mod said;
 mod sending;
@@ -34,7 +35,7 @@ mod threads;
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -45,7 +46,7 @@ use taxel_core::{Marker, Stop};
 
 use crate::capture::{Origin, Receiver};
 use crate::locked::lock;
-use crate::{Error, Result, recording};
+use crate::{Error, Result};
 pub use copies::{Copied, Copies};
 pub use counters::{Counters, SourceCounts, Summary};
 pub use handle::Handle;
@@ -54,7 +55,8 @@ pub use options::{LiveOptions, Record};
 use output::DetectionOutput;
 pub use reader::Listener;
 use reader::Reader;
-use recorder::{Host, Part, Recorder};
+use recorder::{Part, Recorder};
+use recordings::Recordings;
 pub use said::{Lines, Said, Sink};
 use sending::Sending;
 pub use sending::{Destination, Sent};
@@ -77,6 +79,7 @@ pub struct Live {
     said: channel::Receiver<Said>,
     threads: Vec<JoinHandle<()>>,
     others: Mutex<Others<Live>>,
+    recordings: Arc<Recordings>,
 }
 
 impl Live {
@@ -195,8 +198,11 @@ impl Live {
             let recorder = lock(&shared.recorder).take();
             drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
         })?;
+        let boards = others.boards.iter().map(|(name, board)| (name.clone(), Arc::clone(&board.shared)));
+        let recordings = Recordings::new(Arc::clone(&shared), boards.collect(), others.numbers.clone());
         let others = Mutex::new(others);
-        let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![], others };
+        let mut live =
+            Self { shared: Arc::clone(&shared), said, threads: vec![], others, recordings: Arc::new(recordings) };
         // A device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
@@ -233,7 +239,7 @@ impl Live {
     /// What others may do with it while it runs.
     #[must_use]
     pub fn handle(&self) -> Handle {
-        Handle { shared: Arc::clone(&self.shared) }
+        Handle { shared: Arc::clone(&self.shared), recordings: Arc::clone(&self.recordings) }
     }
 
     /// The next detection; `None` after `timeout` without one, or at once when all is over.
@@ -365,12 +371,7 @@ impl Live {
         if !self.shared.options.record_later {
             return Err(taxel_core::problem!("a recording while listening: begin without one, for later ones").into());
         }
-        let handle = self.handle();
-        if !handle.records() {
-            // An error that ended the last one was not returned yet.
-            self.broken()?;
-        }
-        self.next_recording(Some(handle.reserve(record, self.shared.options.sources.clone())?))
+        self.handle().record(record)
     }
 
     /// Lets the recording that runs begin anew, where no source has given anything; returns whether it does.
@@ -381,63 +382,19 @@ impl Live {
         lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.again(&now))
     }
 
-    /// Ends the recording that [`Live::record`] began; returns what came while it ran, and the file, where anything did.
+    /// As [`Handle::end_recording`].
     ///
     /// # Errors
     ///
-    /// The error that ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
+    /// As [`Handle::end_recording`].
     pub fn end_recording(&self) -> Result<Summary> {
-        self.next_recording(None)?.ok_or_else(|| taxel_core::problem!("nothing is recorded").into())
+        self.handle().end_recording()
     }
 
-    /// Whether a recording that began while listening runs, and has not been ended by an error.
+    /// As [`Handle::records`].
     #[must_use]
     pub fn records(&self) -> bool {
-        let others = lock(&self.others);
-        self.handle().records() && others.boards.iter().all(|(_, board)| lock(&board.shared.broken).is_none())
-    }
-
-    /// The error that ended a recording early, of this board or another.
-    fn broken(&self) -> Result<()> {
-        let others = lock(&self.others);
-        let all = others.boards.iter().map(|(_, board)| &board.shared).chain([&self.shared]);
-        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.broken).take()).collect();
-        errors.into_iter().next().map_or(Ok(()), Err)
-    }
-
-    fn next_recording(&self, next: Option<Recorder>) -> Result<Option<Summary>> {
-        let others = lock(&self.others);
-        let mut sources = BTreeMap::new();
-        let mut ended = vec![];
-        for (name, board) in &others.boards {
-            let host: Weak<dyn Host> = Arc::<Shared>::downgrade(&self.shared);
-            let part = Part { host, name: name.clone() };
-            let part =
-                next.as_ref().map(|next| next.part_of(part, &board.shared.options, board.place())).transpose()?;
-            let (recorder, counts) = board.handle().next_recording(part)?;
-            let counters =
-                recorder.as_ref().and_then(Recorder::since).map_or_else(Counters::default, |s| counts.since(s));
-            sources.insert(name.clone(), SourceCounts::Board(Box::new(counters)));
-            ended.push((recorder, counts));
-        }
-        for (name, numbers) in &others.numbers {
-            let track = next.as_ref().map(|next| next.writer(name)).transpose()?;
-            sources.insert(name.clone(), numbers.keep_in(track));
-        }
-        let (recorder, counters) = self.handle().next_recording(next)?;
-        // Parts end before the whole.
-        for (part, counts) in ended {
-            part.map_or(Ok(None), |part| part.finish(&counts))?;
-        }
-        drop(others);
-        self.broken()?;
-        let Some(recorder) = recorder else { return Ok(None) };
-        let came =
-            Counters { sources, ..recorder.since().map_or_else(Counters::default, |since| counters.since(since)) };
-        let losses = recorder.losses(&counters);
-        let path = recorder.finish(&counters)?;
-        let verdict = self.verdict(&came, came.nothing_came(), losses);
-        Ok(Some(Summary { counters: came, verdict, path, tare: self.tare() }))
+        self.handle().records()
     }
 
     /// Asks all threads to end once they have processed what came; [`Live::stop`] waits for them.
@@ -457,22 +414,12 @@ impl Live {
         let counters = Counters { sources, ..self.shared.counters() };
         let recorder = lock(&self.shared.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
-        let verdict = self.verdict(&counters, counters.nothing_came(), recorder::losses(&counters, None));
+        let lost = recorder::losses(&counters, None);
+        let verdict = recordings::verdict(self.place(), &counters, counters.nothing_came(), &lost);
         joined?;
         self.check()?;
         ended?;
         Ok(Summary { counters, verdict, path, tare: self.tare() })
-    }
-
-    /// One line: what was lost, or that nothing came.
-    fn verdict(&self, counters: &Counters, nothing: bool, losses: recording::Counts) -> String {
-        let verdict = if nothing { nothing_came(self.place(), counters.seconds) } else { losses.verdict() };
-        let others = counters.sources.iter().filter_map(|(name, counts)| match counts {
-            SourceCounts::Board(counts) => Some(format!("{name}: {}", recorder::losses(counts, None).verdict())),
-            SourceCounts::Numbers { strange: 0, .. } => None,
-            SourceCounts::Numbers { strange, .. } => Some(format!("{name}: {strange} lines could not be read")),
-        });
-        std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ")
     }
 
     fn join(&mut self) -> Result<()> {
@@ -484,15 +431,6 @@ impl Live {
         }
         Ok(())
     }
-}
-
-/// The verdict where nothing came, with what to check.
-fn nothing_came(place: &Origin, seconds: f64) -> String {
-    let ask = match place {
-        Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
-        Origin::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
-    };
-    format!("nothing arrived at {place} in {seconds:.1} s: {ask}")
 }
 
 impl Drop for Live {

@@ -12,7 +12,7 @@ pub struct Port {
     pub place: String,
     /// "usb", "pci", "bluetooth" or "other".
     pub kind: &'static str,
-    /// What a USB device calls itself: its product, maker and serial number, as far as it says.
+    /// The product, maker and serial number of a USB device, as far as it reports them.
     pub product: Option<String>,
     /// As above.
     pub maker: Option<String>,

@@ -1,6 +1,6 @@
 //! Files that survive: the live format (MCAP) and the manual's raw `.lsa`.
 //!
-//! A recording keeps what came, not what our decoder made of it: raw datagrams with the host's arrival time and our own
+//! A recording holds what came, not what our decoder made of it: raw datagrams with the host's arrival time and our own
 //! arrival number. Beside them stand the board's registers, markers, notes, detections, counts of what was lost, and a
 //! low-rate picture in a standard schema, so that any MCAP viewer shows something.
 //!
@@ -28,8 +28,7 @@ use taxel_core::{Array, problem};
 use crate::bridged::Bridged;
 
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
-pub(crate) use mcap_reader::begin_with;
-pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks};
+pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
 pub use pictures::Pictures;
@@ -41,13 +40,13 @@ pub use topic::Topic;
 /// Half of it is waited on average; the rest of the 100 ms that a kill may cost is left to compression and a busy machine.
 pub const FLUSH_EVERY: Duration = Duration::from_millis(20);
 
-/// A chunk that has waited so long finds its thread starved: who gives the next message writes it himself.
+/// A chunk that has waited so long means that the writing thread gets no processor: the next caller writes it.
 pub const LATE: Duration = Duration::from_millis(40);
 
-/// What can be said of version 1 when nothing was dropped between the socket and the file.
+/// The verdict on version 1 when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
 
-/// What a recording says of itself, from its first byte on.
+/// What a recording states about itself, from its first bytes on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// The sensor.
@@ -55,6 +54,15 @@ pub struct Header {
     /// What the board's registers held at the beginning, where that is known.
     #[serde(default)]
     pub registers: Option<Registers>,
+    /// The array that those registers drive, where the recording is a part of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub driven: Option<Array>,
+    /// What was left behind on the way to this file, a line each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<String>,
+    /// The numbers of events that a state gave, in a file made of events whose datagrams do not say so.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub repaired: Vec<u64>,
     /// Whether intensity words are differences (the board's option) instead of values.
     #[serde(default)]
     pub difference: bool,
@@ -68,7 +76,7 @@ pub struct Header {
     /// The host's clock when the recording began, ns since 1970.
     #[serde(default)]
     pub started_ns: i64,
-    /// What this source is called among the others of its file.
+    /// The name of this source among the others of its file.
     #[serde(default = "board", skip_serializing_if = "is_board")]
     pub name: String,
     /// Of a stream of numbers what its lines hold; a board has none.
@@ -79,7 +87,7 @@ pub struct Header {
     pub sources: Vec<Header>,
 }
 
-/// What a source is called that nobody named.
+/// The name of a source that was given none.
 fn board() -> String {
     "board".to_owned()
 }
@@ -142,13 +150,13 @@ pub struct Counts {
     /// Of a board that speaks version 2: datagrams that it sent and that never came intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
-    /// What the recording that this one was converted from said.
+    /// The verdict of the recording that this one was converted from.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converted: Option<String>,
 }
 
 impl Header {
-    /// Checks what a file says of itself.
+    /// Checks what a file states about itself.
     pub(crate) fn check(&self) -> taxel_core::Result<()> {
         self.array.check()?;
         let (rows, columns) = (self.array.rows, self.array.columns);
@@ -165,7 +173,9 @@ impl Header {
                 return Err(problem!("source {}: {n} columns of values, and {} taxels", self.name, self.array.len()));
             }
         }
-        self.registers.map_or(Ok(()), |registers| registers.check(&self.array))?;
+        let driven = self.driven.as_ref().unwrap_or(&self.array);
+        driven.check()?;
+        self.registers.map_or(Ok(()), |registers| registers.check(driven))?;
         if self.sources.len() >= limits::SOURCES {
             return Err(problem!("{} sources; a file holds at most {}", self.sources.len() + 1, limits::SOURCES));
         }
@@ -190,6 +200,9 @@ impl Header {
         Self {
             array,
             registers,
+            driven: None,
+            lost: vec![],
+            repaired: vec![],
             difference: false,
             origin_us: 0,
             source,
@@ -273,7 +286,7 @@ impl Counts {
     }
 }
 
-/// What a decoder could not use, by cause, as recordings keep it.
+/// What a decoder could not use, by cause, as recordings state it.
 #[must_use]
 pub fn damage(counts: &wire::Counts) -> BTreeMap<String, u64> {
     [
@@ -333,7 +346,7 @@ pub struct BoardChange {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "change", rename_all = "lowercase")]
 pub enum Change {
-    /// The board was reset: its taxels hold nothing until they are heard again.
+    /// The board was reset: its taxels hold no value until their next event.
     Reset,
     /// It speaks another version of the wire.
     Wire {

@@ -1,4 +1,4 @@
-//! What travels between computers: parcels out of a pipeline, and into one.
+//! Copies for other computers out of a pipeline, and their parcels into one.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -14,11 +14,11 @@ use taxel_live::pipeline::{Copied, Copies as Outlet};
 use crate::enter::{Shared, enter};
 use crate::errors::ProblemError;
 
-/// Where parcels of another computer go in.
+/// The entrance for parcels of another computer.
 #[pyclass(frozen)]
 pub(crate) struct Feed {
     feed: capture::Feed,
-    /// Until a pipeline takes it.
+    /// `None` once a pipeline has it.
     receiver: Mutex<Option<Receiver>>,
 }
 
@@ -26,7 +26,7 @@ impl Feed {
     /// The pipeline's end; it can be had once.
     pub(crate) fn receiver(&self) -> taxel_live::Result<Receiver> {
         let taken = self.receiver.lock().unwrap_or_else(PoisonError::into_inner).take();
-        taken.ok_or_else(|| problem!("feed: is heard already").into())
+        taken.ok_or_else(|| problem!("feed: a pipeline receives from it already").into())
     }
 }
 
@@ -51,12 +51,12 @@ impl Feed {
         self.feed.meet();
     }
 
-    /// Takes a round trip to the other computer's clock: four times, ns since 1970.
+    /// Adds a round trip to the other computer's clock: four times, ns since 1970.
     fn compare(&self, asked: i64, came: i64, answered: i64, back: i64) {
         self.feed.compare(RoundTrip { asked, came, answered, back });
     }
 
-    /// What came and what was lost: JSON.
+    /// Counts of what came and what was lost: JSON.
     fn bridged(&self) -> String {
         json!(self.feed.bridged()).to_string()
     }
@@ -66,13 +66,13 @@ impl Feed {
         self.feed.fail(said);
     }
 
-    /// Whether nobody takes any more.
+    /// Whether the pipeline has ended.
     fn is_over(&self) -> bool {
         self.feed.is_over()
     }
 }
 
-/// Where a pipeline's copies come out.
+/// The receiving end of a pipeline's copies.
 #[pyclass(frozen)]
 pub(crate) struct Copies(Shared<Outlet>);
 
@@ -96,7 +96,7 @@ impl Copies {
         }))
     }
 
-    /// Whether the pipeline has ended and everything was given.
+    /// Whether the pipeline has ended and every copy was taken.
     fn is_over(&self, py: Python<'_>) -> bool {
         self.0.look(py, |copies| copies.is_over())
     }

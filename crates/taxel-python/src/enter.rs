@@ -1,4 +1,4 @@
-//! The one door: lets the GIL go, hears Ctrl-C, tells Python how work comes on, turns a panic into an error.
+//! The one way from Python into long work: releases the GIL, checks for Ctrl-C, reports progress, turns a panic into an error.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -9,12 +9,12 @@ use taxel_core::Stop;
 
 use crate::errors::{Error, IntoPyErr};
 
-/// How often a long call asks Python whether Ctrl-C came: often enough to feel prompt, rarely enough to cost nothing.
+/// How often a long call asks Python for pending signals: often enough to be prompt, rarely enough to cost nothing.
 const ASK_EVERY: Duration = Duration::from_millis(50);
 
 /// Runs `work` without the GIL.
 ///
-/// `work` gets a [`Stop`] that says true once Python has a signal pending; the signal's own exception is then raised.
+/// `work` gets a [`Stop`] that asks it to stop once Python has a signal pending; the signal's own exception is then raised.
 pub(crate) fn enter<T, E>(py: Python<'_>, work: impl FnOnce(Stop<'_>) -> Result<T, E> + Send) -> PyResult<T>
 where
     T: Send,
@@ -23,7 +23,7 @@ where
     enter_telling(py, |stop, _| work(stop))
 }
 
-/// As [`enter`], for work that tells Python functions how it comes on.
+/// As [`enter`], for work that calls Python functions with its progress.
 pub(crate) fn enter_telling<T, E>(
     py: Python<'_>,
     work: impl FnOnce(Stop<'_>, Teller<'_>) -> Result<T, E> + Send,
@@ -38,10 +38,10 @@ where
     }
 }
 
-/// As [`enter_telling`], for work that keeps the best so far when it is stopped: by Ctrl-C, by what a function raises that
-/// is told, or after `max_seconds`.
+/// As [`enter_telling`], for work that returns its best result so far when it is stopped: by Ctrl-C, by an exception of a progress
+/// function, or after `max_seconds`.
 ///
-/// Gives its result together with the exception that stopped it, which the caller raises once the result is kept.
+/// Returns the result together with the exception that stopped the work, which the caller raises once the result is stored.
 pub(crate) fn enter_keeping<T, E>(
     py: Python<'_>,
     max_seconds: Option<f64>,
@@ -53,7 +53,7 @@ where
 {
     match guarded(py, max_seconds, work) {
         (Ok(value), raised) => {
-            // A Ctrl-C since the last look would be raised before the caller has kept the result.
+            // A Ctrl-C since the last check would be raised before the caller has stored the result.
             let raised = raised.or_else(|| py.check_signals().err());
             Ok((value, raised.map(|r| r.into_value(py).into_any())))
         }
@@ -62,8 +62,8 @@ where
     }
 }
 
-/// Tells Python functions how work comes on. What one raises ends the work, as Ctrl-C does, and is raised again; after it
-/// nothing more is told.
+/// Calls Python functions with the progress of work. An exception of one ends the work, as Ctrl-C does, and is raised again; no
+/// function is called after it.
 #[derive(Clone, Copy)]
 pub(crate) struct Teller<'a>(&'a Mutex<Option<PyErr>>);
 
@@ -91,7 +91,7 @@ impl Teller<'_> {
     }
 }
 
-/// What several Python threads may use: one at a time, and the others wait without the GIL.
+/// An object that several Python threads may use: one at a time, and the others wait without the GIL.
 pub(crate) struct Shared<T>(Mutex<T>);
 
 impl<T: Send> Shared<T> {
@@ -99,7 +99,7 @@ impl<T: Send> Shared<T> {
         Self(Mutex::new(value))
     }
 
-    /// Through the door, as [`enter`].
+    /// Long work, as [`enter`].
     pub(crate) fn enter<R, E>(
         &self,
         py: Python<'_>,
@@ -112,7 +112,7 @@ impl<T: Send> Shared<T> {
         enter(py, |stop| work(&mut self.lock(), stop))
     }
 
-    /// A short look, or a short change: without the GIL all the same, since who works in it may be asking for the GIL.
+    /// A short read or change: also without the GIL, since the thread that holds the lock may be waiting for the GIL.
     pub(crate) fn look<R: Send>(&self, py: Python<'_>, look: impl FnOnce(&mut T) -> R + Send) -> R {
         py.detach(|| look(&mut self.lock()))
     }
@@ -123,12 +123,12 @@ impl<T: Send> Shared<T> {
     }
 }
 
-/// What a mutex holds. A panic is reported by the door; what it left is no worse than after an error.
+/// The value of a mutex, also after a panic: [`enter`] reports that, and the value is no worse than after an error.
 fn unpoisoned<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What the work gave, and what was raised meanwhile: a signal's exception, or a told function's.
+/// The outcome of the work, and the exception that was raised meanwhile: by a signal, or by a progress function.
 fn guarded<T, E>(
     py: Python<'_>,
     max_seconds: Option<f64>,
@@ -163,12 +163,12 @@ where
         Ok(Ok(value)) => Ok(value),
         Ok(Err(error)) => Err(error.into_py_err()),
         Err(panic) => {
-            let said = panic
+            let message = panic
                 .downcast_ref::<&str>()
                 .map(|s| (*s).to_owned())
                 .or_else(|| panic.downcast_ref::<String>().cloned())
                 .unwrap_or_else(|| "no message".to_owned());
-            Err(Error::new_err(format!("a bug in taxel, please report it: {said}")))
+            Err(Error::new_err(format!("a bug in taxel, please report it: {message}")))
         }
     };
     (outcome, raised.into_inner().unwrap_or_else(PoisonError::into_inner))

@@ -74,15 +74,17 @@ impl ConeRProblem {
     }
 
     /// A fit, and the exception of a signal that ended it early.
-    #[pyo3(signature = (parameters, start, progress))]
+    #[pyo3(signature = (parameters, silent, start, progress))]
     fn fit<'py>(
         &self,
         py: Python<'py>,
         parameters: &str,
+        silent: PyReadonlyArray1<'py, f64>,
         start: Option<StartIn<'py>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<(FitOut<'py>, Option<Py<PyAny>>)> {
         let parameters = to_cone_r(parameters)?;
+        let silent = slice("silent", &silent)?;
         let start = start.as_ref().map(to_start).transpose()?;
         let start = start.as_ref().map(|(weights, multipliers)| (*weights, multipliers.as_ref()));
         let (fit, raised) = enter_keeping(py, parameters.max_seconds, |stop, teller| {
@@ -90,7 +92,7 @@ impl ConeRProblem {
                 let Round { round, rows, objective, left: Left::Gap(gap) } = round else { return };
                 teller.tell(progress.as_ref(), |py, told| told.call1(py, (round, rows, objective, gap)));
             };
-            self.0.fit(&parameters, start, &mut report, stop)
+            self.0.fit(&parameters, silent, start, &mut report, stop)
         })?;
         Ok((fit_out(py, fit), raised))
     }

@@ -25,11 +25,11 @@ use crate::parameters::parsed;
 use crate::thread_state;
 use crate::threaded::Threaded;
 
-/// What Python may choose; everything else is as Rust has it.
+/// The options that Python sets; all others have Rust's defaults.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Chosen {
-    /// A preset's name, or what the registers hold.
+    /// A preset's name, or the registers.
     registers: Value,
     differences: bool,
     guard_frames: f64,
@@ -40,11 +40,11 @@ struct Chosen {
     gro: Option<bool>,
     /// Where detections go as lines.
     send: Vec<String>,
-    /// What the board is called in a recording.
+    /// The board's name in a recording.
     name: String,
-    /// What else the recording holds: what it is called, and what it is.
+    /// The other sources of the recording: name, and description.
     sources: Vec<(String, String)>,
-    /// Whether recordings begin and end while all is heard.
+    /// Whether recordings begin and end while it runs.
     record_later: bool,
 }
 
@@ -133,8 +133,9 @@ impl Live {
         };
         let usual = LiveOptions::new(to_array(parts)?);
         let sources = enter(py, |_| {
-            let said = chosen.sources.iter();
-            said.map(|(name, what)| Ok(Source { name: name.clone(), kind: what.parse()? }))
+            let sources = chosen.sources.iter();
+            sources
+                .map(|(name, what)| Ok(Source { name: name.clone(), kind: what.parse()? }))
                 .collect::<taxel_live::Result<_>>()
         })?;
         let options = LiveOptions {
@@ -184,7 +185,7 @@ impl Live {
         })
     }
 
-    /// Host and port that it listens on.
+    /// Host and port that it receives on.
     fn address(&self, py: Python<'_>) -> PyResult<(String, u16)> {
         let address = self.with(py, |pipeline| Ok(pipeline.address()))?;
         Ok((address.ip().to_string(), address.port()))
@@ -195,7 +196,7 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.place().to_string()))
     }
 
-    /// What the board's registers hold, as far as it was told: JSON.
+    /// The board's registers, as far as they are known: JSON.
     fn registers(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |pipeline| Ok(json!(pipeline.handle().registers()).to_string()))
     }
@@ -217,12 +218,12 @@ impl Live {
         Ok(said.map(said_parts))
     }
 
-    /// Whether the way has ended.
+    /// Whether the pipeline has ended.
     fn is_over(&self, py: Python<'_>) -> bool {
         self.with(py, |pipeline| Ok(pipeline.is_over())).unwrap_or(true)
     }
 
-    /// What came and what became of it: JSON.
+    /// Counts of what came and what became of it: JSON.
     fn counters(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |pipeline| Ok(json!(pipeline.counters()).to_string()))
     }
@@ -232,66 +233,66 @@ impl Live {
         Ok(array(py, self.with(py, |pipeline| Ok(pipeline.picture()))?))
     }
 
-    /// The tare that was taken, as JSON, once it is complete.
+    /// The fresh tare, as JSON, once it is complete.
     fn tare(&self, py: Python<'_>) -> PyResult<Option<String>> {
         self.with(py, |pipeline| Ok(pipeline.tare().map(|tare| tare.to_json())))
     }
 
-    /// Starts and stops that came since this was asked last: (t us, start).
+    /// Starts and stops that came since the last call: (t us, start).
     fn take_markers(&self, py: Python<'_>) -> PyResult<Vec<(i64, bool)>> {
         self.with(py, |pipeline| Ok(pipeline.take_markers().iter().map(|m| (m.t, m.start)).collect()))
     }
 
-    /// Host and port that another board of the recording is listened to on; None where there is none of that name.
+    /// Host and port that another board of the recording sends to; None where there is none of that name.
     fn source_address(&self, py: Python<'_>, name: &str) -> PyResult<Option<(String, u16)>> {
         let address = self.with(py, |pipeline| Ok(pipeline.source_address(name)))?;
         Ok(address.map(|address| (address.ip().to_string(), address.port())))
     }
 
-    /// Keeps numbers of a source that is given; `arrived_ns` is now where it is left out.
+    /// Records numbers of a source whose values a program gives; `arrived_ns` is now where it is left out.
     fn sample(&self, py: Python<'_>, name: &str, values: Vec<f64>, arrived_ns: Option<i64>) -> PyResult<()> {
         let arrived_ns = arrived_ns.unwrap_or_else(taxel_live::recording::now_ns);
         self.with(py, |pipeline| pipeline.sample(name, arrived_ns, &values))
     }
 
-    /// Takes what taxels (column, row) hold for their rest from now on: t in us, column, row, rest after and before.
+    /// Takes the values that taxels (column, row) hold for their rest from now on: t in us, column, row, rest after and before.
     fn zero(&self, py: Python<'_>, taxels: Vec<(u16, u16)>) -> PyResult<Vec<ZeroingOut>> {
         self.with(py, |pipeline| pipeline.handle().zero(&taxels)).map(|all| all.into_iter().map(zeroing_out).collect())
     }
 
-    /// What was zeroed last at each taxel that was.
+    /// The latest zeroing of each taxel that was zeroed.
     fn zeroed(&self, py: Python<'_>) -> PyResult<Vec<ZeroingOut>> {
         self.with(py, |pipeline| Ok(pipeline.handle().zeroed().0)).map(|all| all.into_iter().map(zeroing_out).collect())
     }
 
-    /// Writes something down in the recording.
+    /// Writes a note into the recording.
     fn note(&self, py: Python<'_>, text: &str) -> PyResult<()> {
         self.with(py, |pipeline| pipeline.note(text))
     }
 
-    /// Records what comes from here on; gives how a recording that ran ended, as JSON.
+    /// Records what comes from here on; returns how a recording that ran ended, as JSON.
     fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<String>> {
         let record = to_record(path, compression, overwrite)?;
         let ended = self.with(py, |pipeline| pipeline.record(&record))?;
         Ok(ended.map(|summary| json!(summary).to_string()))
     }
 
-    /// Has the recording that runs begin anew where nothing came into it; gives whether it does.
+    /// Lets the recording that runs begin anew where it holds nothing; returns whether it does.
     fn record_again(&self, py: Python<'_>) -> PyResult<bool> {
         self.with(py, |pipeline| Ok(pipeline.record_again()))
     }
 
-    /// Ends the recording that runs; gives how, as JSON.
+    /// Ends the recording that runs; returns how, as JSON.
     fn end_recording(&self, py: Python<'_>) -> PyResult<String> {
         Ok(json!(self.with(py, Pipeline::end_recording)?).to_string())
     }
 
-    /// Whether a recording that began while listening runs.
+    /// Whether a recording that `record` began runs.
     fn records(&self, py: Python<'_>) -> bool {
         self.with(py, |pipeline| Ok(pipeline.records())).unwrap_or(false)
     }
 
-    /// Says that the host told the board to speak this version of the wire.
+    /// Announces that the host told the board to speak this version of the wire.
     fn expect_version(&self, py: Python<'_>, version: u8) -> PyResult<()> {
         self.with(py, |pipeline| pipeline.expect_version(version))
     }
@@ -324,7 +325,7 @@ fn serial_ports(py: Python<'_>) -> PyResult<String> {
     Ok(json!(ports).to_string())
 }
 
-/// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; gives what was sent as JSON.
+/// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; returns the counts as JSON.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn send(

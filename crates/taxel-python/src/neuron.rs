@@ -77,7 +77,7 @@ fn neuron_potential<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (neuron, trains) = (to_neuron(parameters)?, to_spikes(trains)?);
     let (weights, times, spikes) = (slice("weights", &weights)?, slice("times", &times)?, slice("spikes", &spikes)?);
-    let potential = enter(py, |_| neuron.potential(weights, &trains, times, spikes))?;
+    let potential = enter(py, |stop| neuron.potential(weights, &trains, times, spikes, stop))?;
     Ok(array(py, potential))
 }
 

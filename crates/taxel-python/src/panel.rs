@@ -1,15 +1,22 @@
-//! The panel's server, its files, and the office that answers it in Python.
+//! The panel's server and its files, and its requests as calls of a Python object.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::sync::{PoisonError, RwLock};
 
 use pyo3::prelude::*;
-use serde_json::Value;
-use taxel_core::problem;
+use pyo3::types::PyDict;
+use taxel_core::wire::Command;
+use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
-use taxel_live::panel::assets::asset;
-use taxel_live::panel::{Office, Panel as Server, PanelOptions};
+use taxel_live::pipeline::UNKNOWN;
+use taxel_panel::assets::asset;
+use taxel_panel::{
+    Activity, BoardLines, Cut, LabelRow, Panel as Server, PanelOptions, PresetValue, Reply, RequestHandler,
+    UnhealthyTaxels, UserPreset, UserPresets,
+};
 
+use crate::convert::{array, from_array};
 use crate::enter::enter;
 use crate::errors::core;
 use crate::live::Live;
@@ -20,17 +27,119 @@ fn page_file(name: &str) -> PyResult<&'static [u8]> {
     Ok(asset(name).map_err(core)?.bytes)
 }
 
-/// Calls a Python function of (what, JSON) that returns JSON; what it raises is the reason why not.
-struct Asked(Py<PyAny>);
+/// Calls the methods of a Python object, `PanelRequests` in `_core.pyi`; the text of an exception is the reason of a refusal.
+struct PythonHandler(Py<PyAny>);
 
-impl Office for Asked {
-    fn ask(&self, what: &str, with: &Value) -> Result<Value, String> {
-        let said = Python::attach(|py| {
-            let answer = self.0.call1(py, (what, with.to_string()))?;
-            answer.extract::<String>(py)
-        });
-        let text = said.map_err(|error| Python::attach(|py| error.value(py).to_string()))?;
-        serde_json::from_str(&text).map_err(|error| format!("{what}: {error}"))
+impl PythonHandler {
+    fn call<T>(&self, call: impl FnOnce(&Bound<'_, PyAny>) -> PyResult<T>) -> Reply<T> {
+        Python::attach(|py| call(self.0.bind(py)).map_err(|error| error.value(py).to_string()))
+    }
+}
+
+impl RequestHandler for PythonHandler {
+    fn command(&self, command: Command) -> Reply<u32> {
+        self.call(|handler| handler.call_method1("command", (command.register, command.value))?.extract())
+    }
+
+    fn channels(&self) -> Reply<u8> {
+        self.call(|handler| handler.call_method0("channels")?.extract())
+    }
+
+    fn board_lines(&self) -> Reply<BoardLines> {
+        let (lines, resets) = self.call(|handler| handler.call_method0("board_lines")?.extract())?;
+        Ok(BoardLines { lines, resets })
+    }
+
+    fn connect(&self, place: Option<&str>) -> Reply<()> {
+        self.call(|handler| handler.call_method1("connect", (place,)).map(drop))
+    }
+
+    fn listen(&self, host: &str, port: u16) -> Reply<()> {
+        self.call(|handler| handler.call_method1("listen", (host, port)).map(drop))
+    }
+
+    fn set_differences(&self, on: bool) -> Reply<()> {
+        self.call(|handler| handler.call_method1("set_differences", (on,)).map(drop))
+    }
+
+    fn addresses(&self) -> Reply<Vec<(String, String)>> {
+        self.call(|handler| handler.call_method0("addresses")?.extract())
+    }
+
+    fn health(&self, sensor: &Array, activity: &Activity) -> Reply<UnhealthyTaxels> {
+        let known = activity.range.iter().any(|&(least, _)| least != UNKNOWN);
+        // Python has -1 for what is unknown.
+        let range = |&(least, greatest): &(u16, u16)| match least {
+            UNKNOWN => (-1_i32, -1_i32),
+            _ => (least.into(), greatest.into()),
+        };
+        let (least, greatest): (Vec<_>, Vec<_>) = activity.range.iter().map(range).unzip();
+        let (dead, stuck, noisy) = self.call(|handler| {
+            let py = handler.py();
+            let values = known.then(|| (array(py, activity.values.clone()), array(py, least), array(py, greatest)));
+            let counts = (array(py, activity.events.clone()), array(py, activity.moved.clone()));
+            handler.call_method1("health", (from_array(sensor), counts.0, counts.1, values))?.extract()
+        })?;
+        Ok(UnhealthyTaxels { dead, stuck, noisy })
+    }
+
+    fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>> {
+        let Cut { path, out, start_us, stop_us } = *cut;
+        self.call(|handler| handler.call_method1("cut", (path, out, start_us, stop_us))?.extract())
+    }
+
+    fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>> {
+        let rows: Vec<(String, i64)> =
+            self.call(|handler| handler.call_method1("read_labels", (table, recording))?.extract())?;
+        Ok(rows.into_iter().map(|(label, t_us)| LabelRow { label, t_us }).collect())
+    }
+
+    fn write_labels(&self, table: &Path, labels: &[LabelRow]) -> Reply<()> {
+        let rows: Vec<(&str, i64)> = labels.iter().map(|row| (row.label.as_str(), row.t_us)).collect();
+        self.call(|handler| handler.call_method1("write_labels", (table, rows)).map(drop))
+    }
+
+    fn read_presets(&self) -> Reply<UserPresets> {
+        self.call(|handler| {
+            let (path, presets): (PathBuf, BTreeMap<String, BTreeMap<String, Bound<'_, PyAny>>>) =
+                handler.call_method0("read_presets")?.extract()?;
+            let preset = |held: BTreeMap<String, Bound<'_, PyAny>>| {
+                held.into_iter()
+                    .map(|(name, value)| Ok((name, preset_value(&value)?)))
+                    .collect::<PyResult<UserPreset>>()
+            };
+            let presets = presets.into_iter().map(|(name, held)| Ok((name, preset(held)?))).collect::<PyResult<_>>()?;
+            Ok(UserPresets { path, presets })
+        })
+    }
+
+    fn write_presets(&self, presets: &BTreeMap<String, UserPreset>) -> Reply<()> {
+        self.call(|handler| {
+            let all = PyDict::new(handler.py());
+            for (name, preset) in presets {
+                let values = PyDict::new(handler.py());
+                for (register, value) in preset {
+                    match value {
+                        PresetValue::Flag(flag) => values.set_item(register, flag)?,
+                        PresetValue::Number(number) => values.set_item(register, number)?,
+                        PresetValue::Other(text) => values.set_item(register, text)?,
+                    }
+                }
+                all.set_item(name, values)?;
+            }
+            handler.call_method1("write_presets", (all,)).map(drop)
+        })
+    }
+}
+
+/// A value of a preset, as a table in TOML has it.
+fn preset_value(value: &Bound<'_, PyAny>) -> PyResult<PresetValue> {
+    if let Ok(flag) = value.extract() {
+        return Ok(PresetValue::Flag(flag));
+    }
+    match value.extract() {
+        Ok(number) => Ok(PresetValue::Number(number)),
+        Err(_) => Ok(PresetValue::Other(value.str()?.to_string())),
     }
 }
 
@@ -63,23 +172,23 @@ impl Panel {
         control: Option<String>,
         readout: Option<Vec<String>>,
         live: Option<&Live>,
-        office: Py<PyAny>,
+        requests: Py<PyAny>,
     ) -> PyResult<Self> {
         let handle = live.map(|live| live.handle(py)).transpose()?;
         let server = enter(py, |_| {
             let options = PanelOptions { address: of_host(host, port)?, folder, open: opened, control, readout };
-            Server::start(options, handle, Box::new(Asked(office)))
+            Server::start(options, handle, Box::new(PythonHandler(requests)))
         })?;
         Ok(Self { server: RwLock::new(Some(server)) })
     }
 
-    /// Host and port that it listens on.
+    /// Host and port on which it listens.
     fn address(&self, py: Python<'_>) -> PyResult<(String, u16)> {
         let address = self.with(py, |server| Ok(server.address()))?;
         Ok((address.ip().to_string(), address.port()))
     }
 
-    /// What a person opens, with the token.
+    /// The address for a browser, with the token.
     fn url(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |server| Ok(server.url()))
     }
@@ -89,20 +198,20 @@ impl Panel {
         self.with(py, |server| Ok(server.token().to_owned()))
     }
 
-    /// How many look.
+    /// Number of connected clients.
     fn viewers(&self, py: Python<'_>) -> PyResult<usize> {
         self.with(py, |server| Ok(server.viewers()))
     }
 
-    /// Shows another live source from here on.
+    /// Shows another live source from now on.
     fn attach(&self, py: Python<'_>, live: &Live) -> PyResult<()> {
         let handle = live.handle(py)?;
         self.with(py, |server| server.attach(handle))
     }
 
-    /// Ends; once ended, nothing.
+    /// Ends the server; does nothing once it has ended.
     fn stop(&self, py: Python<'_>) {
-        // The office may be about to call Python: it must be able to, or the server never ends.
+        // A request may be about to call Python: without the GIL released here the server would never end.
         py.detach(|| drop(self.server.write().unwrap_or_else(PoisonError::into_inner).take()));
     }
 }

@@ -77,7 +77,7 @@ impl RecordingReader {
         Ok((arrived, number, array(py, all.t), array(py, all.values), all.bad, all.resets))
     }
 
-    /// What the recording says of itself, how it ended, and what was rebuilt: JSON.
+    /// The header, how the recording ended, and what was rebuilt: JSON.
     fn about(&self) -> String {
         let reader = &self.reader;
         json!({ "header": reader.header(), "ending": reader.ending(), "rebuilt": reader.rebuilt() }).to_string()
@@ -143,7 +143,7 @@ impl RecordingWriter {
         Ok(Self(Threaded::new("recording", "the recording is finished: begin a new one", writer)))
     }
 
-    /// Keeps datagrams: arrival ns, number, where each begins in `payload` (and where the last ends), bytes.
+    /// Writes datagrams: arrival ns, number, where each begins in `payload` (and where the last ends), bytes.
     fn datagrams(
         &self,
         py: Python<'_>,
@@ -157,17 +157,17 @@ impl RecordingWriter {
         self.with(py, |writer| writer.datagrams(arrived_ns, number, offsets, bytes))
     }
 
-    /// Keeps one datagram.
+    /// Writes one datagram.
     fn datagram(&self, py: Python<'_>, arrived_ns: i64, number: u64, payload: &[u8]) -> PyResult<()> {
         self.with(py, |writer| writer.datagram(arrived_ns, number, payload))
     }
 
-    /// Keeps a note.
+    /// Writes a note.
     fn note(&self, py: Python<'_>, at_ns: i64, t_us: Option<i64>, text: &str) -> PyResult<()> {
         self.with(py, |writer| writer.note(at_ns, t_us, text))
     }
 
-    /// Keeps that a taxel was zeroed.
+    /// Writes that a taxel was zeroed.
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn zeroing(
         &self,
@@ -182,12 +182,12 @@ impl RecordingWriter {
         self.with(py, |writer| writer.zeroing(at_ns, &Zeroing { t: t_us, x, y, rest, before }))
     }
 
-    /// Keeps a start or stop of the board.
+    /// Writes a start or stop of the board.
     fn marker(&self, py: Python<'_>, at_ns: i64, t_us: i64, start: bool) -> PyResult<()> {
         self.with(py, |writer| writer.marker(at_ns, Marker { t: t_us, start }))
     }
 
-    /// Keeps a detection.
+    /// Writes a detection.
     #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn detection(
         &self,
@@ -203,25 +203,25 @@ impl RecordingWriter {
         self.with(py, |writer| writer.detection(at_ns, &said))
     }
 
-    /// Keeps a reset of the board or a change of its version of the wire, given as JSON.
+    /// Writes a reset of the board or a change of its version of the wire, given as JSON.
     fn board_change(&self, py: Python<'_>, at_ns: i64, change: &str) -> PyResult<()> {
         let change: BoardChange = parsed("change", change)?;
         self.with(py, |writer| writer.board_change(&BoardChange { at_ns, ..change }))
     }
 
-    /// Keeps registers, given as JSON.
+    /// Writes registers, given as JSON.
     fn registers(&self, py: Python<'_>, at_ns: i64, registers: &str) -> PyResult<()> {
         let registers: wire::Registers = parsed("registers", registers)?;
         self.with(py, |writer| writer.registers(at_ns, &registers))
     }
 
-    /// Keeps what was received and lost so far, given as JSON.
+    /// Writes what was received and lost so far, given as JSON.
     fn counts(&self, py: Python<'_>, at_ns: i64, counts: &str) -> PyResult<()> {
         let counts: Counts = parsed("counts", counts)?;
         self.with(py, |writer| writer.counts(at_ns, &counts))
     }
 
-    /// Keeps a picture of held ticks, row by row.
+    /// Writes a picture of held ticks, row by row.
     fn picture(
         &self,
         py: Python<'_>,
@@ -234,13 +234,13 @@ impl RecordingWriter {
         self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks))
     }
 
-    /// Keeps what the taxels held when it began, ticks by index, 65 535 of one that was not heard of.
+    /// Writes the values that the taxels held when it began, ticks by index, 65 535 of a taxel without any event so far.
     fn held(&self, py: Python<'_>, at_ns: i64, t_us: Option<i64>, ticks: PyReadonlyArray1<'_, u16>) -> PyResult<()> {
         let ticks = slice("ticks", &ticks)?;
         self.with(py, |writer| writer.held(at_ns, t_us, ticks))
     }
 
-    /// Keeps samples of the stream that the recording is of: arrival ns, number, all columns row by row.
+    /// Writes samples of the stream that the recording is of: arrival ns, number, all columns row by row.
     fn samples(
         &self,
         py: Python<'_>,
@@ -275,7 +275,7 @@ fn recording_verdict(counts: &str) -> PyResult<String> {
     Ok(parsed::<Counts>("counts", counts)?.verdict())
 }
 
-/// What of a decoder's counts is damage: JSON in and out.
+/// The damage among a decoder's counts: JSON in and out.
 #[pyfunction]
 fn recording_damage(counts: &str) -> PyResult<String> {
     Ok(json!(taxel_live::recording::damage(&parsed("counts", counts)?)).to_string())

@@ -1,12 +1,14 @@
 //! Streams of version 2 of the wire: datagrams, each behind its length.
 
-use numpy::PyReadonlyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use taxel_core::Error;
 use taxel_core::wire::v2::{self, Decoded, StreamReader};
 
-use crate::convert::{ArrayParts, ColumnsIn, FilledOut, from_filled, slice, to_array, to_room};
+use crate::convert::{
+    ArrayParts, ColumnsIn, EventsIn, FilledOut, array, from_filled, slice, to_array, to_events, to_room,
+};
 use crate::enter::{Shared, enter};
 use crate::parameters::to_json;
 
@@ -25,6 +27,27 @@ fn decode_datagrams<'py>(
     let decoded = enter(py, |stop| v2::decode(bytes, sensor, room, stop))?;
     let Decoded { columns, counts, skipped } = decoded;
     Ok((from_filled(py, columns), to_json(&counts)?, skipped))
+}
+
+/// What is added to times, where each datagram begins (and the last ends), bytes, a time of each; the numbers of events whose
+/// mark as repaired could not be written.
+type EncodedOut<'py> =
+    (i64, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
+
+/// Writes events as datagrams; `held` is what the taxels hold at first, by index.
+#[pyfunction]
+fn encode_datagrams<'py>(
+    py: Python<'py>,
+    events: EventsIn<'py>,
+    held: Option<PyReadonlyArray1<'py, u16>>,
+    promised: bool,
+) -> PyResult<EncodedOut<'py>> {
+    let events = to_events(events)?;
+    let events = events.view()?;
+    let held = held.as_ref().map(|held| slice("held", held)).transpose()?;
+    let encoded = enter(py, |_| v2::encode(events, held, promised))?;
+    let (offsets, bytes, times) = (encoded.offsets, encoded.bytes, encoded.times);
+    Ok((encoded.origin_us, array(py, offsets), array(py, bytes), array(py, times), array(py, encoded.unmarked)))
 }
 
 /// Cuts a stream into datagrams.
@@ -66,5 +89,6 @@ impl DatagramStream {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<DatagramStream>()?;
+    module.add_function(wrap_pyfunction!(encode_datagrams, module)?)?;
     module.add_function(wrap_pyfunction!(decode_datagrams, module)?)
 }

@@ -328,7 +328,7 @@ def floats(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.
 def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
     """Return a mask over all rows, or numbers of rows, as an index; refuse what is neither, by name."""
     try:
-        index = np.asarray(chosen)
+        index = np.asarray(bare(name, chosen))
     except ValueError:
         index = np.empty(0, object)
     if index.size == 0 and index.ndim == 1 and index.dtype.kind in "fi":

@@ -364,6 +364,18 @@ class Calibration:
         loaded = (read > known + self.floor) & ~np.isnan(rest) & _there(self.array)
         return _32_bits(np.where(loaded, self.gain * self._curve.values(read, known), 0.0))
 
+    def _region(self, columns: slice, rows: slice) -> Calibration:
+        """Return the calibration of a rectangle of the array."""
+        (left, right), (top, bottom) = self.array.region(columns, rows)
+        exists = None if self.array.exists is None else self.array.exists[top:bottom, left:right]
+        small = Array(bottom - top, right - left, self.array.pitch_mm, exists, self.array.name)
+        curve, rest = self._curve, None if self.rest is None else self.rest[top:bottom, left:right]
+        if isinstance(curve, Table) and curve.x.ndim == 3:
+            curve = Table(curve.x[:, top:bottom, left:right], curve.y)
+        gain = self.gain[top:bottom, left:right]
+        said = {name: getattr(self, name) for name in ("floor", "date", "residual", "loads", "note")}
+        return self._made(small, curve, self.unit, self.of, {**said, "gain": gain, "rest": rest})
+
     def to_json(self) -> str:
         """Return the calibration as JSON that people can read."""
         even = bool((self.gain == self.gain[0, 0]).all())

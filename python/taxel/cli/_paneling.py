@@ -1,4 +1,4 @@
-"""What the commands that show the panel have in common."""
+"""Options and output of the commands that show the panel."""
 
 from __future__ import annotations
 
@@ -15,19 +15,21 @@ __all__ = ["OpenOption", "PanelHostOption", "PanelPortOption", "announce"]
 
 PanelHostOption = Annotated[
     str,
-    typer.Option(help="The address of this machine on which the panel listens; others than loopback are warned of."),
+    typer.Option(
+        help="The address of this machine on which the panel listens; a warning is printed for any but loopback."
+    ),
 ]
 PanelPortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The panel's TCP port; 0 finds a free one.")]
 OpenOption = Annotated[bool, typer.Option("--open/--no-open", help="Open the panel in a browser.")]
 
 
 def announce(panel: Panel, opens: bool, console: Console) -> None:
-    """Say where the panel is, warn where others can reach it, and open it."""
+    """Print the panel's address, warn where other machines can reach it, and open it."""
     host = panel.address[0]
     if not ipaddress.ip_address(host).is_loopback:
         console.print(
-            f"warning: the panel listens on {host}: whoever learns its address with the token can look and set "
-            "registers, and the way there is not encrypted",
+            f"warning: the panel listens on {host}: everybody who has its address with the token can see the board "
+            "and set registers, and the connection is not encrypted",
             soft_wrap=True,
         )
     console.print(f"panel: {panel.url}", soft_wrap=True, highlight=False)

@@ -16,13 +16,10 @@ from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption, geometry, of_array
 
 if TYPE_CHECKING:
-    from taxel.frames import Frames
     from taxel.recording import Recording
+    from taxel.recording.pressure import Series
 
 __all__ = ["info"]
-
-#: The stretch over which the highest rate is taken, us.
-_PEAK_US = 10_000
 
 _PICTURES = (".png", ".svg", ".pdf")
 
@@ -50,7 +47,8 @@ def info(
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     """
     from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
-    from taxel.recording.pressure import above_rest  # noqa: PLC0415
+    from taxel.recording.pressure import above_rest, series  # noqa: PLC0415
+    from taxel.recording.summary import summary  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
@@ -65,7 +63,7 @@ def info(
         if isinstance(opened, list):
             if picture is not None or table is not None:
                 raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")
-            every = [about(recording, above_rest(recording)) for recording in opened]
+            every = [summary(recording, series(recording)) for recording in opened]
             typer.echo(json.dumps(every) if as_json else "\n".join(_page(said) for said in every))
             return
         if len(opened.sources) > 1:
@@ -73,13 +71,13 @@ def info(
             typer.echo(json.dumps(several) if as_json else _pages(several))
             return
         recording = opened
-        pressed = above_rest(recording)
-        said = about(recording, pressed)
+        pressed = series(recording)
+        said = summary(recording, pressed)
         said["array_assumed"] &= array is None
     if table is not None:
         if pressed is None:
             raise ProblemError(f"{file}: holds events without intensities, so there is no pressure to write")
-        text = "".join(f"{line}\n" for line in _lines(*pressed))
+        text = "".join(f"{line}\n" for line in _lines(pressed))
         write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
         said["table"] = str(table)
     if picture is not None:
@@ -96,7 +94,9 @@ def info(
         else:
             grid = figure.add_gridspec(2, 1, height_ratios=(2, 3))
             overview(recording, figure.add_subfigure(grid[0]))
-            pressure(*pressed, figure=figure.add_subfigure(grid[1]))
+            above = above_rest(recording)
+            assert above is not None  # there are series
+            pressure(*above, figure=figure.add_subfigure(grid[1]))
         write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
         said["picture"] = str(picture)
     typer.echo(json.dumps(said) if as_json else _page(said))
@@ -104,7 +104,8 @@ def info(
 
 def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
     """Return what is said of each source of a file, and how their clocks lie to the first one's."""
-    from taxel.recording.pressure import above_rest  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.summary import summary  # noqa: PLC0415
 
     if drawn:
         raise ProblemError(
@@ -114,7 +115,7 @@ def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
     first = next(iter(recording.sources.values()))
     sources: dict[str, Any] = {}
     for name, source in recording.sources.items():
-        said = about(source, None if source.is_stream else above_rest(source))
+        said = summary(source, None if source.is_stream else series(source))
         clock, ours = source.clock, first.clock
         if source.is_stream:
             said["columns"] = source.columns
@@ -151,97 +152,12 @@ def _opened(file: Path, array: str | None) -> Recording | list[Recording]:
     return opened[0] if len(opened) == 1 else opened
 
 
-def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[str, Any]:
-    """Return all that `taxel info` says, as JSON holds it."""
-    from taxel.recording.health import health  # noqa: PLC0415
-
-    array = recording.array
-    table = recording.events if recording.has_events else recording.frames()
-    span = (int(table.t.min()), int(table.t.max())) if len(table) else None
-    seconds = (span[1] - span[0]) / 1e6 if span else 0.0
-    said: dict[str, Any] = {
-        "file": _named(recording),
-        "kind": recording.kind,
-        "source": recording.source,
-        "array": {name: value for name, value in array._geometry().items() if name != "exists"},
-        "array_assumed": recording.kind in ("csv", "lsa") and recording.has_events,
-        "from_us": span[0] if span else None,
-        "to_us": span[1] if span else None,
-        "seconds": seconds,
-    }
-    if recording.has_events:
-        events = recording.events
-        said["events"] = len(events)
-        said["intensities"] = 0 if events.present is None else int(events.present.sum())
-        said["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
-        said["events_per_s_board"] = len(events) / seconds if seconds else None
-        said["peak_events_per_s_board"] = _peak(events.t)
-    else:
-        said["pictures"], said["unit"] = len(table), recording.frames().unit
-        said["pictures_per_s"] = (len(table) - 1) / seconds if seconds else None
-    clock = recording.clock
-    if clock is not None and len(clock.board_us) > 1:
-        host = (int(clock.arrived_ns.max()) - int(clock.arrived_ns.min())) / 1e9
-        late = np.percentile(clock.delay_us, [50, 99])
-        said |= {
-            "seconds_host": host,
-            "events_per_s_host": said["events"] / host if host and "events" in said else None,
-            "datagrams_per_s_host": len(clock.arrived_ns) / host if host else None,
-            "drift_ppm": clock.drift_ppm,
-            "delay_us": {"median": float(late[0]), "p99": float(late[1])},
-        }
-    calibration = recording.calibration
-    said["calibration"] = None if calibration is None else calibration.described()
-    said["pressure"] = None if pressed is None else _pressure(*pressed)
-    return said | {
-        "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
-        "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
-        "registers": None if recording.registers is None else json.loads(recording.registers._json()),
-        "taxels": health(table).named(),
-        "counts": recording.counts,
-        "truncated": recording.truncated,
-        "rebuilt": recording.rebuilt,
-        "verdict": recording.verdict,
-    }
-
-
-def _named(recording: Recording) -> str:
-    """Return the file, and which trial of it this is where other people's holds several."""
-    place = str(recording.path)
-    return place if place.endswith(recording.name) else f"{place}, {recording.name}"
-
-
-def _pressure(frames: Frames, above: float) -> dict[str, Any] | None:
-    """Return the largest contact area, peak and sum with their times, and where the centre went."""
-    if not len(frames):
-        return None
-    series = {"area_mm2": frames.area(above), "peak": frames.peak(), "sum": frames.total()}
-    said: dict[str, Any] = {"unit": frames.unit, "above": above}
-    for name, values in series.items():
-        k = int(values.argmax())
-        said[name] = {"most": float(values[k]), "t_us": int(frames.t[k])}
-    centre = frames.centre(above)
-    centre = centre[~np.isnan(centre).any(axis=1)]
-    limits = {"x": [float(v) for v in (centre[:, 0].min(), centre[:, 0].max())]} if len(centre) else None
-    if limits is not None:
-        limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
-    return said | {"centre_mm": limits}
-
-
-def _lines(frames: Frames, above: float) -> Iterator[str]:
+def _lines(pressed: Series) -> Iterator[str]:
     """Give the lines of a table of pressure over time; the centre is empty where nothing is loaded."""
-    yield f"t_us,area_mm2,peak_{frames.unit},sum_{frames.unit},centre_x_mm,centre_y_mm"
-    columns = (frames.t, frames.area(above), frames.peak(), frames.total(), *frames.centre(above).T)
+    yield f"t_us,area_mm2,peak_{pressed.unit},sum_{pressed.unit},centre_x_mm,centre_y_mm"
+    columns = (pressed.t, pressed.area, pressed.peak, pressed.total, *pressed.centre.T)
     for t, *values in zip(*(column.tolist() for column in columns), strict=True):
         yield ",".join([str(t), *("" if np.isnan(value) else f"{value:.10g}" for value in values)])
-
-
-def _peak(t: Any) -> float | None:
-    """Return the highest rate in a stretch of 10 ms of board time, events/s."""
-    if not len(t):
-        return None
-    _, counts = np.unique(t // _PEAK_US, return_counts=True)
-    return float(counts.max() / (_PEAK_US / 1e6))
 
 
 def _page(said: dict[str, Any]) -> str:
@@ -250,6 +166,7 @@ def _page(said: dict[str, Any]) -> str:
 
     head = f"{said['file']}: {kind_of_file(said['kind'])}" + f", from {said['source']}" * bool(said["source"])
     rows = [*_contents(said), *_rates(said), *_losses(said), ("verdict", said["verdict"])]
+    rows += [("left behind", line) for line in said["lost"]]
     lines = [head, *(f"  {name:<20}{value}" for name, value in rows)]
     lines += [f"{what} written to {said[what]}" for what in ("picture", "table") if what in said]
     return "\n".join(lines)

@@ -40,7 +40,7 @@ from taxel.cli._board import (
 )
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import new_report
-from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, how_it_goes, say_shown, spikes_of, viewers
+from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.detect import Readout
 from taxel.device import Cable
 from taxel.live import Live, Panel, Said, Summary, Viewer, delays
@@ -166,7 +166,7 @@ def live(
         _report(report, heard, summary.path, taken if taken is not None else rest)
         console.print(f"report: {report / 'report.html'}", soft_wrap=True)
     _unsent(summary)
-    say_shown(looks, quiet=as_json)
+    report_viewers(looks, quiet=as_json)
     if not as_json:
         _say(summary, guard_frames)
     elif summary.nothing_came or summary.lost:
@@ -305,7 +305,7 @@ def _watch(
                 typer.echo(f"taxel: {wrong}", err=True)
                 told = True
             if now["seconds"] - before["seconds"] >= REDRAW_S:
-                lines = [Text(how_it_goes(viewer)) for viewer in looks]
+                lines = [Text(state_of(viewer)) for viewer in looks]
                 display.update(Group(counters_table(before, now), _state(now), *lines))
                 before = now
 

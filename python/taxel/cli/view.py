@@ -14,13 +14,13 @@ from rich.console import Console
 from taxel._core import ProblemError
 from taxel.cli._app import SecondsOption, app
 from taxel.cli._paneling import PanelHostOption, PanelPortOption, announce
-from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, how_it_goes, say_shown, spikes_of, viewers
+from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.live import Panel
 
 __all__ = ["view"]
 
-#: How often the end is looked for, s.
-_LOOK_EVERY = 0.1
+#: How often the viewers' states are read, s.
+_CHECK_EVERY = 0.1
 
 
 @app.command()
@@ -31,7 +31,7 @@ def view(
     panel_host: PanelHostOption = "127.0.0.1",
     panel_port: PanelPortOption = 0,
     opens: Annotated[
-        bool | None, typer.Option("--open/--no-open", help="Open the panel in a browser; not by itself with --to.")
+        bool | None, typer.Option("--open/--no-open", help="Open the panel in a browser; the default, but with --to.")
     ] = None,
     to: ToOption = None,
     speed: Annotated[
@@ -44,9 +44,9 @@ def view(
         bool, typer.Option("--json", help="Print the panel's address as JSON, and nothing else.")
     ] = False,
 ) -> None:
-    """Show a recording in a browser: play, scrub, label, cut. With --to, play it once in viewers of others.
+    """Show a recording in a browser: play, scrub, label, cut. With --to, play it once in Rerun or Foxglove.
 
-    Labels are kept beside it, in NAME.notes.csv; the recording itself is never changed.
+    Labels are saved beside it, in NAME.notes.csv; the recording itself is never changed.
 
     Example: taxel view walk.mcap
     Example: taxel view walk.mcap --to rerun --speed 0.1 --encoder fa1
@@ -67,7 +67,7 @@ def view(
         until = None if seconds is None else time.monotonic() + seconds
         with contextlib.suppress(KeyboardInterrupt):
             while until is None or time.monotonic() < until:
-                time.sleep(_LOOK_EVERY)
+                time.sleep(_CHECK_EVERY)
                 for viewer, told in list(waited.items()):
                     state = viewer.state
                     if state.trouble and state.trouble != told:
@@ -75,5 +75,5 @@ def view(
                         console.print(f"{viewer.place}: {state.trouble}", soft_wrap=True)
                     if state.over:
                         del waited[viewer]
-                        console.print(f"shown to its end in {how_it_goes(viewer)}", soft_wrap=True)
-    say_shown(looks, quiet=as_json)
+                        console.print(f"shown to its end in {state_of(viewer)}", soft_wrap=True)
+    report_viewers(looks, quiet=as_json)

@@ -14,8 +14,9 @@ What NIR has no words for stands in the graph's metadata, so that taxel reads ba
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,49 +33,43 @@ from taxel.neuron import Neuron
 if TYPE_CHECKING:
     from nir import NIRGraph
 
-__all__ = ["lost", "read_nir", "write_nir"]
+__all__ = ["Parts", "lost", "read_nir", "write_nir"]
 
 #: Where in the graph's metadata the readout itself lies, and the length of a spike in s (0: a Dirac pulse).
 READOUT, SPIKE = "taxel_readout", "taxel_spike_s"
 
 
-class Holds(Protocol):
-    """What is asked of a readout here: its parts, and to be built from them."""
+@dataclass(frozen=True)
+class Parts:
+    """Hold the parts of a readout.
 
-    def __init__(
-        self,
-        encoder: Encoder,
-        neurons: Mapping[str, TrainedNeuron],
-        *,
-        array: Array | None = None,
-        delays_ms: list[float],
-    ) -> None: ...
+    Parameters
+    ----------
+    encoder : Encoder
+    neurons : mapping from label to TrainedNeuron
+    array : Array, optional
+    delays_ms : float64, shape (copies,), ms
+    run_threshold : float
+    time, after_spike : str
+        As its neurons have them.
+    text : str
+        The readout as JSON; "" of one that is not built yet.
+    """
 
-    @property
-    def encoder(self) -> Encoder: ...
-    @property
-    def array(self) -> Array | None: ...
-    @property
-    def neurons(self) -> dict[str, TrainedNeuron]: ...
-    @property
-    def labels(self) -> tuple[str, ...]: ...
-    @property
-    def time(self) -> str: ...
-    @property
-    def after_spike(self) -> str: ...
-    @property
-    def run_threshold(self) -> float: ...
-    @property
-    def delays_ms(self) -> NDArray[np.float64]: ...
-    def to_json(self) -> str: ...
-    @classmethod
-    def from_json(cls, text: str) -> Self: ...
+    encoder: Encoder
+    neurons: Mapping[str, TrainedNeuron]
+    array: Array | None
+    delays_ms: Sequence[float] | NDArray[np.float64]
+    run_threshold: float = 1.0
+    time: str = ""
+    after_spike: str = ""
+    text: str = ""
 
 
-R = TypeVar("R", bound=Holds)
+R = TypeVar("R")
 
 
-def write_nir(readout: Holds, path: str | os.PathLike[str], *, spike_ms: float | None, overwrite: bool) -> list[str]:
+def write_nir(readout: Parts, path: str | os.PathLike[str], *, spike_ms: float | None, overwrite: bool) -> list[str]:
     """Write the graph of a readout to a file; return what NIR cannot hold."""
     import nir  # noqa: PLC0415  an extra
 
@@ -84,7 +79,7 @@ def write_nir(readout: Holds, path: str | os.PathLike[str], *, spike_ms: float |
     return lost(readout)
 
 
-def lost(readout: Holds) -> list[str]:
+def lost(readout: Parts) -> list[str]:
     """Return what NIR's nodes cannot say of a readout, one line each."""
     neurons = [one.neuron for one in readout.neurons.values()]
     said = [
@@ -105,14 +100,31 @@ def lost(readout: Holds) -> list[str]:
 
 
 def read_nir(
-    kind: type[R],
     path: str | os.PathLike[str],
+    parts_of: Callable[[str], Parts],
+    build: Callable[[Parts], R],
     *,
     encoder: Encoder | None,
     neuron: Neuron | None,
     spike_ms: float | None,
 ) -> R:
-    """Read a readout, of this `kind`, from a file; what the nodes say wins over the metadata."""
+    """Read a readout from a file; what the nodes say wins over the metadata.
+
+    Parameters
+    ----------
+    path : path
+    parts_of : function
+        Gives the parts of a readout that is JSON.
+    build : function
+        Makes a readout of its parts.
+    encoder, neuron, spike_ms
+        As of `Readout.from_nir`.
+
+    Raises
+    ------
+    FormatError : no NIR graph, or one that no readout can stand for (names file and node)
+    ProblemError : no encoder is known
+    """
     import nir  # noqa: PLC0415  an extra
 
     place, spike_ms = checked_path("path", path), _spike(spike_ms)
@@ -125,12 +137,12 @@ def read_nir(
         raise FormatError(f"{place}: no NIR graph that can be read: {shown(str(error))}") from None
     held = graph.metadata.get(READOUT)
     try:
-        own = None if held is None else kind.from_json(held if isinstance(held, str) else bytes(held).decode())
+        own = None if held is None else parts_of(held if isinstance(held, str) else bytes(held).decode())
         if spike_ms is None and SPIKE in graph.metadata:
             spike_ms = _spike(1000.0 * float(graph.metadata[SPIKE]) or None)
         if own is not None and encoder is None and neuron is None and _same(graph, _graph(own, spike_ms)):
-            return own
-        return _readout(kind, graph, own, encoder, neuron, spike_ms)
+            return build(own)
+        return build(_parts(graph, own, encoder, neuron, spike_ms))
     except (FormatError, ProblemError) as error:
         raise type(error)(f"{place}: {error}") from None
 
@@ -172,7 +184,7 @@ def _peak_one(tau: float, tau_s: float) -> float:
     return float(1.0 / (ratio ** (ratio / (1.0 - ratio)) - ratio ** (1.0 / (1.0 - ratio))))
 
 
-def _graph(readout: Holds, spike_ms: float | None) -> NIRGraph:
+def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
     import nir  # noqa: PLC0415  an extra
 
     spike_s = None if spike_ms is None else spike_ms / 1000.0
@@ -201,7 +213,7 @@ def _graph(readout: Holds, spike_ms: float | None) -> NIRGraph:
         edges += [(source, name), (name, "neurons")]
     parts |= {"neurons": cells, "output": nir.Output({"output": np.array([len(neurons)])})}
     edges.append(("neurons", "output"))
-    metadata = {READOUT: readout.to_json(), SPIKE: spike_s or 0.0}
+    metadata = {READOUT: readout.text, SPIKE: spike_s or 0.0}
     return nir.NIRGraph(nodes=parts, edges=edges, metadata=metadata)
 
 
@@ -223,15 +235,14 @@ def _same(a: NIRGraph, b: NIRGraph) -> bool:
     )
 
 
-def _readout(
-    kind: type[R],
+def _parts(
     graph: NIRGraph,
-    own: R | None,
+    own: Parts | None,
     encoder: Encoder | None,
     neuron: Neuron | None,
     spike_ms: float | None,
-) -> R:
-    """Build a readout from nodes; what they do not say comes from the caller, the metadata, or by default."""
+) -> Parts:
+    """Return a readout's parts from nodes; what they do not say comes from the caller, the metadata, or by default."""
     encoder = encoder or (own.encoder if own is not None else None)
     if encoder is None:
         raise ProblemError("NIR holds no encoder: say which with encoder=")
@@ -239,8 +250,8 @@ def _readout(
     spike_s = None if spike_ms is None else spike_ms / 1000.0
     templates: list[TrainedNeuron | None] = [None] * len(weights)
     labels = [f"output {k}" for k in range(len(weights))]
-    if own is not None and len(own.labels) == len(weights):
-        labels, templates = list(own.labels), list(own.neurons.values())
+    if own is not None and len(own.neurons) == len(weights):
+        labels, templates = list(own.neurons), list(own.neurons.values())
     trained = {}
     for k, (label, template, row) in enumerate(zip(labels, templates, weights, strict=True)):
         rest = neuron or (template.neuron if template is not None else Neuron())
@@ -252,7 +263,7 @@ def _readout(
         one = Neuron(**{**rest.get_params(), **said})
         trained[label] = TrainedNeuron(one, 1000.0 * row * factor, 0.0 if template is None else template.delay_ms)
     array = None if own is None else own.array
-    return kind(encoder, trained, array=array, delays_ms=delays_ms)
+    return Parts(encoder, trained, array, delays_ms)
 
 
 def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], float]:

@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import floats, instance, number, parameters, shown, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
 from taxel._core import FormatError, NotFittedError, ProblemError
 from taxel.array import Array
-from taxel.detect.exchange import read_nir, write_nir
+from taxel.detect.exchange import Parts, read_nir, write_nir
 from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
 from taxel.encode import Encoder
@@ -189,7 +190,7 @@ class Readout:
         """
         if not isinstance(text, str):
             raise ProblemError(f"text is {shown(text)}: must be the text of a readout")
-        return cls._from_text(text)
+        return cls._from_text(checked_text("text", text))
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the readout to a JSON file, whole or not at all, and return its path.
@@ -245,7 +246,14 @@ class Readout:
         Input, for each delay a `Delay` (where above 0) and a `Linear`, then `CubaLIF` (alpha kernel: both time
         constants equal) or `LIF` (exponential kernel).
         """
-        return write_nir(self, path, spike_ms=spike_ms, overwrite=overwrite)
+        return write_nir(self._exchanged(), path, spike_ms=spike_ms, overwrite=overwrite)
+
+    def _exchanged(self) -> Parts:
+        """Return the parts that the exchange format is made of."""
+        return Parts(
+            self.encoder, self.neurons, self.array, self.delays_ms, self.run_threshold, self.time, self.after_spike,
+            self.to_json(),
+        )  # fmt: skip
 
     @classmethod
     def from_nir(
@@ -282,7 +290,20 @@ class Readout:
         ProblemError : no encoder is known
         ImportError : nir is not installed (``pip install taxel[nir]``)
         """
-        return read_nir(cls, path, encoder=encoder, neuron=neuron, spike_ms=spike_ms)
+
+        def build(parts: Parts) -> Readout:
+            if parts.text:
+                return cls.from_json(parts.text)
+            return cls(parts.encoder, parts.neurons, array=parts.array, delays_ms=parts.delays_ms)
+
+        return read_nir(
+            path,
+            lambda text: cls.from_json(text)._exchanged(),
+            build,
+            encoder=encoder,
+            neuron=neuron,
+            spike_ms=spike_ms,
+        )
 
     def stream(
         self,

@@ -10,6 +10,7 @@ import numpy as np
 
 from taxel import _core
 from taxel._base.arguments import instance, several, shown
+from taxel._base.arguments import text as checked_text
 from taxel._base.parameters import Value
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -60,7 +61,7 @@ class Encoder(Value):
         """
         if not isinstance(text, str):
             raise ProblemError(f"encoder is {shown(text)}: must be JSON text")
-        values = json.loads(_core.check_encoder(text))
+        values = json.loads(_core.check_encoder(checked_text("encoder", text)))
         return Encoder._by_name[values.pop("name")]._from_values(values)
 
     def trains(self, array: Array) -> int:

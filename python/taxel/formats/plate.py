@@ -10,13 +10,13 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base import arguments
 from taxel._base.columns import frozen
+from taxel._base.h5_file import H5File
 from taxel._base.limits import unpacked
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
@@ -61,8 +61,6 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that does not hold what it should
     """
-    import h5py  # noqa: PLC0415  loads slowly
-
     place = Path(arguments.path("path", path))
     found = files(place)
     if not found:
@@ -71,31 +69,21 @@ def trials(path: str | Path) -> Iterator[Trial]:
     known, about = _events_table(folder / "events.csv"), _trials_table(folder / "trials.csv")
     for file in found:
         person = file.stem
-        try:
-            with h5py.File(file) as h5:
-                for name in sorted(h5):
-                    match = re.fullmatch(r"img(\d+)", name)
-                    if match is None:
-                        raise FormatError(f"{file.name}: data set {name!r}; must be named imgNNN")
-                    number = int(match[1])
-                    image = _image(h5, name, file)
-                    yield _trial(person, number, image, file, known.get((person, number)), about.get((person, number)))
-        except FormatError:
-            raise
-        except (OSError, RuntimeError, KeyError) as error:
-            if isinstance(error, PermissionError | FileNotFoundError):
-                raise
-            raise FormatError(f"{file.name}: not a whole HDF5 file ({str(error).splitlines()[0]})") from None
+        with H5File(file) as h5:
+            for name in sorted(h5.entries):
+                match = re.fullmatch(r"img(\d+)", name)
+                if match is None:
+                    raise FormatError(f"{file.name}: data set {name!r}; must be named imgNNN")
+                number, image = int(match[1]), _image(h5, name, file)
+                yield _trial(person, number, image, file, known.get((person, number)), about.get((person, number)))
 
 
-def _image(h5: Any, name: str, file: Path) -> NDArray[np.int32]:
-    import h5py  # noqa: PLC0415  loads slowly
-
-    data = h5[name]
-    if not isinstance(data, h5py.Dataset) or data.ndim != 3 or data.dtype.kind not in "ui" or 0 in data.shape:
+def _image(h5: H5File, name: str, file: Path) -> NDArray[np.int32]:
+    entry = h5.entries[name]
+    if not entry.is_numbers or np.dtype(entry.dtype).kind not in "ui" or len(entry.shape) != 3 or 0 in entry.shape:
         raise FormatError(f"{file.name}, {name}: must be whole numbers, rows x columns x frames")
-    unpacked(f"{file.name}, {name}", 4 * math.prod(data.shape))
-    image: NDArray[np.int32] = data[...].astype(np.int32)
+    unpacked(f"{file.name}, {name}", 4 * math.prod(entry.shape))
+    image: NDArray[np.int32] = h5.numbers(name).astype(np.int32)
     if image.min() < 0 or not image.any():
         raise FormatError(f"{file.name}, {name}: {'counts below 0' if image.min() < 0 else 'never loaded'}")
     return image

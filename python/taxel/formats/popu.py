@@ -7,13 +7,13 @@ right and supine, a number and a variant (``supine3_1``), and the empty mat.
 from __future__ import annotations
 
 import re
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from taxel._base import arguments
+from taxel._base.archive import read_arrays, stored_names
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats.trial import Trial
@@ -31,11 +31,7 @@ def files(path: Path) -> list[Path]:
 
 
 def _holds_poses(path: Path) -> bool:
-    try:
-        with zipfile.ZipFile(path) as file:
-            return {"readings.npy", "pose.npy"} <= set(file.namelist())
-    except (OSError, zipfile.BadZipFile):
-        return False
+    return {"readings", "pose"} <= set(stored_names(path))
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -60,12 +56,11 @@ def trials(path: str | Path) -> Iterator[Trial]:
     if not found:
         raise FormatError(f"{place}: no .npz with readings and pose in it")
     for file in found:
-        try:
-            with np.load(file, allow_pickle=False) as held:
-                readings, names = held["readings"], held["pose"]
-        except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError) as error:
-            said = str(error).split("\n", maxsplit=1)[0]
-            raise FormatError(f"{file.name}: cannot be unpacked ({said}); get it again") from None
+        held = read_arrays(file, ("readings", "pose"))
+        missing = [name for name in ("readings", "pose") if name not in held]
+        if missing:
+            raise FormatError(f"{file.name}: holds no array {missing[0]}; must be readings and pose")
+        readings, names = held["readings"], held["pose"]
         if readings.ndim != 4 or readings.dtype.kind not in "ui" or names.shape != readings.shape[:1]:
             raise FormatError(f"{file.name}: readings must be poses x snapshots x rows x columns, with a name a pose")
         array = Array(readings.shape[2], readings.shape[3], name="bed mat")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import gzip
 import re
 import zlib
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
+from taxel._base.header_table import HeaderTable
 from taxel._base.limits import TEXT, VALUE
 from taxel._core import FormatError
 
@@ -98,17 +98,8 @@ def table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
     ------
     FormatError : a column is missing, or a row has another length than the header (names file and line)
     """
-    text = lines(path)
-    if not text:
+    found = HeaderTable.read(path.name, lines(path))
+    if not found.header:
         raise FormatError(f"{path.name}: empty; must begin with a line of column names")
-    rows = list(csv.reader(text))
-    header = rows[0]
-    missing = [c for c in columns if c not in header]
-    if missing:
-        raise FormatError(f"{path.name}, line 1: no column {missing[0]!r}; there are {shown(', '.join(header))}")
-    found = []
-    for k, row in enumerate(rows[1:], start=2):
-        if len(row) != len(header):
-            raise FormatError(f"{path.name}, line {k}: {len(row)} cells, must have {len(header)}")
-        found.append(dict(zip(header, row, strict=True)) | {"line": str(k)})
-    return found
+    found.has(columns)
+    return [{**cells, "line": str(line)} for line, cells in found]

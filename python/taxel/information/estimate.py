@@ -27,6 +27,8 @@ __all__ = ["Estimate", "ZeroTest", "estimate", "zero_test"]
 TRIALS_A_RESPONSE = 7
 #: Cells that are held at a time while trials are redrawn.
 _CELLS = 1 << 21
+#: Units that are redrawn by one call of NumPy.
+_DRAWN = 1 << 19
 #: Counts in which shares are told finely enough.
 _FINE = 1 << 36
 #: A tenth of a bit either way.
@@ -313,7 +315,7 @@ def _interval(
         count = min(at_once, redraws - first)
         weights = np.zeros((count, len(owner)), np.int64)
         for mine in members:
-            weights[:, mine] = random.multinomial(len(mine), np.full(len(mine), 1 / len(mine)), size=count)
+            weights[:, mine] = _redrawn(random, len(mine), count)
         found.append(np.mean(panzeri_treves(_tables(cells, weights[:, units], classes)), axis=1))
     redrawn = np.concatenate(found)
     ends = np.quantile(redrawn, [(1 - confidence) / 2, (1 + confidence) / 2]) - redrawn.mean()
@@ -322,6 +324,31 @@ def _interval(
         wider = stdtrit(free, (1 + confidence) / 2) / ndtri((1 + confidence) / 2)
         ends *= wider * np.sqrt(len(owner) / free)
     return float(min(ends[0], 0.0)), float(max(ends[1], 0.0))
+
+
+def _redrawn(random: np.random.Generator, units: int, count: int) -> NDArray[np.int64]:
+    """Return how often each of so many units is drawn, with replacement, in `count` redraws; shape (count, units).
+
+    The numbers are those of one call of ``random.multinomial``. That draws binomials one after the other and answers
+    Ctrl-C after the last of them, so many units are drawn in several calls, each with what is left over.
+    """
+    share = np.full(units, 1 / units)
+    if units <= _DRAWN:
+        return np.asarray(random.multinomial(units, share, size=count))
+    # The conditional probabilities of one call, with the rounding of its running difference.
+    chance = share / np.subtract.accumulate(np.concatenate([[1.0], share[:-1]]))
+    found = np.zeros((count, units), np.int64)
+    for row in found:
+        left = units
+        for first in range(0, units, _DRAWN):
+            some = chance[first : first + _DRAWN]
+            open_before = np.cumprod(np.concatenate([[1.0], 1 - some]))
+            last = first + _DRAWN >= units
+            each = some * open_before[:-1]
+            pieces = random.multinomial(left, each if last else np.append(each, open_before[-1]))
+            row[first : first + len(some)] = pieces[: len(some)]
+            left -= int(pieces[: len(some)].sum())
+    return found
 
 
 def _left_open(prior: NDArray[np.float64], wrong: float, trials: float, confidence: float) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from taxel._base.arguments import instance, mapping, number, path, several, shown, text, whole
+from taxel._base.header_table import HeaderTable, text_of
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -285,62 +285,24 @@ def _stem(recording: Recording) -> str:
     return Path(recording.name).stem
 
 
-#: What parts cells where it is not the comma, in words.
-_PARTED = {";": "semicolons", "\t": "tabs"}
-
-
 def _rows(place: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[str, str]]]:
-    wanted = f"must be {','.join(_COLUMNS)} ..."
-    try:
-        lines = place.read_bytes().decode("utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise FormatError(f"{place}: is no UTF-8 text; must be a .csv {','.join(_COLUMNS)}") from None
-    except IsADirectoryError:
-        raise FormatError(f"{place}: is a directory; must be a .csv {','.join(_COLUMNS)}") from None
-    table = _cells(place, lines)
-    if not table:
-        raise FormatError(f"{place}: holds nothing; {wanted}")
-    first, header = table[0]
-    header = [name.strip() for name in header]
-    only = {"recording": str(recordings[0].path)} if len(recordings) == 1 and "recording" not in header else {}
-    missing = [name for name in _COLUMNS if name not in {*header, *only}]
-    if missing:
-        parted = next((said for mark, said in _PARTED.items() if len(header) == 1 and mark in header[0]), None)
-        if parted:
-            raise FormatError(f"{place}, line {first}: its cells are parted by {parted}; must be commas")
-        raise FormatError(
-            f"{place}, line {first}: no column {missing[0]}; there are {shown(', '.join(header))[1:-1]}; {wanted}"
-        )
-    repeated = [name for name in header if name and header.count(name) > 1]
-    if repeated:
-        raise FormatError(f"{place}, line {first}: column {repeated[0]} stands there twice")
+    if place.is_dir():
+        raise FormatError(f"{place}: is a directory; must be a .csv {','.join(_COLUMNS)}")
+    table = HeaderTable.read(place, text_of(place))
+    if not table.header:
+        raise FormatError(f"{place}: holds nothing; must be {','.join(_COLUMNS)} ...")
+    alone = len(recordings) == 1 and "recording" not in table.header
+    only = {"recording": str(recordings[0].path)} if alone else {}
+    table.has([name for name in _COLUMNS if name not in only])
     rows = []
-    for line, cells in table[1:]:
-        if len(cells) != len(header):
-            raise FormatError(f"{place}, line {line}: {len(cells)} cells, must have {len(header)}")
-        stray = next((cell for name, cell in zip(header, cells, strict=True) if cell.strip() and not name), None)
-        if stray is not None:
-            raise FormatError(f"{place}, line {line}: {shown(stray)} stands in a column without a name; give it one")
-        rows.append((line, only | {name: cell.strip() for name, cell in zip(header, cells, strict=True) if name}))
+    for line, cells in table:
+        if cells.get("", "").strip():
+            stray = shown(cells[""])
+            raise FormatError(f"{place}, line {line}: {stray} stands in a column without a name; give it one")
+        rows.append((line, only | {name: cell.strip() for name, cell in cells.items() if name}))
     if not rows:
         raise FormatError(f"{place}: names no trial")
     return rows
-
-
-def _cells(place: Path, lines: list[str]) -> list[tuple[int, list[str]]]:
-    """Return the cells of each line that has any, and its number."""
-    reader = csv.reader(lines, strict=True)
-    found = []
-    line = 1
-    try:
-        for cells in reader:
-            if any(cell.strip() for cell in cells):
-                found.append((line, cells))
-            line = reader.line_num + 1
-    except csv.Error as error:
-        said = "a quote opens and does not close" if reader.line_num >= len(lines) else error
-        raise FormatError(f"{place}, line {line}: {said}") from None
-    return found
 
 
 def _whole(where: str, column: str, cell: str) -> int:

@@ -236,17 +236,18 @@ class ConeRProblem:
         if self._heard is not None:
             trains = [(parts[0], np.append(parts[1][self._heard], parts[1][-1]), *parts[2:]) for parts in trains]
         _weighed("patterns", self._trains if self._heard is None else len(self._heard), "trains have spikes")
-        self._problem = _core.ConeRProblem(self._handed(cone), trains, times)
+        self._problem = _core.ConeRProblem(self._handed(cone)[0], trains, times)
         self.silent_rows: int = self._problem.silent_rows
 
-    def _handed(self, cone: ConeR) -> str:
-        """Return a learner's parameters for the trains that are weighed."""
+    def _handed(self, cone: ConeR) -> tuple[str, NDArray[np.float64]]:
+        """Return a learner's parameters for the trains that are weighed, and the largest weights of the others."""
         if self._heard is None:
-            return cone._json()
+            return cone._json(), np.zeros(0)
         cone._check()
         plain = cone._plain()
         silent = np.ones(self._trains, bool)
         silent[self._heard] = False
+        largest = np.zeros(silent.sum())
         for name, away in (("lb", np.greater), ("ub", np.less)):
             bound = np.asarray(plain[name], np.float64)
             if bound.ndim and len(bound) != self._trains:
@@ -257,9 +258,10 @@ class ConeRProblem:
                 raise ProblemError(
                     f"{name}: holds a train without a spike away from 0; lay the rows out with these bounds"
                 )
+            largest = np.maximum(largest, np.abs(bound[silent] if bound.ndim else bound))
             if bound.ndim:
                 plain[name] = bound[self._heard].tolist()
-        return parameters(plain)
+        return parameters(plain), largest
 
     def fit(
         self,
@@ -290,7 +292,7 @@ class ConeRProblem:
         first = None if start is None else self._start(start)
         if progress is not None:
             callback("progress", progress)
-        (weights, *others), signal = self._problem.fit(self._handed(instance("cone", cone, ConeR)), first, progress)
+        (weights, *others), signal = self._problem.fit(*self._handed(instance("cone", cone, ConeR)), first, progress)
         if self._heard is not None:
             every = np.zeros(self._trains)
             every[self._heard] = weights

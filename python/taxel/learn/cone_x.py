@@ -133,8 +133,9 @@ class ConeX(SpikeLearner):
     Attributes
     ----------
     status_ : {"solved", "infeasible", "stopped"}
-        "solved": every target is met to 1e-12 mV (in proportion where theta_0 is not 0.3 mV), silence keeps at least
-        half its margin, and no weights that keep all of it have an objective smaller by more than `tolerance` of it, or
+        "solved": silence keeps at least half its margin, the neuron, run on the patterns, fires within 1e-6 ms of every
+        target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion where theta_0 is not
+        0.3 mV), and no weights that keep the whole margin have an objective smaller by more than `tolerance` of it, or
         by more than 1e-10 of what B is without weights. "infeasible": `certificate_` proves it. "stopped": neither is
         known.
     weights_ : float64, shape (trains,), mV
@@ -150,7 +151,7 @@ class ConeX(SpikeLearner):
         The margin that holds, at least half of what was asked for (`problem_.margin`); on the grid, as `mv`, the least
         threshold - potential over the silent points.
     reason_ : str or None
-        Why, where stopped.
+        Why, where stopped: what is not met, with its pattern and time.
     violation_ : float, mV
         How far the worst row is broken: targets missed, silence with half its margin.
     engine_ : {"native", "cone solver"}

@@ -1,6 +1,7 @@
 """From a board's datagrams to detections, while they come, and what a browser is shown of them."""
 
 from taxel.live.bridge import Bridge
+from taxel.live.client import PanelClient
 from taxel.live.live import Live
 from taxel.live.panel import Panel
 from taxel.live.remote import Remote
@@ -16,6 +17,7 @@ __all__ = [
     "Bridge",
     "Live",
     "Panel",
+    "PanelClient",
     "Remote",
     "Said",
     "Source",

@@ -1,4 +1,4 @@
-"""Show a sensor in Foxglove: a server of its own, on loopback, that Foxglove opens."""
+"""Foxglove: shows what a panel shows, by a server on loopback that Foxglove connects to."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.live._page import Curves, Detection, Item, Note, Picture, Spikes, Subject
+from taxel.live.client import Curves, Detection, Item, Note, Picture, Spikes, Subject
 
 __all__ = ["ToFoxglove"]
 
-#: Messages that wait for each who looks, the oldest of which the server drops.
+#: Messages that wait for each client; beyond them the server drops the oldest.
 _BACKLOG = 512
 
-#: Who looks asks for one topic after the other, all within so long, s.
-_ALL_WITHIN_S = 0.25
+#: A client subscribes to one topic after the other, to all within this time, s.
+_SUBSCRIBED_WITHIN_S = 0.25
 
-#: Whoever has not been heard of looks like this.
+#: Colour of a taxel without any event so far.
 _UNKNOWN = (96, 96, 96)
 
 _NUMBER, _WHOLE, _TEXT = {"type": "number"}, {"type": "integer"}, {"type": "string"}
@@ -47,7 +47,7 @@ _SCHEMAS = {
 
 
 class ToFoxglove:
-    """Show what a page shows to whoever opens ``ws://127.0.0.1:PORT`` in Foxglove.
+    """Show what a panel shows to anybody who opens ``ws://127.0.0.1:PORT`` in Foxglove.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class ToFoxglove:
         self._messages: Any = importlib.import_module("foxglove.messages")
         self._context = self._foxglove.Context()
         self._begun = False
-        self._looks: set[tuple[int, int]] = set()
+        self._subscribed: set[tuple[int, int]] = set()
         self._since, self._lock = 0.0, threading.Lock()
         self._images = {name: channels.RawImageChannel(name, context=self._context) for name in _IMAGES}
         self._notes = channels.LogChannel("/notes", context=self._context)
@@ -90,36 +90,36 @@ class ToFoxglove:
         return self._foxglove.Channel(name, schema=schema, message_encoding="json", context=self._context)
 
     def on_subscribe(self, client: Any, channel: Any) -> None:
-        """Note who looks."""
+        """Note a subscription."""
         with self._lock:
-            if not self._looks:
+            if not self._subscribed:
                 self._since = time.monotonic()
-            self._looks.add((client.id, channel.id))
+            self._subscribed.add((client.id, channel.id))
 
     def on_unsubscribe(self, client: Any, channel: Any) -> None:
-        """Note who looks no more."""
+        """Note the end of a subscription."""
         with self._lock:
-            self._looks.discard((client.id, channel.id))
+            self._subscribed.discard((client.id, channel.id))
 
-    def meet(self) -> bool:
-        """Tell whether somebody looks."""
+    def is_connected(self) -> bool:
+        """Return whether a client has subscribed to the topics."""
         with self._lock:
-            return bool(self._looks) and time.monotonic() > self._since + _ALL_WITHIN_S
+            return bool(self._subscribed) and time.monotonic() > self._since + _SUBSCRIBED_WITHIN_S
 
     @property
-    def trouble(self) -> str:
-        """Why nobody is met."""
-        return "nobody looks"
+    def why_not_connected(self) -> str:
+        """Why no viewer is connected."""
+        return "no Foxglove is connected"
 
     def begin(self, subject: Subject) -> None:  # noqa: ARG002  pictures bring its name
-        """Show something else from here on."""
+        """Show another subject from now on."""
         if self._begun:
-            # Time may begin anew: who looks forgets what was.
+            # Time may begin anew, so that clients must discard what they have.
             self._server.clear_session()
         self._begun = True
 
     def show(self, subject: Subject, item: Item) -> None:
-        """Show the next."""
+        """Show the next item."""
         match item:
             case Picture():
                 for name, (encoding, draw) in _IMAGES.items():
@@ -141,8 +141,8 @@ class ToFoxglove:
                 note = self._messages.Log(timestamp=self._stamp(item.t), level=level, message=item.text, name="note")
                 self._notes.log(note, log_time=_ns(item.t))
 
-    def settle(self) -> None:
-        """Return at once: its server never waits for who reads slowly."""
+    def flush(self) -> None:
+        """Return at once: Foxglove's server never waits for a slow client."""
 
     def _stamp(self, t_us: int) -> Any:
         return self._messages.Timestamp(*divmod(_ns(t_us), 10**9))
@@ -184,14 +184,14 @@ def _change(picture: Picture) -> NDArray[np.uint8]:
 
 @cache
 def _colours() -> NDArray[np.uint8]:
-    """Return 256 colours, safe for colour-blind eyes."""
+    """Return 256 colours that can be told apart with a colour vision deficiency."""
     from matplotlib import colormaps  # noqa: PLC0415  loads slowly
 
     table: NDArray[np.uint8] = (np.asarray(colormaps["viridis"](np.arange(256)))[:, :3] * 255).astype(np.uint8)
     return table
 
 
-#: Pictures by topic: as a colour is safe to look at, and as numbers.
+#: Pictures by topic, in colours and in numbers.
 _IMAGES: dict[str, tuple[str, Callable[[Picture], NDArray[Any]]]] = {
     "/pressure": ("rgb8", _pressure),
     "/pressure/ticks": ("16UC1", _ticks),
@@ -201,7 +201,7 @@ _TITLES = {"/contact": "Contact", "/spikes": "Spikes", "/detections": "Detection
 
 
 def _some(value: Any) -> float | None:
-    """Return a number, or none where it is none."""
+    """Return a number, or None for NaN."""
     return None if np.isnan(value) else float(value)
 
 

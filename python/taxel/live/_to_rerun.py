@@ -1,4 +1,4 @@
-"""Show a sensor in a Rerun viewer that the user has started, as its client: nothing listens here."""
+"""Rerun: shows what a panel shows in a Rerun viewer that the user has started. It opens no port of its own."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from taxel.live._page import Curves, Detection, Item, Note, Picture, Spikes, Subject
-from taxel.live._sink import Gone
+from taxel.live._external_viewer import Disconnected
+from taxel.live.client import Curves, Detection, Item, Note, Picture, Spikes, Subject
 from taxel.spikes import to_ms
 
 __all__ = ["ToRerun"]
 
-#: The time line: the board's.
+#: Name of the time line, which has the board's times.
 _TIME = "board"
 
-#: How long a viewer is looked for, and how often; how long is waited at a time for one that reads slowly, s.
-_LOOK_S, _LOOK_EVERY_S, _WAIT_S = 0.5, 0.5, 1.0
+#: Time limit of a connection attempt and time between attempts; how long one flush waits for a slow viewer, s.
+_CONNECT_S, _CONNECT_EVERY_S, _FLUSH_S = 0.5, 0.5, 1.0
 
 
 class ToRerun:
-    """Show what a page shows in a Rerun viewer.
+    """Show what a panel shows in a Rerun viewer.
 
     Parameters
     ----------
@@ -38,42 +38,42 @@ class ToRerun:
         self.place = f"Rerun at {host}:{port}"
         self._address, self._name = (host.strip("[]"), port), f"{host}:{port}"
         self._stream: Any = None
-        self._looked = -_LOOK_EVERY_S
-        self._there = False
+        self._tried = -_CONNECT_EVERY_S
+        self._connected = False
         self._known: Any = None
 
-    def meet(self) -> bool:
-        """Tell whether there is a viewer."""
-        if self._stream is None and time.monotonic() >= self._looked + _LOOK_EVERY_S:
-            self._looked = time.monotonic()
-            self._there = self._answers()
-        return self._there
+    def is_connected(self) -> bool:
+        """Return whether a viewer runs."""
+        if self._stream is None and time.monotonic() >= self._tried + _CONNECT_EVERY_S:
+            self._tried = time.monotonic()
+            self._connected = self._answers()
+        return self._connected
 
     @property
-    def trouble(self) -> str:
-        """Why nobody is met."""
+    def why_not_connected(self) -> str:
+        """Why no viewer is connected."""
         return f"no viewer at {self._name}; start one with: rerun"
 
     def begin(self, subject: Subject) -> None:
-        """Show something else from here on, as a recording of its own: its time may begin anew."""
+        """Show another subject from now on, as a Rerun recording of its own, because its time may begin anew."""
         self._known = None
         self._stream = self._rerun.RecordingStream("taxel")
         self._stream.set_log_tick_enabled(False)
         self._stream.set_log_time_enabled(False)
-        # Where nobody listens this would wait for five seconds.
+        # Without a viewer this call would wait for five seconds; `is_connected` has found one.
         self._stream.connect_grpc(f"rerun+http://{self._name}/proxy")
         self._stream.send_recording_name(subject.name)
         self._stream.send_blueprint(_layout())
-        unknown = self._rerun.AnnotationContext([(0, "heard of", (0, 0, 0, 0)), (1, "not heard of yet", (96, 96, 96))])
+        unknown = self._rerun.AnnotationContext([(0, "known", (0, 0, 0, 0)), (1, "no event yet", (96, 96, 96))])
         self._stream.log("pressure/unknown", unknown, static=True)
         for name, colour in (("more", (230, 140, 40)), ("less", (70, 150, 240))):
-            look = self._rerun.SeriesPoints(colors=colour, names=name, markers="circle", marker_sizes=1.5)
-            self._stream.log(f"spikes/{name}", look, static=True)
+            style = self._rerun.SeriesPoints(colors=colour, names=name, markers="circle", marker_sizes=1.5)
+            self._stream.log(f"spikes/{name}", style, static=True)
         for name, colour in (("x", (230, 140, 40)), ("y", (70, 150, 240))):
             self._stream.log(f"contact/centre/{name}", self._rerun.SeriesLines(colors=colour, names=name), static=True)
 
-    def show(self, subject: Subject, item: Item) -> None:  # noqa: ARG002  where it is shown was said
-        """Show the next."""
+    def show(self, subject: Subject, item: Item) -> None:  # noqa: ARG002  `begin` has set the subject
+        """Show the next item."""
         match item:
             case Picture():
                 self._picture(item)
@@ -88,33 +88,33 @@ class ToRerun:
                         self._column(f"spikes/{name}", item.t[chosen], item.train[chosen])
             case Detection():
                 self._at(item.t)
-                self._stream.log("detections", self._rerun.TextLog(_said(item), level="INFO"))
+                self._stream.log("detections", self._rerun.TextLog(_described(item), level="INFO"))
                 if item.latency is not None:
                     self._stream.log("latency_ms", self._rerun.Scalars(to_ms(item.latency)))
             case Note():
                 self._at(item.t)
                 self._stream.log("notes", self._rerun.TextLog(item.text, level="INFO"))
 
-    def settle(self) -> None:
-        """Wait until the viewer has taken it all.
+    def flush(self) -> None:
+        """Wait until the viewer has read everything.
 
         Raises
         ------
-        Gone : it is not there any more
+        Disconnected : it does not run any more
         """
         while True:
             try:
-                self._stream.flush(timeout_sec=_WAIT_S)
+                self._stream.flush(timeout_sec=_FLUSH_S)
             except (RuntimeError, ValueError) as error:
-                # One that only reads slowly still takes connections.
+                # A viewer that only reads slowly still accepts connections.
                 if "timed out" in str(error) and self._answers():
                     continue
-                self._stream, self._there = None, False
-                raise Gone(str(error)) from None
+                self._stream, self._connected = None, False
+                raise Disconnected(str(error)) from None
             return
 
     def _answers(self) -> bool:
-        with contextlib.suppress(OSError), socket.create_connection(self._address, _LOOK_S):
+        with contextlib.suppress(OSError), socket.create_connection(self._address, _CONNECT_S):
             return True
         return False
 
@@ -138,7 +138,7 @@ class ToRerun:
 
 
 def _layout() -> Any:
-    """Return where what is shown, until the user moves it."""
+    """Return the arrangement of the views, which the user may change."""
     layout: Any = importlib.import_module("rerun.blueprint")
     pictures = layout.Vertical(
         layout.Spatial2DView(origin="pressure", name="Pressure above rest, ticks"),
@@ -154,7 +154,7 @@ def _layout() -> Any:
     return layout.Blueprint(layout.Horizontal(pictures, curves), collapse_panels=True)
 
 
-def _said(detection: Detection) -> str:
+def _described(detection: Detection) -> str:
     known = f"known {to_ms(detection.known - detection.t):.2f} ms after the event"
     if detection.latency is None:
         return f"{detection.label}: {known}"

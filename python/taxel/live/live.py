@@ -23,7 +23,7 @@ from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.options import LiveOptions, takes
 from taxel.live.said import Said
 from taxel.live.summary import Summary, summary_of
-from taxel.recording.remarks import Zeroing
+from taxel.recording.notes import Zeroing
 from taxel.tare import Tare
 
 __all__ = ["Live"]

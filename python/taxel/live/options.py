@@ -159,7 +159,7 @@ def takes(
     """Let a constructor that is written for a dataclass of options take the fields of that dataclass."""
 
     def decorate(begin: Callable[[_Self, _Options], None]) -> Callable[Concatenate[_Self, _P], None]:
-        def init(self: _Self, *arguments: _P.args, **keywords: _P.kwargs) -> None:
+        def init(self: _Self, /, *arguments: _P.args, **keywords: _P.kwargs) -> None:
             begin(self, options(*arguments, **keywords))
 
         functools.update_wrapper(init, begin)

@@ -1,4 +1,4 @@
-"""The live panel: a server on this machine for pages that look at a board, or at recordings."""
+"""The live panel: a server on this machine for browsers and other clients that show a board or recordings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from taxel._base.arguments import flag, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.device import Cable
-from taxel.live._office import Office
+from taxel.live._requests import RequestHandler
 from taxel.live.live import Live
 
 __all__ = ["Panel"]
@@ -21,22 +21,22 @@ __all__ = ["Panel"]
 class Panel:
     """Serve the live panel, until it is stopped. A context manager.
 
-    A thread of its own serves all who look. A page that reads slowly, or never, slows neither the others nor what is
-    received and recorded. The protocol is written down in the documentation, so any program may be a page.
+    A thread of its own serves all clients. One that reads slowly, or never, delays neither the others nor what is
+    received and recorded. The protocol is documented, so any program may be a client; `PanelClient` is one.
 
     Parameters
     ----------
     shows : Live or path
-        A board that is listened to, or a recording (`.mcap`, `.lsa`) to show first; its folder's others can be opened.
+        A live board, or a recording (`.mcap`, `.lsa`) to show first; others of its folder can be opened too.
     control : str, optional
         The board's serial line ("/dev/ttyUSB0", host:port), with which the page reads and sets registers.
     folder : path, optional
-        Where recordings are, and new ones go: the recording's own, or the current one.
+        The folder of recordings, also of new ones: the recording's own, or the current one.
     port : int
         TCP; 0 finds a free one, see `url`.
     host : str
-        The address of this machine on which to listen. On any but loopback everybody who learns the token from the
-        address may look and set registers, over a connection that is not encrypted.
+        The address of this machine on which to listen. On any but loopback everybody who has the token in the panel's
+        address can see the board and set registers, over a connection that is not encrypted.
 
     Raises
     ------
@@ -59,8 +59,8 @@ class Panel:
         port: int = 0,
         host: str = "127.0.0.1",
     ) -> None:
-        # Held while one is ended and another begun.
-        self._anew = threading.Lock()
+        # Held while one `Live` replaces another.
+        self._restarting = threading.Lock()
         self._live = shows if isinstance(shows, Live) else None
         opened = None
         if self._live is None:
@@ -74,10 +74,10 @@ class Panel:
             if place.suffix not in (".mcap", ".lsa"):
                 raise ProblemError(f"{place}: the panel shows .mcap and .lsa; taxel convert makes a .mcap")
             if place.suffix == ".mcap":
-                # Indexed by the server when a page asks for it; a file that is none is refused now.
+                # The server indexes it when a client opens it; a file that is no recording is refused now.
                 _core.RecordingReader(place)
             folder, opened = place.resolve().parent, place.resolve().name
-        self._office = Office(self, None if control is None else Cable(text("control", control)))
+        self._requests = RequestHandler(self, None if control is None else Cable(text("control", control)))
         readout = None if self._live is None else self._live._labels
         try:
             self._core = _core.Panel(
@@ -88,69 +88,69 @@ class Panel:
                 control,
                 readout,
                 None if self._live is None else self._live._core,
-                self._office.answer,
+                self._requests,
             )
         except BaseException:
-            self._office.close()
+            self._requests.close()
             raise
         self._first, self._stopped = self._live, False
-        self._opened = opened
         self._url = self._core.url()
 
     @property
     def url(self) -> str:
-        """What a person opens in a browser; the part behind # is the token that opens the panel."""
+        """The address for a browser; the part behind # is the token that gives access."""
         return self._url
 
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port that it listens on."""
+        """Host and port on which it listens."""
         return self._core.address()
 
     @property
     def token(self) -> str:
-        """What a client of one's own brings (see the protocol)."""
+        """The token with which a client connects (see the protocol)."""
         return self._core.token()
 
     @property
     def viewers(self) -> int:
-        """How many look."""
+        """Number of connected clients."""
         return self._core.viewers()
 
     @property
     def live(self) -> Live | None:
-        """The board that is listened to; another one after a page chose another address. Waits while one begins."""
-        with self._anew:
+        """The live board; another `Live` after a client has chosen another address. Waits while one begins."""
+        with self._restarting:
             return self._live
 
     def listen(self, host: str, port: int) -> None:
-        """Listen on another address, with everything else as it was.
+        """Receive on another address, with all other options unchanged.
 
         Raises
         ------
-        ProblemError : no board is listened to, or to a file, which has to be ended first
-        OSError : the port is taken; then it listens where it did
+        ProblemError : the panel shows recordings only; a recording was begun with this address, or the board is another
+            computer's
+        OSError : the port is taken; the old address stays in use
         """
-        with self._anew:
-            before = self._may_begin_anew("listen")
+        with self._restarting:
+            before = self._restartable("listen")
             after = before._again(port, host)
             self._core.attach(after._core)
             self._live = after
             before.stop()
 
     def delta_intensity(self, on: bool) -> None:
-        """Take intensities for differences from the value before, or for values, from here on.
+        """Interpret intensities as differences from the value before, or as values, from now on.
 
-        What came before was read in the other way, so nothing of it is kept: time, picture, a readout and its tare
-        begin anew, on the same address.
+        Earlier events were decoded with the other meaning, so nothing of them is kept: time, picture, a readout and its
+        tare begin anew, on the same address.
 
         Raises
         ------
-        ProblemError : no board is listened to, or to a file, which has to be ended first
-        OSError : the port was taken by another program in that moment
+        ProblemError : as `listen`
+        OSError : another program has taken the port in that moment
         """
-        with self._anew:
-            before = self._may_begin_anew("delta_intensity")
+        with self._restarting:
+            before = self._restartable("delta_intensity")
             if flag("on", on) == before._options.differences:
                 return
             host, port = before.address
@@ -159,21 +159,23 @@ class Panel:
             self._core.attach(after._core)
             self._live = after
 
-    def _may_begin_anew(self, what: str) -> Live:
+    def _restartable(self, what: str) -> Live:
         if self._live is None:
             raise ProblemError(f"{what}: this panel shows recordings only")
         if self._live._options.record is not None:
             raise ProblemError(f"{what}: a recording was begun with this address; end it first")
         if self._live._remote is not None:
-            raise ProblemError(f"{what}: the board is another computer's, which says where and how it is heard")
+            raise ProblemError(
+                f"{what}: the board is another computer's, which says where it sends and what its intensities are"
+            )
         return self._live
 
     def stop(self) -> None:
-        """End the server; pages hear of it. What `listen` began is ended as well."""
+        """End the server, and the `Live` that `listen` or `delta_intensity` began; clients are notified."""
         if not self._stopped:
             self._stopped = True
             self._core.stop()
-            self._office.close()
+            self._requests.close()
             if self._live is not None and self._live is not self._first:
                 self._live.stop()
 
@@ -186,5 +188,5 @@ class Panel:
         self.stop()
 
     def __repr__(self) -> str:
-        # Not the token: what is printed may be kept.
+        # Without the token, because printed text may be stored.
         return f"Panel({'ended' if self._stopped else self._url.partition('#')[0]})"

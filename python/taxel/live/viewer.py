@@ -1,4 +1,4 @@
-"""Views in programs of somebody else's: Rerun and Foxglove."""
+"""Viewers in other programs: Rerun and Foxglove."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import threading
 from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any
-from urllib.parse import urlsplit
 
 from taxel._base.arguments import instance, number, shown, text
 from taxel._core import ProblemError
@@ -23,7 +22,7 @@ from taxel.live.panel import Panel
 
 __all__ = ["Viewer", "Viewing"]
 
-#: Where a Rerun viewer listens, and where Foxglove looks for a server, by their own defaults.
+#: Default ports of a Rerun viewer, and of the server that Foxglove connects to.
 _PORTS = {"rerun": 9876, "foxglove": 8765}
 
 #: The modules of the extras.
@@ -37,17 +36,17 @@ _END_WITHIN_S = 4.0
 
 @dataclass(frozen=True)
 class Viewing:
-    """Say how a `Viewer` goes.
+    """Hold the state of a `Viewer`.
 
     Attributes
     ----------
     sent, lost : dict
-        How many pictures, times of the curves ("curves"), spikes, detections and notes the viewer took, and how many
-        found no room because it was missing, slow or gone.
+        How many pictures, times of the curves ("curves"), spikes, detections and notes the viewer has received, and how
+        many were dropped because it was not connected or too slow.
     there : bool
-        Whether somebody looks.
+        Whether a viewer is connected.
     trouble : str or None
-        Why nobody does, or what the panel's server refused.
+        Why no viewer is connected, or what the panel's server refused.
     over : bool
         Whether all of a recording has been shown.
     """
@@ -62,27 +61,27 @@ class Viewing:
 class Viewer:
     """Show a board, or a recording, in a Rerun viewer or in Foxglove. A context manager.
 
-    What goes, on the board's time line: the picture above rest and the change, both with colours; force, area and
+    It is sent, on the board's time line: the picture above rest and the change, both with colours; force, area and
     centre of the contact as curves; an encoder's spikes, detections with their latency, a recording's notes. A process
-    of its own hands it on, as one more page of the panel (whose server, on loopback, is begun where none is given): a
-    viewer that is missing, slow, stuck or gone holds nobody up. 32 pictures and 1024 other messages wait for it; of
-    what finds no room the oldest goes, and is counted.
+    of its own passes them on, as one more client of the panel (whose server, on loopback, is started where none is
+    given), so that a viewer that is missing, slow, stuck or ended delays nothing. 32 pictures and 1024 other messages
+    wait for it; beyond that the oldest are dropped, and counted.
 
     Parameters
     ----------
     shows : Live, Panel or path
         A board that is listened to, a panel that shows one, or a recording (`.mcap`, `.lsa`), which is played once,
-        from when somebody looks.
+        from when a viewer is connected.
     to : str
-        "rerun", "rerun:HOST:PORT" or "rerun+http://HOST:PORT/proxy": a viewer that the user has started; taxel is its
-        client, and looks for it until it is there. "foxglove" or "foxglove:PORT": a server on 127.0.0.1 that Foxglove
-        opens (any program of this machine may); port 0 finds a free one.
+        "rerun", "rerun:HOST:PORT" or "rerun+http://HOST:PORT/proxy": a viewer that the user has started; taxel
+        connects to it as soon as it runs. "foxglove" or "foxglove:PORT": a server on 127.0.0.1 that Foxglove
+        connects to (any program of this machine may); port 0 finds a free one.
     encoder : Encoder, optional
-        Whose spikes go too. One that reads the taxels' rest must have it.
+        An encoder whose spikes are sent too. One that needs a tare must have it.
     speed : float, 0.001 to 100
         Of a recording: board time over real time.
     rate_hz : float, 1 to 60
-        Pictures a second at most.
+        Maximum number of pictures a second.
 
     Raises
     ------
@@ -119,20 +118,18 @@ class Viewer:
         assert panel is not None  # one of the two
         asked = {
             "to": where,
-            "address": urlsplit(panel.url).netloc,
-            "token": panel.token,
+            "url": panel.url,
             "encoder": spikes,
-            "opens": panel._opened,
-            "speed": pace,
+            "speed": None if panel.live is not None else pace,
             "rate_hz": rate,
         }
         self._state, self._changed = Viewing(), threading.Condition()
         self._ended = self._stopping = False
         self._listener: threading.Thread | None = None
-        # Ctrl-C is ours to hear; no file of the current folder is taken for a library; what the libraries say to
-        # themselves is not for the user.
+        # A session of its own, because Ctrl-C is handled here; -P, so that no file of the current folder is imported as
+        # a library; RUST_LOG, because the libraries' own messages are not for the user.
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "taxel.live._viewing"],
+            [sys.executable, "-P", "-m", "taxel.live._viewer_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -148,7 +145,7 @@ class Viewer:
         self._listener.start()
 
     def _begun(self, asked: dict[str, Any]) -> str:
-        """Say what is to be done; return where the viewer is."""
+        """Send the options to the process; return where the viewer is."""
         assert self._process.stdin is not None  # asked for
         assert self._process.stdout is not None
         with contextlib.suppress(BrokenPipeError):
@@ -181,7 +178,7 @@ class Viewer:
 
     @property
     def state(self) -> Viewing:
-        """How it goes, four times a second."""
+        """The state, updated four times a second."""
         return self._state
 
     def wait(self, timeout: float | None = None) -> bool:
@@ -198,7 +195,7 @@ class Viewer:
             return self._state.over
 
     def stop(self) -> Viewing:
-        """End, and say how it went: what waits still goes, for 2 s at most. Once ended, say it again."""
+        """End, and return the last state; pending items have 2 s. A second call returns the same."""
         self._stopping = True
         assert self._process.stdin is not None  # asked for
         with contextlib.suppress(BrokenPipeError):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar, overload
+from typing import TypeVar, overload
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,10 +12,7 @@ from matplotlib.figure import Figure, FigureBase
 from taxel._base.arguments import instance
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
-
-if TYPE_CHECKING:
-    from taxel.recording import Recording
-    from taxel.recording.health import Health
+from taxel.recording import Health, Recording, health
 
 __all__ = ["health_map", "overview", "pressure"]
 
@@ -30,9 +27,6 @@ def overview(recording: Recording, figure: None = None) -> Figure: ...
 def overview(recording: Recording, figure: F) -> F: ...
 def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBase:
     """Draw events a second (or the sum of pressure) over time, and the activity of each taxel."""
-    from taxel.recording import Recording  # noqa: PLC0415  a recording draws itself here
-    from taxel.recording.health import health  # noqa: PLC0415  health draws itself here
-
     instance("recording", recording, Recording)
 
     if figure is None:
@@ -92,8 +86,6 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
 
 def health_map(health: Health, ax: Axes | None = None) -> Axes:
     """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
-    from taxel.recording.health import Health  # noqa: PLC0415  health draws itself here
-
     instance("health", health, Health)
     ax = axes(ax, (5, 4.4))
     image = ax.imshow(np.log10(1.0 + health.activity), origin="upper", cmap="Greys", interpolation="nearest")

@@ -1,21 +1,14 @@
 """Recordings: opened, cut, merged, put on a clock, converted."""
 
+from taxel.clock import Clock
 from taxel.recording.convert import convert
+from taxel.recording.cut import cut
 from taxel.recording.health import Health, health
-from taxel.recording.opening import open_any
-from taxel.recording.parts import cut, merge
-from taxel.recording.recording import (
-    ENDINGS,
-    BoardChange,
-    Clock,
-    Datagrams,
-    Note,
-    Recording,
-    Zeroing,
-    in_memory,
-    kind_of_file,
-    open_recording,
-)
+from taxel.recording.kinds import ENDINGS, kind_of_file
+from taxel.recording.merge import merge
+from taxel.recording.notes import BoardChange, Datagrams, Note, Zeroing
+from taxel.recording.opening import open_any, open_recording
+from taxel.recording.recording import Recording
 
 __all__ = [
     "ENDINGS",
@@ -29,7 +22,6 @@ __all__ = [
     "convert",
     "cut",
     "health",
-    "in_memory",
     "kind_of_file",
     "merge",
     "open_any",

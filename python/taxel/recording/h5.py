@@ -3,26 +3,21 @@
 The root has the attribute ``taxel`` (1, the layout's version). Events are the data sets ``t`` (int64, us), ``x``, ``y``
 (uint16), ``p`` (bool) and where they came ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
 ``markers`` (int64, two columns: us, whether a start); pictures are ``values`` (float32, pictures x rows x columns)
-with ``t`` and ``unit`` (text). ``about`` is JSON: the sensor, where it came from, registers, notes, detections and
-what was lost.
+with ``t`` and ``unit`` (text). ``held`` (uint16, rows x columns, 65 535 where nothing is known) is what the taxels held
+at the beginning. ``about`` is JSON: the sensor, where it came from, registers, notes, detections and what was lost.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from taxel._base.limits import DESCRIPTION, unpacked
+from taxel._base.h5_file import H5File
 from taxel._core import FormatError
 from taxel.array import Array
-from taxel.events import Events
-from taxel.frames import Frames
-from taxel.recording.remarks import Remarks
-from taxel.recording.tables import columns_of, table_of
+from taxel.recording.contents import Contents
+from taxel.recording.npz import TEXTS, columns_of, contents_of
 
 __all__ = ["is_ours", "read_h5", "write_h5"]
 
@@ -34,26 +29,21 @@ _PIECE_BYTES = 1 << 20
 
 def is_ours(path: Path) -> bool:
     """Tell whether a .h5 is of the layout that `taxel convert` writes; false too for what is no HDF5 file."""
-    import h5py  # noqa: PLC0415  loads slowly
-
     try:
-        with h5py.File(path) as h5:
-            return "taxel" in h5.attrs
-    # What h5py raises on damage is no closed list.
-    except Exception:
+        with H5File(path) as h5:
+            return "taxel" in h5.attributes
+    except (FormatError, OSError):
         return False
 
 
-def write_h5(part: Path, table: Events | Frames, remarks: Remarks) -> None:
+def write_h5(part: Path, contents: Contents) -> None:
     """Write a .h5."""
     import h5py  # noqa: PLC0415  loads slowly
 
-    said = replace(remarks, array=table.array).to_json()
     with h5py.File(part, "w") as h5:
         h5.attrs["taxel"] = _VERSION
-        h5.create_dataset("about", data=said)
-        for name, column in columns_of(table).items():
-            if name == "unit":
+        for name, column in columns_of(contents).items():
+            if name in TEXTS:
                 h5.create_dataset(name, data=str(column))
                 continue
             row = max(1, column[:1].nbytes)
@@ -62,49 +52,20 @@ def write_h5(part: Path, table: Events | Frames, remarks: Remarks) -> None:
             h5.create_dataset(name, data=column, **packed)
 
 
-def read_h5(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
+def read_h5(path: Path, array: Array | None) -> Contents:
     """Read a .h5 of ours.
 
     Raises
     ------
     FormatError : no HDF5 file, or one of another layout
     """
-    import h5py  # noqa: PLC0415  loads slowly
-
-    try:
-        with h5py.File(path) as h5:
-            if "taxel" not in h5.attrs:
-                raise FormatError(
-                    f"{path}: HDF5, but without the attribute taxel of what taxel convert writes; other people's files "
-                    "are read by taxel.open and taxel.formats.trials"
-                )
-            version = int(h5.attrs["taxel"])
-            if version != _VERSION:
-                raise FormatError(f"{path}: layout {version}; this version reads {_VERSION}")
-            columns = {name: _column(f"{path}, data set {name}", name, h5[name]) for name in h5}
-    except (OSError, FormatError) as error:
-        if isinstance(error, FormatError | PermissionError | FileNotFoundError | IsADirectoryError):
-            raise
-        raise FormatError(f"{path}: not a whole HDF5 file ({str(error).splitlines()[0][:200]})") from None
-    # What h5py raises on damage is no closed list.
-    except Exception as error:
-        said = (str(error).splitlines() or [""])[0][:200]
-        raise FormatError(f"{path}: not a whole HDF5 file ({said})") from None
-    return table_of(path, columns, array)
-
-
-def _column(place: str, name: str, data: Any) -> NDArray[Any]:
-    import h5py  # noqa: PLC0415  loads slowly
-
-    if not isinstance(data, h5py.Dataset):
-        raise FormatError(f"{place}: a group; must be a column")
-    if name in {"about", "unit"}:
-        if data.shape != () or h5py.check_string_dtype(data.dtype) is None:
-            raise FormatError(f"{place}: must be a text")
-        text = data.asstr()[()]
-        unpacked(place, len(text), DESCRIPTION)
-        return np.array(text)
-    if data.dtype.kind not in "biuf":
-        raise FormatError(f"{place}: holds {data.dtype}; must hold numbers")
-    unpacked(place, int(np.prod(data.shape, dtype=object)) * data.dtype.itemsize)
-    return np.asarray(data[...])
+    with H5File(path) as h5:
+        if "taxel" not in h5.attributes:
+            raise FormatError(
+                f"{path}: HDF5, but without the attribute taxel of what taxel convert writes; other people's files are "
+                "read by taxel.open and taxel.formats.trials"
+            )
+        if h5.attributes["taxel"] != _VERSION:
+            raise FormatError(f"{path}: layout {h5.attributes['taxel']}; this version reads {_VERSION}")
+        columns = {name: np.array(h5.text(name)) if name in TEXTS else h5.numbers(name) for name in h5.entries}
+    return contents_of(path, "h5", columns, array)

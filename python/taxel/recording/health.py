@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
+from taxel._base.drawing import draw
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -34,6 +35,9 @@ QUIET_SHARE = 0.1
 STUCK_FROM = 3
 #: ... noisy where it spoke so many times as often as four in five of the 24 taxels around it, and so often at least.
 NOISY_TIMES, NOISY_FROM, NOISY_SHARE = 8.0, 20, 0.8
+
+#: Taxels whose neighbours are looked at at once.
+_AT_ONCE = 1 << 17
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,14 +65,10 @@ class Health:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
-        from taxel.plot import health_map  # noqa: PLC0415  matplotlib loads slowly
-
-        return health_map(self, ax)
+        return draw("health_map", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(found)} {name}" for name, found in self.named().items())
@@ -136,17 +136,17 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 
 
 class Told(NamedTuple):
-    """What each taxel did, and what is known to be held; int64, shape (rows, columns)."""
+    """What each taxel did, and what is known to be held; whole numbers, shape (rows, columns)."""
 
     activity: NDArray[np.int64]
     """Events."""
     moved: NDArray[np.int64]
     """Events that go the way of the taxel's event before."""
-    values: NDArray[np.int64] | None = None
+    values: NDArray[np.integer[Any]] | None = None
     """How many different intensities its events showed: 0, 1, or 2 and more; None where events have none."""
-    least: NDArray[np.int64] | None = None
+    least: NDArray[np.integer[Any]] | None = None
     """The least that it is known to have held, ticks; -1 where it was not heard of."""
-    greatest: NDArray[np.int64] | None = None
+    greatest: NDArray[np.integer[Any]] | None = None
     """The greatest, likewise."""
 
 
@@ -155,23 +155,27 @@ def judged(array: Array, told: Told) -> Health:
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
     activity = told.activity
     silent = exists & (activity == 0)
-    among = exists & (_around(np.where(exists, activity, np.nan)) >= DEAD_BELOW)
-    moved = _around(np.where(exists, told.moved, np.nan)) >= MOVED_FROM
+    # A median reaches a bound only beside a taxel that does: all others need not be looked at.
+    among = _reaches(activity, exists, _beside(exists & (activity >= DEAD_BELOW)) & exists, DEAD_BELOW)
+    moved = _reaches(told.moved, exists, silent & among, MOVED_FROM)
     quiet = np.count_nonzero(among & (activity > 0) & (activity < DEAD_BELOW))
     alone = quiet <= QUIET_SHARE * np.count_nonzero(among & silent)
     loud = alone and 2 * np.count_nonzero(among) > np.count_nonzero(exists)
-    stuck, known = np.zeros(array.shape, bool), np.full(array.shape, -1)
     dead = silent & among & (moved | loud)
+    stuck = np.zeros(array.shape, bool)
     if told.least is not None and told.greatest is not None:
-        known = told.greatest
-        at_rest = _around(np.where(exists & (told.least >= 0), told.least, np.nan))
-        dead |= silent & (known == 0) & (at_rest >= max(REST_FROM, REST_SHARE * known.max(initial=0)))
+        least = max(REST_FROM, REST_SHARE * int(told.greatest.max(initial=0)))
+        known = exists & (told.least >= 0)
+        at_zero = silent & (told.greatest == 0) & _beside(known & (told.least >= least))
+        dead |= _reaches(told.least, known, at_zero, least)
+        stuck = dead & (told.greatest > 0)
     if told.values is not None:
-        varied = _around(np.where(exists & (activity > 0), told.values, np.nan)) > 1
-        stuck = exists & (activity >= STUCK_FROM) & (told.values == 1) & varied
-    stuck |= dead & (known > 0)
-    beside = _around(np.where(exists, activity, np.nan), 2, NOISY_SHARE)
-    noisy = exists & (activity >= NOISY_FROM) & (activity > NOISY_TIMES * beside)
+        still = exists & (activity >= STUCK_FROM) & (told.values == 1)
+        stuck |= _reaches(told.values, exists & (activity > 0), still, 1, above=True)
+    noisy = exists & (activity >= NOISY_FROM)
+    places = np.flatnonzero(noisy)
+    often = NOISY_TIMES * _around(activity, exists, places, 2, NOISY_SHARE)
+    noisy.reshape(-1)[places] = activity.reshape(-1)[places] > often
     return Health(array, activity, dead & ~stuck, stuck, noisy)
 
 
@@ -184,13 +188,13 @@ def _told_of_events(events: Events) -> Told:
         return Told(activity, moved)
     shape, size = events.array.shape, events.array.rows * events.array.columns
     pairs = np.unique(index[events.present & own] * 65_536 + events.intensity[events.present & own].astype(np.int64))
-    values = np.bincount(pairs // 65_536, minlength=size).reshape(shape)
-    ticks = events.intensity[events.present].astype(np.int64)
-    least, greatest = np.full(size, 65_536), np.full(size, -1)
+    values = np.bincount(pairs // 65_536, minlength=size).astype(np.int32)
+    ticks = events.intensity[events.present].astype(np.int32)
+    least, greatest = np.full(size, 65_536, np.int32), np.full(size, -1, np.int32)
     np.minimum.at(least, index[events.present], ticks)
     np.maximum.at(greatest, index[events.present], ticks)
     least[greatest < 0] = -1
-    return Told(activity, moved, values, least.reshape(shape), greatest.reshape(shape))
+    return Told(activity, moved, values.reshape(shape), least.reshape(shape), greatest.reshape(shape))
 
 
 def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -204,19 +208,56 @@ def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[ND
     return activity, moved
 
 
-def _around(grid: NDArray[Any], reach: int = 1, share: float = 0.5) -> NDArray[np.float64]:
-    """Return a quantile (the median) of the neighbours of each taxel so far away; NaN (an empty place) does not count.
+def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which taxels have one of a mask among their up to 8 neighbours."""
+    rows, columns = mask.shape
+    padded = np.pad(mask, 1)
+    found = np.zeros(mask.shape, bool)
+    for i, j in _offsets(1):
+        found |= padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
+    return found
 
-    0 where there are none.
+
+def _reaches(
+    grid: NDArray[Any], counts: NDArray[np.bool_], where: NDArray[np.bool_], bound: float, *, above: bool = False
+) -> NDArray[np.bool_]:
+    """Tell at which of some taxels the median of the neighbours that count is at least a bound, or above it."""
+    found = np.zeros(grid.shape, bool)
+    places = np.flatnonzero(where)
+    medians = _around(grid, counts, places)
+    found.reshape(-1)[places] = medians > bound if above else medians >= bound
+    return found
+
+
+def _around(
+    grid: NDArray[Any], counts: NDArray[np.bool_], places: NDArray[np.int64], reach: int = 1, share: float = 0.5
+) -> NDArray[np.float64]:
+    """Return a quantile (the median) of the neighbours that count, for taxels by index; 0 where none counts.
+
+    numpy.nanquantile does the same a hundred times slower, a taxel at a time.
     """
-    padded = np.pad(np.asarray(grid, np.float64), reach, constant_values=np.nan)
     rows, columns = grid.shape
-    places = [(i, j) for i in range(2 * reach + 1) for j in range(2 * reach + 1) if (i, j) != (reach, reach)]
-    # Sorted, what does not count is last. numpy.nanquantile does the same a hundred times slower, a taxel at a time.
-    stack = np.sort(np.stack([padded[i : i + rows, j : j + columns] for i, j in places]), axis=0)
-    last = np.count_nonzero(~np.isnan(stack), axis=0) - 1
-    place = share * np.maximum(last, 0)
-    below = np.floor(place).astype(np.intp)
-    above = np.minimum(below + 1, np.maximum(last, 0))
-    low, high = (np.take_along_axis(stack, at[np.newaxis], axis=0)[0] for at in (below, above))
-    return np.where(last < 0, 0.0, low + (place - below) * (high - low))
+    found = np.empty(len(places))
+    for first in range(0, len(places), _AT_ONCE):
+        y, x = np.divmod(places[first : first + _AT_ONCE], columns)
+        stack = np.full((len(_offsets(reach)), len(y)), np.nan)
+        for row, (i, j) in zip(stack, _offsets(reach), strict=True):
+            inside = (y + i >= 0) & (y + i < rows) & (x + j >= 0) & (x + j < columns)
+            at = (np.where(inside, y + i, 0), np.where(inside, x + j, 0))
+            use = inside & counts[at]
+            row[use] = grid[at][use]
+        # Sorted, what does not count is last.
+        stack.sort(axis=0)
+        last = np.count_nonzero(~np.isnan(stack), axis=0) - 1
+        place = share * np.maximum(last, 0)
+        below = np.floor(place).astype(np.intp)
+        over = np.minimum(below + 1, np.maximum(last, 0))
+        low, high = (np.take_along_axis(stack, at[np.newaxis], axis=0)[0] for at in (below, over))
+        found[first : first + _AT_ONCE] = np.where(last < 0, 0.0, low + (place - below) * (high - low))
+    return found
+
+
+def _offsets(reach: int) -> list[tuple[int, int]]:
+    """Return how far rows and columns of the neighbours so far away lie off."""
+    steps = range(-reach, reach + 1)
+    return [(i, j) for i in steps for j in steps if (i, j) != (0, 0)]

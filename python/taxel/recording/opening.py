@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from taxel import formats
 from taxel._base import arguments
+from taxel._base.arguments import flag, instance, text
 from taxel._core import FormatError
 from taxel.array import Array
+from taxel.events import Events
 from taxel.formats import Trial
 from taxel.labels import Labels
-from taxel.recording.h5 import is_ours
-from taxel.recording.recording import ENDINGS, Clock, Recording, in_memory, open_recording
-from taxel.recording.remarks import Note, Remarks
+from taxel.recording.beside import with_what_lies_beside
+from taxel.recording.contents import Contents
+from taxel.recording.csv import read_csv
+from taxel.recording.h5 import is_ours, read_h5
+from taxel.recording.kinds import ENDINGS, kind_of
+from taxel.recording.notes import Note
+from taxel.recording.npz import read_npz
+from taxel.recording.read_lsa import read_lsa
+from taxel.recording.read_mcap import read_mcap
+from taxel.recording.recording import Recording
 
-__all__ = ["open_any"]
+__all__ = ["open_any", "open_recording"]
 
 #: What a folder's reference events are called.
 LABELS = "labels.csv"
@@ -77,9 +85,60 @@ def open_any(
     how: dict[str, Any] = {"array": array, "pairing": pairing, "differences": differences}
     if place.is_dir():
         return _folder(place, how)
-    if not _is_own(place) and place.exists() and (names := _formats(place)):
+    # What other people's files are called is asked first: a .h5 is read once more to know whose it is.
+    if place.exists() and (names := _formats(place)) and not _is_own(place):
         return [_of(trial, place, names[0]) for trial in formats.trials(place, names[0])]
     return open_recording(place, **how)
+
+
+def open_recording(
+    path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
+) -> Recording:
+    """Open one file of ours: .mcap, .lsa, .npz, .csv or .h5, finished or not, whole or damaged.
+
+    Parameters
+    ----------
+    path : path
+    array : Array, optional
+        The sensor, for files that do not hold it (.lsa, .csv, plain .npz); the thesis' 64 x 64 where it is left out,
+        a larger one where events lie outside it.
+    pairing : {"direct", "taxel"}
+        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
+    differences : bool
+        Whether the intensities of a .lsa are differences (the board's option); a .mcap says so itself.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    FormatError : the file is of another kind, or damaged where nothing can be read (names the place)
+    OSError : the file is not there, or cannot be read
+
+    Notes
+    -----
+    A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel.
+    """
+    place = Path(arguments.path("path", path))
+    if array is not None:
+        instance("array", array, Array)
+    text("pairing", pairing, ("direct", "taxel"))
+    flag("differences", differences)
+    kind = kind_of(place)
+    try:
+        return Recording(with_what_lies_beside(_read(place, kind, array, pairing, differences)))
+    except MemoryError as error:
+        raise FormatError(f"{place}: needs more memory than there is ({error})") from None
+
+
+def _read(place: Path, kind: str, array: Array | None, pairing: str, differences: bool) -> Contents:
+    """Read a file by the reader of its kind."""
+    if kind == "mcap":
+        return read_mcap(place, pairing)
+    if kind == "lsa":
+        return read_lsa(place, array or Array.thesis(), pairing, differences)
+    return {"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array)
 
 
 def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
@@ -118,7 +177,7 @@ def _labelled(table: Path, named: list[tuple[Path, Recording]]) -> list[Recordin
 
 def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
     clock = recording.clock if recording.clock is not None and len(recording.clock.board_us) else None
-    times = labels.of(_Named(name, clock))
+    times = labels._of(name, lambda: clock)
     return sorted(
         (
             Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
@@ -129,21 +188,16 @@ def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
     )
 
 
-@dataclass(frozen=True)
-class _Named:
-    """What labels look at: a recording under the name that its folder gives it."""
-
-    path: Path
-    clock: Clock | None
-
-
 def _of(trial: Trial, place: Path, kind: str) -> Recording:
     """Return a trial of other people's as a recording; what is known of it are notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
+    table = trial.recorded
+    events, frames = (table, None) if isinstance(table, Events) else (None, table)
     path = place if place.is_file() else place / trial.name
-    return in_memory(path, kind, trial.recorded, Remarks(source=trial.source, notes=tuple(notes)), name=trial.name)
+    held: dict[str, Any] = {"events": events, "frames": frames, "source": trial.source, "notes": tuple(notes)}
+    return Recording(with_what_lies_beside(Contents(path, trial.name, kind, table.array, **held)))
 
 
 def _formats(place: Path) -> list[str]:

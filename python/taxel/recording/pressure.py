@@ -2,20 +2,148 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.parameters import defaults
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recording.contents import UNKNOWN
+from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
 
-__all__ = ["above_rest", "readings"]
+__all__ = ["Series", "above_rest", "readings", "series"]
 
 #: Of a long recording, so many pictures at most: a curve has no more points to see.
 MOST_PICTURES = 2000
 #: Pictures a second of a short recording of events.
 PICTURES_HZ = 100.0
+#: Values of pictures that are looked at at once.
+_BLOCK = 1 << 21
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Hold the pressure of a recording over time.
+
+    Parameters
+    ----------
+    t : int64, shape (n,), us
+    unit : str
+    above : float
+        What a loaded taxel reads more than, in `unit`.
+    area : float64, shape (n,), mm2
+    peak, total : float64, shape (n,), in `unit`
+    centre : float64, shape (n, 2), mm
+        As of `Frames.centre`.
+    """
+
+    t: NDArray[np.int64]
+    unit: str
+    above: float
+    area: NDArray[np.float64]
+    peak: NDArray[np.float64]
+    total: NDArray[np.float64]
+    centre: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, frames: Frames, above: float) -> Series:
+        """Return the series of pictures above rest."""
+        return cls(
+            frames.t, frames.unit, above, frames.area(above), frames.peak(), frames.total(), frames.centre(above)
+        )
+
+
+def series(recording: Recording) -> Series | None:
+    """Return area, peak, sum and centre of a recording's pictures above rest (`above_rest`); None without intensities.
+
+    Of events only taxels that have some are looked at, a block of pictures at a time: of a large sensor with few events
+    there is never a whole picture in memory.
+    """
+    if not recording.has_events or recording.calibration is not None:
+        found = above_rest(recording)
+        return None if found is None else Series.of(*found)
+    events = recording.events
+    if events.present is None or events.intensity is None or not events.present.any():
+        return None
+    floor = defaults("contact_area").noise_floor + 0.5
+    drawn = _Drawn.of(recording)
+    rest = np.full(len(drawn.taxels), np.inf)
+    for first, values in drawn.blocks():
+        known = drawn.t[first : first + len(values), None] >= drawn.since
+        rest = np.minimum(rest, np.min(values, axis=0, where=known, initial=np.inf))
+    array, n = events.array, len(drawn.t)
+    y, x = np.divmod(drawn.taxels, array.columns)
+    area, peak, total, centre = np.zeros(n), np.zeros(n), np.zeros(n), np.full((n, 2), np.nan)
+    for first, values in drawn.blocks():
+        over = np.maximum(values - rest, 0.0).astype(np.float32)
+        loaded = over > np.float64(floor)
+        part = slice(first, first + len(values))
+        area[part] = array.pitch_mm**2 * np.count_nonzero(loaded, axis=1)
+        peak[part], total[part] = over.max(axis=1), over.sum(axis=1, dtype=np.float64)
+        weights = np.where(loaded, over, 0.0).astype(np.float64)
+        all_of_them = weights.sum(axis=1)[:, None]
+        moments = np.stack([weights @ x, weights @ y], axis=1) * array.pitch_mm
+        np.divide(moments, all_of_them, out=centre[part], where=all_of_them > 0)
+    return Series(drawn.t, "ticks", floor, area, peak, total, centre)
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """What the taxels with events hold at the times of pictures, a block of pictures at a time."""
+
+    t: NDArray[np.int64]
+    #: The indices of the taxels, what each holds at first, and when its first event comes, us.
+    taxels: NDArray[np.int64]
+    begins: NDArray[np.float32]
+    since: NDArray[np.int64]
+    #: Of each event with a value the first picture that shows it, its taxel's number, its value; by time.
+    picture: NDArray[np.int64]
+    column: NDArray[np.int64]
+    ticks: NDArray[np.uint16]
+
+    @classmethod
+    def of(cls, recording: Recording) -> _Drawn:
+        events = recording.events
+        assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller asked
+        there = np.flatnonzero(events.present)
+        order = there[np.argsort(events.t[there], kind="stable")]
+        taxels, column = np.unique(events.array.index(events.x[order], events.y[order]), return_inverse=True)
+        t, held = _times(recording), recording._contents.held
+        begins = np.zeros(len(taxels), np.float32)
+        if held is not None:
+            begins = np.where(held == UNKNOWN, 0, held).reshape(-1)[taxels].astype(np.float32)
+        since = np.full(len(taxels), np.iinfo(np.int64).max)
+        np.minimum.at(since, column, events.t[order])
+        picture = np.searchsorted(t, events.t[order], side="left")
+        return cls(t, taxels, begins, since, picture, column, events.intensity[order])
+
+    def blocks(self) -> Iterator[tuple[int, NDArray[np.float32]]]:
+        """Give the first picture of each block, and what the taxels hold in its pictures."""
+        now, each = self.begins.copy(), max(1, _BLOCK // max(1, len(self.taxels)))
+        bounds = np.searchsorted(self.picture, np.arange(len(self.t) + 1), side="left").tolist()
+        for first in range(0, len(self.t), each):
+            values = np.empty((min(each, len(self.t) - first), len(self.taxels)), np.float32)
+            for k in range(len(values)):
+                new = slice(bounds[first + k], bounds[first + k + 1])
+                now[self.column[new]] = self.ticks[new]
+                values[k] = now
+            yield first, values
+
+
+def _rate_hz(recording: Recording) -> float:
+    seconds = recording.events.duration_us / 1e6
+    return min(PICTURES_HZ, MOST_PICTURES / seconds) if seconds else PICTURES_HZ
+
+
+def _times(recording: Recording) -> NDArray[np.int64]:
+    """Return the times of the pictures of `Recording.frames`."""
+    t = recording.events.t
+    first, stop = recording._contents.stretch or (int(t.min()), int(t.max()) + 1)
+    return np.arange(first, stop, period_us("rate_hz", _rate_hz(recording)), dtype=np.int64)
 
 
 def above_rest(recording: Recording) -> tuple[Frames, float] | None:
@@ -50,8 +178,7 @@ def readings(recording: Recording) -> tuple[Frames, NDArray[np.float64], float] 
     events = recording.events
     if events.present is None or not events.present.any():
         return None
-    seconds = events.duration_us / 1e6
-    frames = recording.frames(min(PICTURES_HZ, MOST_PICTURES / seconds) if seconds else PICTURES_HZ)
+    frames = recording.frames(_rate_hz(recording))
     heard = frames.t[:, None, None] >= _first_heard(events)
     rest = np.min(frames.values, axis=0, where=heard, initial=np.inf).astype(np.float64)
     return frames, rest, defaults("contact_area").noise_floor + 0.5

@@ -34,7 +34,7 @@ _ADAPTIVE = defaults("adaptive_ramp")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Fabric(Value):
-    """Model the conductance of a taxel of piezoresistive fabric under a force: ``rest_us + touch_us (F / 0.02 N)^exponent``.
+    """Model a fabric taxel's conductance under a force: ``rest_us + touch_us (F / 0.02 N)^exponent``.
 
     Parameters
     ----------
@@ -320,7 +320,15 @@ class Converter(Value):
         return _core.converter_ticks(self._json(), shape, given.ravel()).reshape(given.shape)
 
     def ramp_volts(self, ticks: ArrayLike) -> Values:
-        """Return where the ramp stands after so many ticks, V, of the same shape.
+        """Return where the ramp stands after so many ticks.
+
+        Parameters
+        ----------
+        ticks : float64, ticks, any shape
+
+        Returns
+        -------
+        float64, V, of the same shape
 
         Raises
         ------
@@ -330,7 +338,16 @@ class Converter(Value):
         return _core.converter_ramp(self._json(), given.ravel(), False).reshape(given.shape)
 
     def ramp_ticks(self, volts: ArrayLike) -> Values:
-        """Return when the ramp passes a voltage, ticks, of the same shape: the inverse; `ramp` at 3 V and above.
+        """Return when the ramp passes a voltage: the inverse of `ramp_volts`.
+
+        Parameters
+        ----------
+        volts : float64, V, any shape
+
+        Returns
+        -------
+        float64, ticks, of the same shape
+            `ramp` at 3 V and above.
 
         Raises
         ------
@@ -386,7 +403,7 @@ class Converted(NamedTuple):
 class AdaptiveRamp(Value):
     """Convert by a ramp that is steep while the signal moves fast and gentle while it hardly does (thesis 4.3.2).
 
-    After a frame the taxel that moved farthest sets the length of the next ramp: the length that lets it move by `moves_ticks`
+    After a frame the taxel that moved farthest sets the length of the next ramp, which lets it move by `moves_ticks`
     of that ramp within the frame, so that a reading is about as much too old as too coarse. Without any move the ramp
     takes twice its time, up to the gentlest. What a step and a column take beside their ramp stays.
 

@@ -154,7 +154,7 @@ class Layer:
 
         Parameters
         ----------
-        sunk_mm : float64, shape (rows, columns), each times `cells_per_pitch`
+        sunk_mm : float64, mm, shape (rows, columns), each times `cells_per_pitch`
             At each cell; below 0 where the body is still above the face.
 
         Returns

@@ -58,7 +58,12 @@ class Replay:
     def registers(self, preset: str | None) -> Registers:
         """Return what the board holds that plays it: as it was recorded where that is known, else a preset."""
         known = None if self.recording is None else self.recording.registers
-        held = fitting(preset, self.array) if known is None else known.replace(record=False)
+        if known is not None and known.array != self.array:
+            # A part of a sensor: a board of its own, as fast as the whole one was.
+            held, _ = Registers._of_source(self.array, 1e6 / known.frame_us, int(known.ramp).bit_length())
+            held = held.replace(noise_floor=known.noise_floor, wire_version=known.wire_version)
+        else:
+            held = fitting(preset, self.array) if known is None else known.replace(record=False)
         values = self.source.intensity if isinstance(self.source, Events) else None
         most = 0 if values is None else int(values.max())
         # A converter sees nothing above its ramp: where that is a preset's and the sensor another, it is made longer.

@@ -42,15 +42,29 @@ class Command:
         object.__setattr__(self, "value", whole("value", self.value, 0, 2**32 - 1))
 
     def to_bytes(self) -> bytes:
-        """Return the five bytes."""
+        """Return the five bytes.
+
+        Returns
+        -------
+        bytes, 5
+        """
         return _core.command_bytes(self.register, self.value)
 
     @classmethod
     def from_bytes(cls, data: Any) -> Command:
         """Read five bytes.
 
+        Parameters
+        ----------
+        data : bytes, or anything with a contiguous buffer
+
+        Returns
+        -------
+        Command
+
         Raises
         ------
+        ProblemError : `data` is not bytes
         FormatError : not five bytes, or a top bit out of place (names the byte)
         """
         return cls(*_core.command_read(given_bytes(data)))

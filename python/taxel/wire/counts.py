@@ -1,4 +1,4 @@
-"""What a decoder received, decoded, refused and missed, and what the board says of itself."""
+"""What a decoder received, decoded, refused and missed, and the board's totals."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Counts:
     datagrams, intact : int
         Version 2: given to the decoder, and decoded.
     repeated, old : int
-        Version 2: received again; more than 65 536 numbers late, so that nobody can tell.
+        Version 2: received again; more than 65 536 numbers late, so that it is unknown whether they came before.
     long, foreign, checksum : int
         Version 2: refused as longer than 1400 bytes, not of version 2 or of another board, damaged.
     missing : int

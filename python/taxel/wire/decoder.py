@@ -121,7 +121,7 @@ class Decoder:
     -----
     Table 5.4, and the page *Wire version 2*. Time of version 1 is unwrapped into 64 bits: a stamp up to 0.1 s behind
     the latest time is a step back (counted, kept), any other lies ahead, so silences of up to 6.45 s are right. Arrival
-    times tell how long a longer one was.
+    times show how long a longer one was.
 
     Examples
     --------
@@ -168,7 +168,7 @@ class Decoder:
         data : bytes, or anything with a contiguous buffer
         arrived : int, us, optional
             The host's clock when they came. Of version 1 it chooses the wrap of the 16-bit time after a silence of more
-            than 6.45 s; of version 2 it says how much time has passed at a reset of the board.
+            than 6.45 s; of version 2 it shows how much time has passed at a reset of the board.
 
         Returns
         -------

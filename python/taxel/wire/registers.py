@@ -28,7 +28,7 @@ _MANUAL = {field["manual"]: name for name, field in _FIELDS.items() if field["ma
 
 
 class Registers:
-    """Hold what the board's registers say; a set that breaks a rule cannot be made.
+    """Hold the values of the board's registers; a set that breaks a rule cannot be made.
 
     "Line" is the driven line, the outer step of the scan; "step" the inner one, the multiplexer's. The manual's names
     (`row_change_period`, `ramp_time`, `nrows` ...) are aliases, in the manual's units (10 ns, ticks, lines less one).
@@ -57,7 +57,7 @@ class Registers:
 
     Raises
     ------
-    DeviceError : a rule is broken (says which, with the numbers)
+    DeviceError : a rule is broken (names it, with the numbers)
     ProblemError : no such field, a value that is no number, a time that is no multiple of 0.01 us
 
     Notes
@@ -93,6 +93,16 @@ class Registers:
     def preset(cls, name: str, *, array: Array | None = None) -> Registers:
         """Return one of `PRESETS`.
 
+        Parameters
+        ----------
+        name : str, one of `PRESETS`
+        array : Array, optional
+            The sensor; the thesis' 64 x 64 where it is left out.
+
+        Returns
+        -------
+        Registers
+
         Raises
         ------
         ProblemError : no such preset (names those that there are)
@@ -117,7 +127,19 @@ class Registers:
 
     @classmethod
     def from_words(cls, words: Sequence[int], *, array: Array | None = None, channels: int = 16) -> Registers:
-        """Return the set that eight 32-bit registers hold, REG0 first; of REG6 nothing is looked at.
+        """Return the set that eight 32-bit registers hold, REG0 first; REG6 has no field.
+
+        Parameters
+        ----------
+        words : sequence of int, shape (8,), 0 to 2**32 - 1
+        array : Array, optional
+            The sensor; the thesis' 64 x 64 where it is left out.
+        channels : {16, 64}
+            Of the converter: the board's build, not a register.
+
+        Returns
+        -------
+        Registers
 
         Raises
         ------
@@ -139,6 +161,15 @@ class Registers:
     def replace(self, **fields: float) -> Registers:
         """Return a set with some fields changed, by taxel's names or the manual's.
 
+        Parameters
+        ----------
+        **fields : float
+            As in the constructor.
+
+        Returns
+        -------
+        Registers
+
         Raises
         ------
         DeviceError, ProblemError : as for a new set
@@ -150,8 +181,16 @@ class Registers:
     def with_preset(self, name: str) -> Registers:
         """Return a set that took over one of `PRESETS`, with as many lines as the array has.
 
-        A preset says neither which version of the wire the board speaks nor whether a recording runs: these stay, as
-        do the channels, which are the board's build.
+        A preset has neither the version of the wire nor whether a recording runs: these stay, as do the channels, which
+        are the board's build.
+
+        Parameters
+        ----------
+        name : str, one of `PRESETS`
+
+        Returns
+        -------
+        Registers
 
         Raises
         ------
@@ -188,6 +227,14 @@ class Registers:
 
         `record` stays as it is: starting a recording is a command of its own.
 
+        Parameters
+        ----------
+        target : Registers
+
+        Returns
+        -------
+        list of Command
+
         Raises
         ------
         DeviceError : the sets are for boards with different channels
@@ -223,6 +270,18 @@ class Registers:
 
 def described(registers: Registers) -> list[tuple[str, float, str, str, str]]:
     """Return each field of a set: its name, value, unit, place in the registers, and what it is for.
+
+    Parameters
+    ----------
+    registers : Registers
+
+    Returns
+    -------
+    list of (name, value, unit, place, text), one a field, in the order of the registers
+
+    Raises
+    ------
+    ProblemError : not Registers
 
     Examples
     --------

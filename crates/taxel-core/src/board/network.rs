@@ -1,4 +1,4 @@
-//! A network that does to datagrams what networks do, on demand and by a seed.
+//! Simulated network: drops, repeats, delays, cuts and damages datagrams, by a seed.
 
 use std::collections::VecDeque;
 
@@ -60,7 +60,7 @@ pub struct NetworkCounts {
     pub corrupted: u64,
 }
 
-/// Stands between a board and who listens.
+/// Passes the datagrams of a board on to a host, with faults.
 #[derive(Debug, Clone)]
 pub struct Network {
     faults: Faults,

@@ -95,8 +95,8 @@ impl Play {
         Ok(Armed { board, crossed, stage, commands })
     }
 
-    /// Plays as fast as it goes and decodes what the board sends; `watch` hears once a second of the board's which share
-    /// is played.
+    /// Plays as fast as it goes and decodes what the board sends; `watch` is called once a second of the board's with the share
+    /// that is played.
     ///
     /// # Errors
     ///

@@ -8,7 +8,8 @@ use super::statement::Parts;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// The objective is proven to lie within `tolerance` of its least value; what must be met is met.
+    /// The objective is proven to lie within `tolerance` of its least value; what must be met is met, in continuous time by the
+    /// neuron itself, run on the patterns.
     Solved,
     /// No weights meet what must be met; a certificate proves it. (In 6.14 nothing must be.)
     Infeasible,

@@ -21,7 +21,7 @@ pub use certificate::Certificate;
 pub(crate) use examples::{check_example, check_examples, check_heard, check_pattern, check_some_target, check_trains};
 pub(crate) use objective::{Choice, NOTHING, Objective, relative_gap};
 pub use objective::{Divisor, Norm, Parts};
-pub(crate) use peak::{Peak, largest};
+pub(crate) use peak::{Peak, exceeds, largest};
 pub(crate) use relaxed::{Point, Relaxed, Tangents};
 pub(crate) use rows::end_of;
 pub use rows::{Margin, Row, Stated, Statement};

@@ -183,18 +183,14 @@ impl StdpNeuron {
         if piece.start < self.now {
             return Err(problem!("piece from {} ms: must begin at {} ms or later", piece.start, self.now));
         }
-        let mut spikes: Vec<(f64, u32)> = Vec::with_capacity(piece.times.len());
-        for train in 0..piece.len() {
-            spikes.extend(piece.train(train).iter().map(|&t| (t, train as u32)));
-        }
-        spikes.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let spikes = piece.by_time(stop)?;
         let mut out = vec![];
-        for (k, &(t, train)) in spikes.iter().enumerate() {
-            if k % 65_536 == 0 {
+        for (k, spike) in spikes.iter().enumerate() {
+            if k % 4096 == 0 {
                 stop.check()?;
             }
-            self.pass(t, learn, &mut out);
-            self.hear(t, train as usize, learn);
+            self.pass(spike.t, learn, &mut out);
+            self.hear(spike.t, spike.train as usize, learn);
         }
         self.pass(piece.stop, learn, &mut out);
         Ok(out)

@@ -5,6 +5,9 @@ use super::kernel::{KernelSum, Shape};
 use super::model::{AT_EDGE, AfterSpike, Neuron};
 use super::threshold::{OutputSpike, Threshold};
 
+/// So many times as far below the threshold as counts as reaching it a potential may be that was trained to reach it there.
+const ROUNDED: f64 = 4.0;
+
 /// The neuron of continuous time at work.
 #[derive(Debug, Clone)]
 pub(super) struct ContinuousStream {
@@ -80,13 +83,21 @@ impl ContinuousStream {
     /// Fires whatever crosses up to an input at `t`, included.
     fn settle_at_input(&mut self, t: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
         self.settle(t, horizon, out);
-        // An input a hair before a crossing is at it and comes too late: it could turn the potential down there.
+        // The potential of a trained neuron reaches the threshold to rounding. An input there comes too late to turn it down.
         if let Next::At(crossing) = self.next
             && crossing - t <= AT_EDGE
             && self.edge.is_none_or(|edge| crossing < edge)
+            && self.below(t) <= ROUNDED * self.threshold.touch
         {
             self.fire(crossing, out);
         }
+    }
+
+    /// How far the potential is below the threshold at `t`, mV.
+    fn below(&self, t: f64) -> f64 {
+        // Before the printed first rise sets in there is none; it is an edge of its own.
+        let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(t) };
+        self.threshold.base + rise - self.potential(t)
     }
 
     fn move_to(&mut self, t: f64) {

@@ -2,6 +2,7 @@
 
 use super::kernel::{KernelSum, Shape, Step};
 use super::model::{AfterSpike, Neuron};
+use super::points::{Grid, Place};
 use super::threshold::{OutputSpike, Threshold};
 
 /// The grid neuron at work.
@@ -10,7 +11,7 @@ pub(super) struct GridStream {
     neuron: Neuron,
     shape: Shape,
     pub(super) threshold: Threshold,
-    start: f64,
+    grid: Grid,
     /// The potential at grid point `point`; inputs of the interval before it are in already.
     state: KernelSum,
     /// The weights of inputs at that point itself: they move neither potential nor slope before it is left.
@@ -29,7 +30,7 @@ impl GridStream {
             neuron: neuron.clone(),
             shape,
             threshold: Threshold::new(neuron, factor, start),
-            start,
+            grid: Grid::new(start, neuron.step_ms),
             state: KernelSum::default(),
             arriving: 0.0,
             point: 0.0,
@@ -40,14 +41,15 @@ impl GridStream {
 
     /// An input adds to the state at the first point not before it, so it needs one exponential and no queue.
     pub(super) fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
-        let point = ((t - self.start) / self.neuron.step_ms).ceil();
+        let place = self.grid.place(t);
+        let point = place.from();
         if point > self.point {
             self.compare(out);
             self.step_through(point - 1.0, out);
             self.jump(point);
         }
         if !self.neuron.loses(t, self.threshold.fired) {
-            let age = self.time(self.point) - t;
+            let age = self.grid.between(place, Place::at(self.point));
             if age > 0.0 {
                 self.shape.add(&mut self.state, weight, age);
             } else {
@@ -58,23 +60,16 @@ impl GridStream {
 
     /// Fires at whatever point up to `until`, included, finds the potential at or above the threshold.
     pub(super) fn settle(&mut self, until: f64, out: &mut Vec<OutputSpike>) {
-        if self.time(self.point) <= until {
+        if self.grid.time(self.point) <= until {
             self.compare(out);
-            let last = ((until - self.start) / self.neuron.step_ms).floor();
-            self.step_through(last, out);
+            self.step_through(self.grid.place(until).until(), out);
         }
     }
 
     pub(super) fn potential(&self, t: f64) -> f64 {
-        {
-            let since = t - self.time(self.point);
-            // An input at the point itself moves nothing before the point is left.
-            if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
-        }
-    }
-
-    fn time(&self, point: f64) -> f64 {
-        self.start + point * self.neuron.step_ms
+        let since = self.grid.between(Place::at(self.point), self.grid.place(t));
+        // An input at the point itself moves nothing before the point is left.
+        if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
     }
 
     /// Goes on point by point as long as the potential could reach the threshold without a further input.
@@ -82,10 +77,15 @@ impl GridStream {
     /// Where it could not, the state stays behind and catches up in one jump at the next input. What is done depends on
     /// the state alone, so that a stream cut elsewhere gives the same bits.
     fn step_through(&mut self, last: f64, out: &mut Vec<OutputSpike>) {
-        while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - self.threshold.touch {
+        while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - self.slack() {
             self.jump(self.point + 1.0);
             self.compare(out);
         }
+    }
+
+    /// How far below the threshold a potential may end and still be looked at, mV.
+    fn slack(&self) -> f64 {
+        self.threshold.slack(self.grid.rounding_ms(self.grid.time(self.point)))
     }
 
     fn leaving(&self) -> KernelSum {
@@ -107,11 +107,14 @@ impl GridStream {
     }
 
     fn compare(&mut self, out: &mut Vec<OutputSpike>) {
-        let t = self.time(self.point);
-        if std::mem::replace(&mut self.compared, true) || !self.threshold.reached(t, self.state.b) {
+        if std::mem::replace(&mut self.compared, true) {
             return;
         }
-        out.push(OutputSpike { t, slope: self.shape.slope(self.state) });
+        let (t, slope) = (self.grid.time(self.point), self.shape.slope(self.state));
+        if !self.threshold.reached(t, self.state.b, slope, self.grid.rounding_ms(t)) {
+            return;
+        }
+        out.push(OutputSpike { t, slope });
         self.threshold.fire(t);
         if self.neuron.after_spike == AfterSpike::Reset {
             self.state = KernelSum::default();

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::kernel::{Kernel, Shape};
-use super::points::{MOST_LAID_OUT, check_points, points_between};
+use super::points::{Grid, MOST_LAID_OUT, check_points, points_between};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};
@@ -78,8 +78,8 @@ pub struct Neuron {
     pub step_ms: f64,
 }
 
-/// An input so near an end of a refractory time counts as at it, and one so short a time before the neuron's own spike as at
-/// the spike, ms: trained neurons fire within 1e-6 ms of their targets, and inputs at whole ms often lie just there.
+/// An input so near an end of a refractory time counts as at it, ms: trained neurons fire within 1e-6 ms of their targets, and
+/// inputs at whole ms often lie just there.
 pub(crate) const AT_EDGE: f64 = 1e-6;
 /// Rounding of a time that is the sum of others, on the very edge of a refractory time, ms, and in neighbouring numbers: from
 /// some 20 minutes on these lie farther apart.
@@ -208,6 +208,16 @@ impl Neuron {
     /// What is left at `t` of the threshold's rise by the last spike, mV.
     pub(crate) fn rise(&self, spike: Option<f64>, t: f64) -> f64 {
         spike.map_or(0.0, |spike| left_of_rise(self.theta_plus, t - spike - self.refractory, self.tau_rec(), t))
+    }
+
+    /// How long before `t` other times are, ms: on a grid that begins at `start` reckoned from the numbers of its points.
+    pub(crate) fn ages(&self, start: f64, t: f64) -> impl Fn(f64) -> f64 + use<> {
+        let grid = (self.time == Time::Grid).then(|| Grid::new(start, self.step_ms));
+        let here = grid.map(|grid| grid.place(t));
+        move |s| match (grid, here) {
+            (Some(grid), Some(here)) => grid.between(grid.place(s), here),
+            _ => t - s,
+        }
     }
 
     /// How many points of the grid lie from `start` to `end`.

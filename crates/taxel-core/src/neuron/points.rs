@@ -1,14 +1,105 @@
-//! How many points a grid in time has, and how many are too many.
+//! The points of a grid in time: their times, their numbers, and how many are too many.
+//!
+//! Far from time 0 neighbouring times lie so far apart that `start + k step_ms` is rounded by more than a trained potential may
+//! be off. So the state of a neuron and the ages of its inputs are both reckoned from the number of a step, never from the
+//! difference of two rounded times.
 
+use super::model::rounding_ms;
 use crate::{Result, problem};
 
 /// So many points are laid out at most (some GB), and so many stepped through (some ten seconds).
 pub(crate) const MOST_LAID_OUT: f64 = 2e7;
 pub(super) const MOST_STEPPED: f64 = 1e9;
 
+/// The points `start + k step_ms`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Grid {
+    pub(crate) start: f64,
+    pub(crate) step_ms: f64,
+}
+
+/// A time by the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Place {
+    /// The number of the nearest point.
+    point: f64,
+    /// How long behind that point, ms; 0 at the point itself, below 0 before it.
+    rest: f64,
+}
+
+impl Place {
+    /// A point itself.
+    pub(crate) fn at(point: f64) -> Self {
+        Self { point, rest: 0.0 }
+    }
+
+    /// Whether the time is that of a point.
+    pub(crate) fn is_point(self) -> bool {
+        self.rest == 0.0
+    }
+
+    /// The first point not before the time.
+    pub(crate) fn from(self) -> f64 {
+        if self.rest > 0.0 { self.point + 1.0 } else { self.point }
+    }
+
+    /// The first point behind the time.
+    pub(crate) fn behind(self) -> f64 {
+        if self.rest >= 0.0 { self.point + 1.0 } else { self.point }
+    }
+
+    /// The last point not behind the time.
+    pub(crate) fn until(self) -> f64 {
+        if self.rest < 0.0 { self.point - 1.0 } else { self.point }
+    }
+}
+
+impl Grid {
+    pub(crate) fn new(start: f64, step_ms: f64) -> Self {
+        Self { start, step_ms }
+    }
+
+    /// When a point is, ms.
+    pub(crate) fn time(&self, point: f64) -> f64 {
+        self.start + point * self.step_ms
+    }
+
+    /// Where a time lies. Which side of a point is decided by the point's time as it is told, the distance without rounding.
+    pub(crate) fn place(&self, t: f64) -> Place {
+        let since = t - self.start;
+        let point = (since / self.step_ms).round();
+        let told = self.time(point);
+        if t == told {
+            return Place::at(point);
+        }
+        // What the difference of the two times lost by rounding.
+        let back = since + self.start;
+        let lost = (t - back) + ((back - since) - self.start);
+        let rest = (-point).mul_add(self.step_ms, since) + lost;
+        Place { point, rest: if t > told { rest.max(f64::MIN_POSITIVE) } else { rest.min(-f64::MIN_POSITIVE) } }
+    }
+
+    /// How long after one time another is, ms.
+    pub(crate) fn between(&self, from: Place, to: Place) -> f64 {
+        (to.point - from.point) * self.step_ms + (to.rest - from.rest)
+    }
+
+    /// How many points there are up to `end`, one that rounding puts a hair behind it included.
+    pub(crate) fn points_until(&self, end: f64) -> f64 {
+        let place = self.place(end);
+        let last = if self.time(place.point) <= end + rounding_ms(end) { place.point } else { place.until() };
+        (last + 1.0).max(0.0)
+    }
+
+    /// How far the time of a point may be rounded, ms.
+    pub(super) fn rounding_ms(&self, t: f64) -> f64 {
+        4.0 * f64::EPSILON * self.start.abs().max(t.abs())
+    }
+}
+
 /// How many points of a grid of `step_ms` lie from `start` to `end`, ms.
 pub(crate) fn points_between(start: f64, end: f64, step_ms: f64) -> f64 {
-    (((end - start) / step_ms + 1e-9).floor() + 1.0).max(0.0)
+    Grid::new(start, step_ms).points_until(end)
 }
 
 /// Refuses more points than can be had, before memory is asked for.

@@ -48,8 +48,8 @@ impl Neuron {
             self.check_rows(self.points(trains.start, trains.stop))?;
         }
         let script = match self.time {
-            Time::Continuous => Script::Continuous(continuous::Script::new(self, trains, threshold)),
-            Time::Grid => Script::Grid(grid::Script::new(self, trains, threshold)),
+            Time::Continuous => Script::Continuous(continuous::Script::new(self, trains, threshold, stop)?),
+            Time::Grid => Script::Grid(grid::Script::new(self, trains, threshold, stop)?),
         };
         let mut out =
             SpikeTrains { times: vec![], offsets: vec![0], values: None, start: trains.start, stop: trains.stop };
@@ -67,8 +67,8 @@ impl Neuron {
                 return Err(problem!("weights[{}, {train}] is {value}: must be finite", first + lane));
             }
             match &script {
-                Script::Continuous(script) => continuous::run(self, script, &block, &mut fired),
-                Script::Grid(script) => grid::run(self, script, &block, &mut fired),
+                Script::Continuous(script) => continuous::run(self, script, &block, &mut fired, stop)?,
+                Script::Grid(script) => grid::run(self, script, &block, &mut fired, stop)?,
             }
             for spikes in &mut fired[..count] {
                 out.times.append(spikes);

@@ -39,7 +39,7 @@ impl Neuron {
         }
         let mut stream = self.stream(weights, threshold, trains.start)?;
         let mut out = Vec::new();
-        for (k, spike) in trains.by_time().iter().enumerate() {
+        for (k, spike) in trains.by_time(stop)?.iter().enumerate() {
             if k % 4096 == 0 {
                 stop.check()?;
             }
@@ -80,8 +80,16 @@ impl Neuron {
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters, weights or trains that make no sense, or times that do not ascend.
-    pub fn potential(&self, weights: &[f64], trains: &SpikeTrains, times: &[f64], spikes: &[f64]) -> Result<Vec<f64>> {
+    /// `Problem` for parameters, weights or trains that make no sense, or times that do not ascend; `Interrupted` where the
+    /// caller stops it.
+    pub fn potential(
+        &self,
+        weights: &[f64],
+        trains: &SpikeTrains,
+        times: &[f64],
+        spikes: &[f64],
+        stop: Stop<'_>,
+    ) -> Result<Vec<f64>> {
         self.check()?;
         self.check_inputs(weights, trains)?;
         for (name, list) in [("times", times), ("spikes", spikes)] {
@@ -97,7 +105,7 @@ impl Neuron {
                 ));
             }
         }
-        Ok(potential(self, weights, trains, times, spikes))
+        potential(self, weights, trains, times, spikes, stop)
     }
 
     pub(super) fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
@@ -110,20 +118,32 @@ impl Neuron {
 }
 
 /// The potential at ascending `times` of a neuron that fired at ascending `spikes`.
-fn potential(neuron: &Neuron, weights: &[f64], trains: &SpikeTrains, times: &[f64], spikes: &[f64]) -> Vec<f64> {
-    let (inputs, shape) = (trains.by_time(), neuron.shape());
+fn potential(
+    neuron: &Neuron,
+    weights: &[f64],
+    trains: &SpikeTrains,
+    times: &[f64],
+    spikes: &[f64],
+    stop: Stop<'_>,
+) -> Result<Vec<f64>> {
+    let (inputs, shape) = (trains.by_time(stop)?, neuron.shape());
     let (mut state, mut at) = (KernelSum::default(), trains.start);
-    let (mut next_input, mut next_spike, mut last) = (0, 0, None);
+    let age = |from: f64, to: f64| neuron.ages(trains.start, to)(from);
+    let (mut next_input, mut next_spike, mut last, mut done) = (0, 0, None, 0_usize);
     let mut out = Vec::with_capacity(times.len());
     for &t in times {
         // A spike takes effect after its own time, an input from it on; at equal times the spike sees the input (as 0).
         loop {
             let spike = spikes.get(next_spike).copied().filter(|&s| s < t);
             let input = inputs.get(next_input).filter(|i| i.t < t && spike.is_none_or(|s| i.t <= s));
+            done += 1;
+            if done % 4096 == 0 {
+                stop.check()?;
+            }
             if let Some(input) = input {
                 next_input += 1;
                 if !neuron.loses(input.t, last) {
-                    state = shape.after(state, input.t - at);
+                    state = shape.after(state, age(at, input.t));
                     at = input.t;
                     shape.add(&mut state, weights[input.train as usize], 0.0);
                 }
@@ -138,7 +158,7 @@ fn potential(neuron: &Neuron, weights: &[f64], trains: &SpikeTrains, times: &[f6
             }
         }
         let refractory = last.is_some_and(|s| t <= s + neuron.refractory);
-        out.push(if refractory { 0.0 } else { shape.after(state, (t - at).max(0.0)).b });
+        out.push(if refractory { 0.0 } else { shape.after(state, age(at, t).max(0.0)).b });
     }
-    out
+    Ok(out)
 }

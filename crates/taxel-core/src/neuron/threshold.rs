@@ -11,6 +11,9 @@ pub struct OutputSpike {
     pub slope: f64,
 }
 
+/// Steeper than by so many thresholds a ms no potential is taken to rise.
+const STEEPEST: f64 = 1e4;
+
 /// The threshold with its memory of the last spike.
 #[derive(Debug, Clone)]
 pub(super) struct Threshold {
@@ -55,10 +58,17 @@ impl Threshold {
         self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + rounding_ms(t))
     }
 
-    /// Whether a potential on a grid has reached the threshold at `t`, and the neuron may fire.
-    pub(super) fn reached(&self, t: f64, potential: f64) -> bool {
-        let potential = potential + self.touch;
+    /// Whether a potential on a grid has reached the threshold at `t`, a time that may be rounded by `rounding_ms`, and the
+    /// neuron may fire: rounding may move a potential by its slope, and the threshold by its own, times that.
+    pub(super) fn reached(&self, t: f64, potential: f64, slope: f64, rounding_ms: f64) -> bool {
+        let slope = slope.abs().min(STEEPEST * self.base) + self.plus / self.tau_rec;
+        let potential = potential + self.touch + slope * rounding_ms;
         potential >= self.base && !self.silent_at(t) && potential >= self.base + self.rise(t)
+    }
+
+    /// No potential lower than so far below the threshold, mV, has reached it, whatever its slope.
+    pub(super) fn slack(&self, rounding_ms: f64) -> f64 {
+        self.touch + (STEEPEST * self.base + self.plus / self.tau_rec) * rounding_ms
     }
 
     /// When the rise sets in and the refractory time ends.

@@ -128,7 +128,7 @@ pub(in crate::wire) unsafe fn append(
     }
 }
 
-/// Where version 2 puts what datagrams tell: columns that grow, or columns that were laid out.
+/// Where version 2 writes the rows of datagrams: columns that grow, or columns that were laid out.
 pub(in crate::wire) trait Table {
     /// Takes a start or a stop.
     fn mark(&mut self, marker: Marker);
@@ -137,7 +137,7 @@ pub(in crate::wire) trait Table {
     fn paired(&self) -> bool;
 
     /// Takes rows: `fill` gets room, the row from which on there is some for `most` of them, and whether each has an intensity or the mark that it has none, as it
-    /// must where they are `valued`; it says how many it wrote. States gave them where they are `repaired`.
+    /// must where they are `valued`; it returns how many it wrote. States gave them where they are `repaired`.
     ///
     /// # Safety
     ///

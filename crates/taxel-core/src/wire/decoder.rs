@@ -121,7 +121,7 @@ impl Decoder {
 
     /// Takes the next bytes; gives the events that they complete.
     ///
-    /// `arrived` is the host's clock in us when the bytes came; it tells how long a silence of more than 6.45 s was.
+    /// `arrived` is the host's clock in us when the bytes came; it shows how long a silence of more than 6.45 s was.
     pub fn push(&mut self, bytes: &[u8], arrived: Option<i64>) -> Events {
         let mut events = Events::empty(self.array.clone());
         self.push_into(bytes, arrived, &mut events);
@@ -226,7 +226,7 @@ impl Decoder {
     ///
     /// None where stamps alone do not unwrap them: before the first, and until this arrival has been reckoned with.
     fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, filling: &mut Filling<'_>) -> usize {
-        if self.by_taxel.is_some() || self.held.is_some() || self.clock.heard != arrived {
+        if self.by_taxel.is_some() || self.held.is_some() || self.clock.arrived != arrived {
             return 0;
         }
         let Some(latest) = self.clock.latest else { return 0 };

@@ -1,4 +1,4 @@
-//! One sender's datagrams to events, whichever version of the wire it speaks.
+//! One sender's datagrams to events, whichever version of the wire it sends.
 
 use crate::wire::decoder::{Counts, Decoder};
 use crate::wire::silence::silence;
@@ -9,7 +9,7 @@ use crate::{Array, Events};
 /// For so long nothing but whole words of version 1 must come before a sender of version 2 counts as changed, us.
 const CHANGED_AFTER_US: i64 = 1_000_000;
 
-/// What a datagram told beside its events.
+/// What a datagram held beside its events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Took {
     /// The version that the sender speaks after it.
@@ -22,11 +22,11 @@ pub struct Took {
     pub until: Option<i64>,
     /// Numbers that have not come so far (version 2).
     pub missing: u64,
-    /// The latest time that was heard, us.
+    /// The latest time that was received, us.
     pub now: Option<i64>,
 }
 
-/// Hears one sender (address and port).
+/// Decodes the datagrams of one sender (address and port).
 ///
 /// It speaks version 1 until its first intact datagram of version 2. From then on what is of version 1 is refused and counted, until
 /// [`Self::expect`], or a second of nothing but whole words of version 1, says that the board changed. Time goes on over a
@@ -39,7 +39,7 @@ pub struct Receiver {
     two: v2::Decoder,
     /// What is added to times of version 1, once known after a change.
     offset: Option<i64>,
-    /// The latest time, and when it was heard.
+    /// The latest time, and when it arrived.
     latest: Option<(i64, Option<i64>)>,
     /// Since when nothing but whole words of version 1 has come.
     whole_since: Option<i64>,
@@ -68,13 +68,13 @@ impl Receiver {
         self.two.begin_with(held);
     }
 
-    /// What was heard of version 1.
+    /// The decoder of version 1.
     #[must_use]
     pub fn one(&self) -> &Decoder {
         &self.one
     }
 
-    /// What was heard of version 2.
+    /// The decoder of version 2.
     #[must_use]
     pub fn two(&self) -> &v2::Decoder {
         &self.two
@@ -98,7 +98,7 @@ impl Receiver {
         self.changes
     }
 
-    /// Says that the host told the board to speak this version.
+    /// Notes that the host has set the board to this version.
     pub fn expect(&mut self, version: u8, out: &mut Events) {
         if version != self.version {
             self.change(version, out);
@@ -171,7 +171,7 @@ impl Receiver {
         }
     }
 
-    /// Moves times of version 1 behind what was heard before the change.
+    /// Moves times of version 1 behind what was received before the change.
     fn carry(&mut self, rows: usize, markers: usize, arrived: Option<i64>, out: &mut Events) {
         let first = out.t.get(rows).copied().or_else(|| out.markers.get(markers).map(|m| m.t));
         let Some(first) = first else { return };

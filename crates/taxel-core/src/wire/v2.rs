@@ -1,6 +1,6 @@
 //! Version 2 of the wire: datagrams that stand alone, say whose they are and which, and when time has gone on.
 //!
-//! `docs/wire-v2.md` specifies it. Little-endian throughout; byte 0 has its top bit clear, so that the first byte tells the
+//! `docs/wire-v2.md` specifies it. Little-endian throughout; byte 0 has its top bit clear, so that the first byte shows the
 //! version. A datagram is a header, a body of words of one kind, a promise (*span*) and a checksum.
 //!
 //! | bytes | field |
@@ -20,11 +20,13 @@
 mod checksum;
 mod counts;
 mod decoder;
+mod encode;
 mod packer;
 mod stream;
 
 pub use counts::{Counts, Status};
 pub use decoder::{Decoder, Heard, stream_rows};
+pub use encode::{Encoded, encode};
 pub use packer::{Packer, Settings};
 pub use stream::{Decoded, StreamReader, decode};
 
@@ -45,7 +47,7 @@ pub const DATAGRAM_BYTES: usize = 1400;
 /// Bytes of the length that stands before a datagram in files and on streams.
 const LENGTH_BYTES: usize = 2;
 
-/// The latest offset from the base that a word says, us: later times begin a new datagram. Its words could otherwise be taken
+/// The latest offset from the base that a word holds, us: later times begin a new datagram. Its words could otherwise be taken
 /// for a control word by a reader that looks at all words alike.
 pub const LATEST_OFFSET: u64 = 32_511;
 
@@ -73,9 +75,9 @@ pub enum Kind {
     Markers,
     /// The board's own totals, 64 bits each, in the order of [`Status`].
     Status,
-    /// As [`Kind::Small`], values told again.
+    /// As [`Kind::Small`], values that the board repeats.
     SmallStates,
-    /// As [`Kind::Large`], values told again.
+    /// As [`Kind::Large`], values that the board repeats.
     LargeStates,
 }
 

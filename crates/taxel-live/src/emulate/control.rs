@@ -8,7 +8,7 @@ use taxel_core::board::Board;
 use super::line::Line;
 use crate::{Error, Result};
 
-/// Takes commands from whoever is connected. Of the TCP port one at a time, as a UART has one cable: a new one takes the
+/// Reads commands from the connected host. On the TCP port there is one at a time, as a UART has one cable: a new one takes the
 /// place of the old.
 #[derive(Debug)]
 pub(super) struct Control {
@@ -35,7 +35,7 @@ impl Control {
         self.listener.as_ref().map(|(_, address)| *address)
     }
 
-    /// Says what a board says at reset.
+    /// Sends the line that a board sends at reset.
     pub(super) fn greet(&mut self, board: &Board) {
         self.say(&board.greeting());
     }
@@ -78,7 +78,7 @@ impl Control {
     }
 }
 
-/// A status line that nobody reads is lost, as on a UART; a cable that was pulled is let go.
+/// A status line without a reader is lost, as on a UART; a closed connection is dropped.
 fn say(cable: &mut Option<TcpStream>, lines: &str) {
     if let Some(there) = cable
         && let Err(error) = there.write_all(lines.as_bytes())

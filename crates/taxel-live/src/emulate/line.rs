@@ -12,7 +12,7 @@ use crate::{Error, Result};
 /// Bits on the line for a byte: start, 8 of data, stop.
 const BITS_A_BYTE: f64 = 10.0;
 
-/// What a UART gathers at most while nobody looks, bytes.
+/// What a UART buffers at most while nothing reads it, bytes.
 const GATHERS: f64 = 64.0;
 
 /// What waits to be sent at most, bytes; more is lost, as on a UART.
@@ -22,7 +22,7 @@ const WAITING: usize = 4096;
 #[derive(Debug)]
 pub(super) struct Line {
     ours: File,
-    /// Held open, so that the line stays up while nobody is on it.
+    /// Held open, so that the line stays up while no program has it open.
     _theirs: OwnedFd,
     link: PathBuf,
     bytes_per_s: f64,
@@ -49,12 +49,12 @@ impl Line {
         if opened != 0 {
             return Err(Error::file(link)(std::io::Error::last_os_error()));
         }
-        // SAFETY: both are open and belong to nobody else; the name ends within its room.
+        // SAFETY: both are open and belong to this function alone; the name ends within its room.
         let (ours, theirs, name) = unsafe {
             let name = std::ffi::CStr::from_ptr(name.as_ptr()).to_string_lossy().into_owned();
             (File::from_raw_fd(ours), OwnedFd::from_raw_fd(theirs), name)
         };
-        // Raw before anybody can open it: else what the board says would be echoed back to it.
+        // Raw before a program can open it: else what the board sends would be echoed back to it.
         // SAFETY: a descriptor of ours, settings on our stack.
         let ready = unsafe {
             let mut settings = std::mem::zeroed();
@@ -106,7 +106,7 @@ impl Line {
             let n = match self.ours.write(&now) {
                 Ok(n) => n,
                 Err(error) if error.kind() == ErrorKind::Interrupted => 0,
-                // Nobody reads, so the terminal is full: lost, as on a UART.
+                // The terminal is full because nothing reads it: lost, as on a UART.
                 Err(_) => now.len(),
             };
             self.out -= n as f64;

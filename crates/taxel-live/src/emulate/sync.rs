@@ -16,7 +16,7 @@ pub(super) struct Sync {
 }
 
 impl Sync {
-    /// Opens a new file, or a pipe or terminal that is there, and says how the line stands.
+    /// Opens a new file, or an existing pipe or terminal, and writes the line's level.
     ///
     /// # Errors
     ///
@@ -27,7 +27,7 @@ impl Sync {
         let mut options = File::options();
         options.write(true);
         if pipe {
-            // Reading too, so that a pipe opens before anybody reads it; and never waiting for who reads too slowly.
+            // For reading too, so that a pipe opens before it has a reader; and never waiting for a slow reader.
             options.read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY);
         } else if overwrite {
             options.create(true).truncate(true);
@@ -51,7 +51,7 @@ impl Sync {
     /// The board's time in us, 1 or 0, the host's time in ns since 1970.
     fn edge(&mut self, time_us: f64) {
         let line = format!("{time_us} {} {}\n", u8::from(self.high), now_ns());
-        // A line that nobody reads is lost, as an edge that nobody samples.
+        // A line without a reader is lost, as an edge that no input samples.
         let _ = self.out.write_all(line.as_bytes());
     }
 }

@@ -1,22 +1,19 @@
 //! What other parts may do with a pipeline while it runs: get its events, record, announce what was written to the board.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 use crossbeam_channel as channel;
 use taxel_core::encode::Zeroing;
 use taxel_core::wire::Registers;
 
 use super::copies::Copies;
-use super::counters::Counters;
+use super::counters::{Counters, Summary};
 use super::options::{LiveOptions, Record};
-use super::recorder::Recorder;
+use super::recordings::Recordings;
 use super::said::Said;
-use super::shared::{Ended, Request, Shared};
-use super::source::Source;
+use super::shared::{Request, Shared};
 use super::tap::Outlet;
 use crate::Result;
 use crate::capture::Origin;
@@ -29,6 +26,7 @@ const COPIED_WAITING: usize = 1 << 12;
 #[derive(Clone)]
 pub struct Handle {
     pub(super) shared: Arc<Shared>,
+    pub(super) recordings: Arc<Recordings>,
 }
 
 impl Handle {
@@ -82,7 +80,7 @@ impl Handle {
     pub fn look(&self) -> Result<Outlet> {
         let (give, outlet) = channel::bounded(1);
         self.shared.request(Request::Tap(give));
-        self.wait(&outlet)
+        self.shared.wait(&outlet)
     }
 
     /// Copies what comes, for other computers, from the next batch on.
@@ -94,7 +92,7 @@ impl Handle {
         let (give, parcels) = channel::bounded(1);
         let said = self.hear(COPIED_WAITING);
         self.shared.request(Request::Copy(give));
-        Ok(Copies::new(Arc::clone(&self.shared), self.wait(&parcels)?, said))
+        Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, said))
     }
 
     /// Gives each detection from here on; so many may wait, and a slow receiver misses some.
@@ -105,61 +103,36 @@ impl Handle {
         said
     }
 
-    /// Begins to record what comes from here on, beginning with the registers and what the taxels hold.
+    /// Records what arrives from now on, of all sources, beginning with the registers and the held values. A recording that
+    /// runs ends with what arrived before: each datagram, and each line, belongs to one of the two.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where something is recorded already, `File` where the file exists or cannot be created.
-    pub fn record(&self, record: &Record) -> Result<()> {
-        if lock(&self.shared.recorder).is_some() {
-            return Err(taxel_core::problem!("a recording runs already: stop it first").into());
-        }
-        // The other sources belong to a recording that began with the pipeline.
-        let recorder = self.reserve(record, vec![])?;
-        lock(&self.shared.broken).take();
-        self.next_recording(Some(recorder)).map(drop)
+    /// `File` where the file exists or cannot be created: then the one that runs goes on. What ended that one early, or `File`
+    /// where its end cannot be written. `Core(Problem)` where all is over.
+    pub fn record(&self, record: &Record) -> Result<Option<Summary>> {
+        self.recordings.record(record)
     }
 
-    /// A recording that is to begin, with the board's registers as they are now, and those other sources.
-    pub(super) fn reserve(&self, record: &Record, sources: Vec<Source>) -> Result<Recorder> {
-        let header = LiveOptions { registers: self.registers(), sources, ..self.shared.options.clone() };
-        Recorder::reserve(record, &header, self.place())
-    }
-
-    /// Records what comes from here on into this recording, or none; returns the one that ran.
-    pub(super) fn next_recording(&self, next: Option<Recorder>) -> Result<Ended> {
-        // A caller who asks meanwhile whether something is recorded finds that it is.
-        self.shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
-        let (give, ended) = channel::bounded(1);
-        self.shared.request(Request::Record(next.map(Box::new), give));
-        let ended = self.wait(&ended).and_then(std::convert::identity);
-        if ended.is_err() {
-            self.shared.records.store(lock(&self.shared.recorder).is_some(), Ordering::Release);
-        }
-        ended
-    }
-
-    /// Ends the recording that [`Handle::record`] began. Returns the file, where anything came, and what was lost, in a line.
+    /// Ends the recording that [`Handle::record`] began: what it contains, and the file, where anything arrived.
     ///
     /// # Errors
     ///
-    /// The error that ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
-    pub fn end_recording(&self) -> Result<(Option<PathBuf>, String)> {
-        let (recorder, counters) = self.next_recording(None)?;
-        if let Some(error) = lock(&self.shared.broken).take() {
-            return Err(error);
-        }
-        let Some(recorder) = recorder else {
-            return Err(taxel_core::problem!("nothing is recorded").into());
-        };
-        let verdict = recorder.verdict(&counters);
-        Ok((recorder.finish(&counters)?, verdict))
+    /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
+    pub fn end_recording(&self) -> Result<Summary> {
+        self.recordings.end()
     }
 
-    /// Whether a recording runs, and has not been ended by an error.
+    /// Whether a recording that [`Handle::record`] began runs, and has not been ended by an error.
     #[must_use]
     pub fn records(&self) -> bool {
-        self.shared.records.load(Ordering::Acquire)
+        self.recordings.run()
+    }
+
+    /// Whether anything is recorded, also from the beginning on.
+    #[must_use]
+    pub fn is_recording(&self) -> bool {
+        lock(&self.shared.recorder).is_some()
     }
 
     /// As [`Live::note`](super::Live::note).
@@ -190,7 +163,7 @@ impl Handle {
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let (give, zeroed) = channel::bounded(1);
         self.shared.request(Request::Zero(taxels.to_vec(), give));
-        self.wait(&zeroed).and_then(std::convert::identity)
+        self.shared.wait(&zeroed).and_then(std::convert::identity)
     }
 
     /// The latest zeroing of each taxel that was zeroed, by taxel index; and how often taxels were.
@@ -204,17 +177,5 @@ impl Handle {
     #[must_use]
     pub fn zeroings(&self) -> u64 {
         self.shared.published().zeroings
-    }
-
-    fn wait<T>(&self, from: &channel::Receiver<T>) -> Result<T> {
-        loop {
-            match from.recv_timeout(Duration::from_millis(50)) {
-                Ok(given) => return Ok(given),
-                Err(_) if self.is_over() => {
-                    return Err(taxel_core::problem!("live: has ended").into());
-                }
-                Err(_) => {}
-            }
-        }
     }
 }

@@ -365,11 +365,6 @@ impl Recorder {
         losses(counters, self.since())
     }
 
-    /// The same in a line.
-    pub(super) fn verdict(&self, counters: &Counters) -> String {
-        self.losses(counters).verdict()
-    }
-
     /// Closes the file and returns its path; a file that would hold nothing is not kept.
     pub(super) fn finish(self, counters: &Counters) -> Result<Option<PathBuf>> {
         let lost = self.losses(counters);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::Marker;
@@ -22,6 +22,9 @@ use crate::latency::Latencies;
 use crate::locked::lock;
 use crate::recording::Track;
 use crate::{Error, Result};
+
+/// How often a wait for an answer checks whether the decoding thread has ended.
+const ANSWER_EVERY: Duration = Duration::from_millis(50);
 
 /// What the threads publish: counts, the picture, the tare.
 #[derive(Debug, Default)]
@@ -105,6 +108,21 @@ impl Shared {
     /// Everything that came was processed.
     pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Release);
+    }
+
+    /// Waits for the answer to a request.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the decoding thread has ended.
+    pub(super) fn wait<T>(&self, answer: &channel::Receiver<T>) -> Result<T> {
+        loop {
+            match answer.recv_timeout(ANSWER_EVERY) {
+                Ok(answer) => return Ok(answer),
+                Err(_) if self.has_ended() => return Err(taxel_core::problem!("live: has ended").into()),
+                Err(_) => {}
+            }
+        }
     }
 
     pub(super) fn has_ended(&self) -> bool {

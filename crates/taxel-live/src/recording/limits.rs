@@ -1,5 +1,5 @@
 //! What a recording of the live format may hold at most: asked before memory is asked for, named in the error or the
-//! verdict, told in docs/files.md. A file comes from strangers or from a damaged disk, and a few bytes can claim 2^64.
+//! verdict, documented in docs/files.md. A file comes from strangers or from a damaged disk, and a few bytes can claim 2^64.
 
 /// What one chunk may unpack to: 64 MiB. Ours are of 1 MiB, other tools' of 1 to 8.
 pub(super) const CHUNK: u32 = 1 << 26;

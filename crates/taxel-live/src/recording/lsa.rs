@@ -1,5 +1,5 @@
 //! The manual's raw recordings (Appendix 1, section 3): `NAME.lsa` holds all bytes as they came and nothing else, an empty
-//! `NAME.lss` says that it is complete. The manual's program overwrites without a warning; this one refuses.
+//! `NAME.lss` marks it as complete. The manual's program overwrites without a warning; this one refuses.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -138,7 +138,7 @@ pub struct DecodedLsa {
     pub events: Events,
     /// What the decoder saw and dropped.
     pub counts: wire::Counts,
-    /// Whether its `.lss` says that it is complete.
+    /// Whether its `.lss` marks it as complete.
     pub complete: bool,
 }
 

@@ -23,8 +23,7 @@ use super::{BoardChange, Change, Counts, Header, Samples, Topic, limits};
 use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
-pub use remarks::Remarks;
-pub(crate) use remarks::begin_with;
+pub use remarks::{Remarks, begin_with};
 use walk::Walk;
 
 /// A recording of the live format, opened.
@@ -39,7 +38,7 @@ pub struct Reader {
     rebuilt: Rebuilt,
 }
 
-/// How a recording says that it ended.
+/// How a recording ended, as it states.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ending {
@@ -50,7 +49,7 @@ pub enum Ending {
         /// The writer's line about it.
         verdict: String,
     },
-    /// Writing failed: what the operating system said.
+    /// Writing failed: the operating system's error.
     Stopped(String),
 }
 
@@ -71,7 +70,7 @@ impl Place {
     }
 }
 
-/// What had to be left out of a file, or put up with.
+/// What had to be left out of a damaged file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Rebuilt {
     /// Whether the file lacks its end: writing was killed, or the file was cut.
@@ -82,7 +81,7 @@ pub struct Rebuilt {
     pub gaps: u64,
     /// Bytes skipped there.
     pub skipped_bytes: u64,
-    /// Chunks left out because they say that they unpack to more than a chunk may.
+    /// Chunks left out because they state that they unpack to more than a chunk may.
     pub large_chunks: u64,
 }
 
@@ -119,7 +118,7 @@ pub struct Decoded {
     pub events: Events,
     /// What the decoder saw and dropped.
     pub counts: wire::Counts,
-    /// What was heard and missed of version 2.
+    /// What came and what was missing of version 2.
     pub version_2: wire::v2::Counts,
     /// When each datagram came, ns since 1970.
     pub arrived_ns: Vec<i64>,
@@ -145,6 +144,20 @@ impl Decoded {
             first: vec![],
             left: vec![],
             bad_chunks: 0,
+        }
+    }
+}
+
+/// Marks events as repaired by their numbers; a number that is none of an event is left out.
+fn mark_repaired(events: &mut Events, numbers: &[u64]) {
+    if numbers.is_empty() || events.is_empty() {
+        return;
+    }
+    let n = events.len();
+    let marks = events.repaired.get_or_insert_with(|| vec![false; n]);
+    for &number in numbers {
+        if let Some(mark) = usize::try_from(number).ok().and_then(|number| marks.get_mut(number)) {
+            *mark = true;
         }
     }
 }
@@ -200,19 +213,19 @@ impl Reader {
         Ok(Self { source, ending, ..self.clone() })
     }
 
-    /// What the source says of itself.
+    /// The source's header.
     #[must_use]
     pub fn header(&self) -> &Header {
         if self.source == 0 { &self.header } else { &self.header.sources[self.source - 1] }
     }
 
-    /// How it ended, where it says so.
+    /// How it ended, where it states that.
     #[must_use]
     pub fn ending(&self) -> Option<&Ending> {
         self.ending.as_ref()
     }
 
-    /// What opening had to put up with; what is wrong inside a chunk shows when it is read.
+    /// Damage found when it was opened; damage inside a chunk is found when that is read.
     #[must_use]
     pub fn rebuilt(&self) -> Rebuilt {
         self.rebuilt
@@ -222,7 +235,7 @@ impl Reader {
     ///
     /// # Errors
     ///
-    /// `File` where the file cannot be read, `Core` where `take` says so or the caller stops.
+    /// `File` where the file cannot be read, `Core` where `take` returns that or the caller stops.
     pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<u64> {
         let (mut place, mut bad) = (Place::default(), 0);
         for block in 0..self.blocks() {
@@ -369,7 +382,7 @@ impl Reader {
             if message.topic == Topic::Held {
                 begin_with(&mut sender, message.data);
             }
-            // What the host told the board cannot be seen from its datagrams.
+            // Commands of the host to the board do not show in its datagrams.
             if message.topic == Topic::Board
                 && let Ok(BoardChange { change: Change::Wire { version, asked: true }, .. }) =
                     serde_json::from_slice(message.data)
@@ -379,6 +392,7 @@ impl Reader {
             Ok(())
         })?;
         sender.finish_into(&mut decoded.events);
+        mark_repaired(&mut decoded.events, &header.repaired);
         decoded.events.t.iter_mut().for_each(|t| *t += header.origin_us);
         decoded.events.markers.iter_mut().for_each(|m| m.t += header.origin_us);
         decoded.counts = *sender.counts();

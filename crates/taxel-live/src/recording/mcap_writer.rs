@@ -42,7 +42,7 @@ pub(super) const END: &str = "taxel.end";
 
 /// A recording being written; one may be fed from several threads.
 ///
-/// Dropped without [`Writer::finish`], it keeps everything that was given, and its file states that it was not finished; one that
+/// Dropped without [`Writer::finish`], it writes everything that was given, and its file states that it was not finished; one that
 /// has not begun its file leaves it as it was.
 pub struct Writer {
     /// The first source.
@@ -170,7 +170,7 @@ impl Writer {
 }
 
 impl Track {
-    /// Keeps numbers of a stream as they came, one for each of its columns: arrival by the host's clock (ns since 1970), our
+    /// Writes numbers of a stream as they came, one for each of its columns: arrival by the host's clock (ns since 1970), our
     /// arrival number.
     ///
     /// # Errors
@@ -184,7 +184,7 @@ impl Track {
         self.push(Topic::Samples, arrived_ns, number, stream.message(values).to_string().as_bytes())
     }
 
-    /// Keeps a line of a stream that could not be read, as it came.
+    /// Writes a line of a stream that could not be read, as it came.
     ///
     /// # Errors
     ///
@@ -193,14 +193,14 @@ impl Track {
         self.push(Topic::Samples, arrived_ns, number, json!({ "line": line }).to_string().as_bytes())
     }
 
-    /// Says what was received and lost of this source, at its end; nothing is taken of it afterwards.
+    /// Ends this source, with what was received and lost of it; it gives nothing afterwards.
     pub fn end(&self, name: &str, counts: Counts) {
         let mut state = self.queue.lock();
         let recorded = state.recorded[self.source];
         state.ends.insert(name.to_owned(), Counts { recorded, ..counts });
     }
 
-    /// Keeps a datagram as it came: arrival by the host's clock (ns since 1970), our arrival number, bytes.
+    /// Writes a datagram as it came: arrival by the host's clock (ns since 1970), our arrival number, bytes.
     ///
     /// # Errors
     ///
@@ -217,7 +217,7 @@ impl Track {
         self.queue.push(self.source, Topic::Datagrams, (arrived_ns, number), bytes, most)
     }
 
-    /// Keeps many datagrams: each begins in `bytes` where `offsets` say, whose last entry says where all end.
+    /// Writes many datagrams: each begins in `bytes` where `offsets` say, whose last entry says where all end.
     ///
     /// # Errors
     ///
@@ -237,7 +237,7 @@ impl Track {
         Ok(())
     }
 
-    /// Keeps the board's registers, as they are from now on.
+    /// Writes the board's registers, as they are from now on.
     ///
     /// # Errors
     ///
@@ -246,7 +246,7 @@ impl Track {
         self.push_json(Topic::Registers, at_ns, &json!(registers))
     }
 
-    /// Keeps a start or stop that the board marked.
+    /// Writes a start or stop that the board marked.
     ///
     /// # Errors
     ///
@@ -255,7 +255,7 @@ impl Track {
         self.push_json(Topic::Markers, at_ns, &json!({ "t_us": marker.t, "start": marker.start }))
     }
 
-    /// Keeps a note of a person; `t_us` is the board's time where it is known.
+    /// Writes a note of a person; `t_us` is the board's time where it is known.
     ///
     /// # Errors
     ///
@@ -264,43 +264,43 @@ impl Track {
         self.push_json(Topic::Notes, at_ns, &log(at_ns, t_us, text))
     }
 
-    /// Keeps that a person zeroed a taxel, as a note that says so.
+    /// Writes that a person zeroed a taxel, as a note.
     ///
     /// # Errors
     ///
     /// As [`Track::datagram`].
     pub fn zeroing(&self, at_ns: i64, zeroing: &Zeroing) -> Result<()> {
         let Zeroing { t, x, y, rest, before } = *zeroing;
-        let before_said = before.map_or_else(|| "unknown".to_owned(), |before| format!("{before:.1}"));
-        let text = format!("zeroed row {y}, column {x}: rest {before_said} to {rest:.1} ticks");
+        let before_text = before.map_or_else(|| "unknown".to_owned(), |before| format!("{before:.1}"));
+        let text = format!("zeroed row {y}, column {x}: rest {before_text} to {rest:.1} ticks");
         let mut note = log(at_ns, Some(t), &text);
         note["zeroed"] = json!({ "x": x, "y": y, "rest": rest, "before": before });
         self.pictures().zero(usize::from(y) * self.columns + usize::from(x), rest);
         self.push_json(Topic::Notes, at_ns, &note)
     }
 
-    /// Keeps a reset of the board, or a change of its version of the wire.
+    /// Writes a reset of the board, or a change of its version of the wire.
     ///
     /// # Errors
     ///
     /// As [`Track::datagram`].
     pub fn board_change(&self, change: &BoardChange) -> Result<()> {
-        let said = serde_json::to_value(change).unwrap_or_default();
-        self.push_json(Topic::Board, change.at_ns, &said)
+        let value = serde_json::to_value(change).unwrap_or_default();
+        self.push_json(Topic::Board, change.at_ns, &value)
     }
 
-    /// Keeps what a readout said; `at_ns` is when it said so.
+    /// Writes a detection of a readout; `at_ns` is when it was output.
     ///
     /// # Errors
     ///
     /// As [`Track::datagram`].
     pub fn detection(&self, at_ns: i64, detection: &Detection) -> Result<()> {
         let Detection { label, t, known, slope, repaired } = detection;
-        let said = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope, "repaired": repaired });
-        self.push_json(Topic::Detections, at_ns, &said)
+        let value = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope, "repaired": repaired });
+        self.push_json(Topic::Detections, at_ns, &value)
     }
 
-    /// Keeps what was received and lost so far, so that an unfinished recording knows too; call it about once a second.
+    /// Writes what was received and lost so far, so that an unfinished recording states it too; call it about once a second.
     ///
     /// # Errors
     ///
@@ -309,7 +309,7 @@ impl Track {
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 
-    /// Takes a tare's rest off the pictures from here on; before, the lowest value that each taxel held so far.
+    /// Subtracts a tare's rest from the pictures from here on; before, the lowest value that each taxel held so far.
     pub fn tare(&self, tare: &Tare) {
         self.pictures().tare(tare);
     }
@@ -318,8 +318,8 @@ impl Track {
         lock(&self.pictures)
     }
 
-    /// Keeps a picture of held values for viewers: 8 bits above rest, the largest of the last 10 s being white. The
-    /// message says what was taken off and how many ticks are white.
+    /// Writes a picture of held values for viewers: 8 bits above rest, the largest of the last 10 s being white. The
+    /// message states what was subtracted and how many ticks are white.
     ///
     /// # Errors
     ///
@@ -339,8 +339,8 @@ impl Track {
         self.push_json(Topic::Pressure, at_ns, &picture)
     }
 
-    /// Keeps what the taxels hold before the recording's first datagram, ticks by taxel index; 65 535 of one that was
-    /// never heard of. A recording that begins in mid-stream would else know a taxel from its next change on.
+    /// Writes the values that the taxels hold before the recording's first datagram, ticks by taxel index; 65 535 of a taxel without
+    /// any event so far. A recording that begins in mid-stream would else know a taxel from its next change on.
     ///
     /// # Errors
     ///

@@ -20,7 +20,7 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Opens and locks a new file; or an existing one where `overwrite` says so, which keeps its contents until
+    /// Opens and locks a new file; or an existing one where `overwrite` is set, whose contents stay until
     /// [`OutputFile::begin`]. One that is write-protected is never replaced.
     ///
     /// # Errors
@@ -128,7 +128,7 @@ fn open(path: &Path, overwrite: bool) -> IoResult<(File, bool)> {
     options.create(true).truncate(false).open(path).map(|file| (file, new))
 }
 
-/// Refuses a file that somebody protected from being written: from the superuser too, who may write everywhere.
+/// Refuses a write-protected file, also to the superuser, who may write everywhere.
 fn replaceable(path: &Path) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(file) if file.permissions().readonly() => Err(Error::file(path)(IoError::from_raw_os_error(libc::EACCES))),

@@ -16,7 +16,7 @@ pub(super) struct Pictures {
     tare: Option<Vec<f64>>,
     /// What taxels rest at that were zeroed since, by index.
     zeroed: BTreeMap<usize, f64>,
-    /// The lowest that each taxel held so far; `None` before it was heard of.
+    /// The lowest value that each taxel held so far; `None` before its first event.
     lowest: Vec<Option<u16>>,
     /// Largest values above rest with their times, us: falling values, so that the first is the largest of all.
     peaks: VecDeque<(i64, f64)>,
@@ -27,7 +27,7 @@ pub(super) struct Pictures {
 pub(super) struct Grey {
     /// 0 at rest, 255 at `full`, row by row.
     pub(super) bytes: Vec<u8>,
-    /// What was taken off.
+    /// What was subtracted.
     pub(super) rest: &'static str,
     /// What is white, ticks above rest.
     pub(super) full: f64,
@@ -36,7 +36,7 @@ pub(super) struct Grey {
 impl Pictures {
     /// Takes a tare's rest off from here on.
     pub(super) fn tare(&mut self, tare: &Tare) {
-        // A taxel that was never heard of reads 0 and rests there.
+        // A taxel without any event so far reads 0 and rests there.
         self.tare = Some(tare.rest.iter().map(|rest| rest.unwrap_or(0.0)).collect());
         self.zeroed.clear();
         self.peaks.clear();
@@ -47,7 +47,7 @@ impl Pictures {
         self.zeroed.insert(taxel, rest);
     }
 
-    /// The grey picture of what the taxels hold at `t_us`; a taxel that holds 0 was not heard of yet.
+    /// The grey picture of the values at `t_us`; 0 is a taxel without any event so far.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn take(&mut self, t_us: i64, held: &[u16]) -> Grey {
         self.lowest.resize(held.len(), None);

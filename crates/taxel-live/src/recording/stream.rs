@@ -6,7 +6,7 @@ use taxel_core::problem;
 
 use super::limits;
 
-/// A counter of whole numbers is taken for one of 32 bits.
+/// A counter of whole numbers is assumed to have 32 bits.
 const TURN: f64 = 4_294_967_296.0;
 
 /// A clock that steps back by more than this, though time went on, began anew, us.
@@ -48,7 +48,7 @@ impl Stream {
         self.columns.iter().filter(|name| Some(*name) != self.time.as_ref())
     }
 
-    /// Checks what is said of it.
+    /// Checks names and units.
     pub(super) fn check(&self, name: &str) -> taxel_core::Result<()> {
         let refused = |what: String| Err(problem!("source {name}: {what}"));
         if self.columns.len() > limits::COLUMNS {
@@ -88,7 +88,7 @@ impl Stream {
         self.takes(&values).then_some(values)
     }
 
-    /// A line as it is kept.
+    /// A line as it is recorded.
     #[must_use]
     pub(super) fn message(&self, values: &[f64]) -> Value {
         let named: Map<String, Value> =
@@ -175,7 +175,7 @@ impl<'a> Sampling<'a> {
             let lacks = passed - (own + self.added - last);
             let turn = TURN * self.stream.unit_us;
             let turns = (lacks / turn).round();
-            // Arrivals tell time within a second, or a hundredth of a pause.
+            // Arrivals give the time within a second, or a hundredth of a pause.
             let near = STEP_BACK_US.max(passed.abs() * 1e-2);
             if self.whole && turns >= 1.0 && (lacks - turns * turn).abs() <= near {
                 self.added += turns * turn;

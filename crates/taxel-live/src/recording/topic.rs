@@ -13,7 +13,7 @@ pub enum Topic {
     Markers = 3,
     /// Notes of people.
     Notes = 4,
-    /// What a readout said.
+    /// Detections of a readout.
     Detections = 5,
     /// What was received and lost so far.
     Counts = 6,

@@ -269,7 +269,7 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
     Returns
     -------
     Course
-        Where no equilibrium was found from some path on it ends there, and `fault` holds the reason: nothing is filled in.
+        Where no equilibrium was found from some path on it ends there, and `fault` is the reason: nothing is filled in.
 
     Raises
     ------

@@ -53,7 +53,7 @@ class KeptCourses:
         self.code = source_digest([Path(str(module.__file__)) for module in _CODE])
 
     def path(self, asked: Indentation) -> Path:
-        """Return the path of a course's file, whether it exists or not: object and path are its name, the rest a digest."""
+        """Return the path of a course's file: its name has object and path, and a digest of the rest."""
         i = instance("asked", asked, Indentation)
         all_of_it = json.dumps([i.to_dict(), self.code], sort_keys=True)
         digest = hashlib.sha256(all_of_it.encode()).hexdigest()[:16]

@@ -205,8 +205,7 @@ impl ConeRProblem {
         let margin = Margin { height: base.margin, slope: 0.0 };
         let mut statement = Statement::new(&base.neuron, margin, unit, patterns[0].len());
         for ((pattern, targets), &end) in patterns.iter().zip(targets).zip(ends) {
-            stop.check()?;
-            statement.push(pattern, targets, end);
+            statement.push(pattern, targets, end, stop)?;
         }
         let rows = Relaxed::new(&statement, base.delta_t(), stop)?;
         Ok(Self { base, patterns: patterns.to_vec(), statement, rows })
@@ -214,7 +213,7 @@ impl ConeRProblem {
 
     /// Adds one more pattern, which has been checked; where the caller stops it, all is as before.
     pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64, stop: Stop<'_>) -> Result<()> {
-        self.statement.push(pattern, targets, end);
+        self.statement.push(pattern, targets, end, stop)?;
         if let Err(error) = self.rows.push(&self.statement, self.base.delta_t(), stop) {
             self.statement.drop_last();
             return Err(error);
@@ -257,18 +256,21 @@ impl ConeRProblem {
     }
 
     /// 6.14 with these parameters (in units of this problem).
-    fn objective(&self, parameters: &ConeR) -> Result<Objective> {
+    fn objective(&self, parameters: &ConeR, silent: &[f64]) -> Result<Objective> {
         let bounds = bounds_of(&parameters.lb, &parameters.ub, self.rows.trains)?;
         let ConeR { lambdas, kappa, norm, divide_b_by: divisor, .. } = *parameters;
         let choice = Choice { lambdas, kappa, norm, divisor };
         let d_max = |most: &[f64]| self.rows.broken_silence(most);
-        Ok(Objective::new(choice, bounds, &self.rows.targets, self.statement.unit, d_max))
+        let unit = self.statement.unit;
+        let silent: Vec<f64> = silent.iter().map(|most| most / unit).collect();
+        Ok(Objective::new(choice, bounds, &silent, &self.rows.targets, unit, d_max))
     }
 
     /// Fits the weights.
     ///
     /// `parameters` may differ from those that the problem was made with in `lambdas`, `kappa`, bounds, `divide_b_by`,
-    /// `norm`, `tolerance` and `engine`; the rest is in the rows. `start` are weights of a similar fit, and its multipliers
+    /// `norm`, `tolerance` and `engine`; the rest is in the rows. `silent` are the largest weights (mV, without sign) of trains
+    /// without a spike that were left out of the rows: the normalisers count them. `start` are weights of a similar fit, and its multipliers
     /// where it was of these very rows: the closer, the quicker. Where `stop` asks for an end, the best so far comes back.
     ///
     /// # Errors
@@ -277,17 +279,19 @@ impl ConeRProblem {
     pub fn fit(
         &self,
         parameters: &ConeR,
+        silent: &[f64],
         start: Option<(&[f64], Option<&Shares>)>,
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<ConeRFit> {
-        self.fit_counting(parameters, start, None, progress, stop)
+        self.fit_counting(parameters, silent, start, None, progress, stop)
     }
 
     /// As `fit`; counts refiring on one pattern alone where one is named.
     pub(crate) fn fit_counting(
         &self,
         parameters: &ConeR,
+        silent: &[f64],
         start: Option<(&[f64], Option<&Shares>)>,
         pattern: Option<usize>,
         progress: &mut dyn FnMut(Round),
@@ -297,7 +301,7 @@ impl ConeRProblem {
         let unit = self.statement.unit;
         let parameters = &parameters.in_units(unit);
         self.check_same_rows(parameters)?;
-        let objective = self.objective(parameters)?;
+        let objective = self.objective(parameters, silent)?;
         let start = self.start_from(&objective, start)?;
         let mut found =
             self.rows.minimise(&objective, parameters.tolerance, parameters.engine, start, progress, stop)?;

@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::exact::{Best, Exact, MET};
+use super::exact::{Best, Exact};
 use super::shortest::{End, Shortest};
 use crate::allowed::{Numbers, Range, ranges};
 use crate::learn::fit::{Engine, Fit, Round, Status};
@@ -180,8 +180,9 @@ impl ConeX {
     }
 }
 
-/// Why a fit is stopped that was asked to.
+/// Why a search ended early.
 const ASKED: &str = "asked to stop, by max_seconds or Ctrl-C";
+const UNDECIDED: &str = "rows that rounding cannot tell apart are neither met nor refuted";
 
 /// A fit of CONE-X.
 #[derive(Debug, Clone, PartialEq)]
@@ -244,8 +245,7 @@ impl ConeXProblem {
         }
         let mut statement = Statement::new(neuron, parameters.margin(), unit, trains);
         for (p, (pattern, targets)) in examples() {
-            stop.check()?;
-            statement.push(pattern, targets, ends[p]);
+            statement.push(pattern, targets, ends[p], stop)?;
         }
         let [l1, l2, b] = parameters.lambdas;
         let choice = Choice {
@@ -254,7 +254,7 @@ impl ConeXProblem {
             norm: parameters.norm,
             divisor: parameters.divide_b_by,
         };
-        let objective = |targets: &_| Objective::new(choice, bounds, targets, unit, |_| 0.0);
+        let objective = |targets: &_| Objective::new(choice, bounds, &[], targets, unit, |_| 0.0);
         let exact = Exact::new(statement, parameters.delta_t(), objective, parameters.tolerance, stop)?;
         Ok(Self { parameters, exact, free_margin })
     }
@@ -389,9 +389,7 @@ impl Exact {
             }
             End::Met => self.report(best, None)?,
             End::Stopped if stop.asked() => self.report(best, Some(ASKED))?,
-            End::Stopped => {
-                self.report(best, Some("rows that rounding cannot tell apart are neither met nor refuted"))?
-            }
+            End::Stopped => self.report(best, Some(UNDECIDED))?,
         })
     }
 
@@ -430,29 +428,20 @@ impl Exact {
         let lifts = self.targets.thresholds.iter().map(|threshold| (self.objective.kappa * threshold).powi(2));
         let nothing = NOTHING * self.objective.b * lifts.sum::<f64>();
         let known = gap <= self.tolerance || objective - least <= nothing;
-        let (missed, broken) = (self.missed(&weights), self.worst(&weights));
-        let kept = missed <= MET && broken <= self.rounding(&weights);
-        let unit = self.statement.unit;
-        let reason = if let Some(reason) = cut_short {
-            Some(reason.to_owned())
-        } else if !kept {
-            Some(format!(
-                "targets are missed by {:.1e} mV, silence is broken by {:.1e} mV",
-                missed * unit,
-                broken * unit
-            ))
-        } else if !known {
-            Some(format!("the objective is only proven to lie within {gap:.1e} of its least value"))
-        } else {
-            self.fires_elsewhere(&weights)?
+        let unmet = self.unmet(&weights)?;
+        let open = || format!("the objective is only proven to lie within {gap:.1e} of its least value");
+        let reason = match (cut_short, unmet.or_else(|| (!known).then(open))) {
+            (Some(why), Some(what)) => Some(format!("{why}; {what}")),
+            (_, what) => what,
         };
+        let violation = largest([self.missed(&weights), self.worst(&weights), 0.0]);
         let status = if reason.is_none() { Status::Solved } else { Status::Stopped };
         Ok(ConeXFit {
             margin: self.kept_margin(&weights),
             fit: Fit { status, weights, objective, parts, gap, rounds, engine },
             asked: self.statement.margin,
             reason,
-            violation: largest([missed, broken, 0.0]),
+            violation,
             held,
             certificate: None,
         })

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use crate::learn::fit::Engine;
-use crate::learn::statement::{Margin, Objective, Parts, Peak, Row, Silence, Stated, Statement, Targets, largest};
+use crate::learn::statement::{
+    Margin, Objective, Parts, Peak, Row, Silence, Stated, Statement, Targets, exceeds, largest,
+};
 use crate::neuron::{AT_EDGE, Time};
 use crate::vectors::dot;
 use crate::{Result, Stop};
@@ -91,15 +93,30 @@ impl Exact {
         least.max(BROKEN_SHARE * weights.iter().map(|w| w.abs()).sum::<f64>())
     }
 
-    /// Where the neuron itself, run on the patterns, does not fire as asked; continuous time only.
+    /// What these weights do not meet, with its pattern and time: silence with half its margin; in continuous time the spikes
+    /// of the neuron itself, run on the patterns; on the grid the target rows.
     ///
-    /// It hears an input within 1e-6 ms before a crossing too late (`AT_EDGE`), the rows one so near before a target: an
-    /// input that turns the potential down a few such times before a target can be heard in the rows and too late for the
-    /// neuron.
-    pub(super) fn fires_elsewhere(&self, weights: &[f64]) -> Result<Option<String>> {
-        if self.is_grid() {
-            return Ok(None);
+    /// On the grid the neuron is not run: without a margin it may fire where a silent row is met with equality.
+    pub(super) fn unmet(&self, weights: &[f64]) -> Result<Option<String>> {
+        let unit = self.statement.unit;
+        let worst = self.silence.broken(weights, KEPT_SHARE, self.rounding(weights)).into_iter();
+        if let Some(Peak { pattern, t, excess }) = worst.max_by(|a, b| a.excess.total_cmp(&b.excess)) {
+            let excess = excess * unit;
+            return Ok(Some(format!("pattern {pattern}: silence is broken by {excess:.1e} mV at {t} ms")));
         }
+        if !self.is_grid() {
+            return self.misfire(weights);
+        }
+        let misses = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
+        let worst = misses.enumerate().filter(|(_, miss)| exceeds(*miss, MET)).max_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(worst.map(|(k, miss)| {
+            let ((pattern, target), t, miss) = (self.targets.names[k], self.targets.times[k], miss * unit);
+            format!("pattern {pattern}: target {target} ({t} ms) is missed by {miss:.1e} mV")
+        }))
+    }
+
+    /// Where the neuron itself, run on the patterns, does not fire at a target, or fires elsewhere.
+    fn misfire(&self, weights: &[f64]) -> Result<Option<String>> {
         for (p, sheet) in self.statement.sheets.iter().enumerate() {
             let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, sheet.start)?);
             for &(t, train) in sheet.inputs.iter().take_while(|input| input.0 <= sheet.end) {
@@ -121,9 +138,7 @@ impl Exact {
                     (Some(target), None) => format!("does not fire at its target {target:.7} ms"),
                     (None, Some(t)) => format!("fires at {t:.7} ms too"),
                 };
-                return Ok(Some(format!(
-                    "the neuron {reason} (pattern {p}): inputs lie so near before a target that it hears them too late"
-                )));
+                return Ok(Some(format!("pattern {p}: the neuron {reason}")));
             }
         }
         Ok(None)

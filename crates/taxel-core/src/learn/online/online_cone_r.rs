@@ -96,7 +96,7 @@ impl OnlineConeR {
             return Err(problem!("the window is empty: add a pattern first"));
         };
         let start = self.last.as_ref().map(|(weights, shares)| (weights.as_slice(), Some(shares)));
-        let fit = problem.fit_counting(&self.parameters, start, Some(problem.patterns() - 1), progress, stop)?;
+        let fit = problem.fit_counting(&self.parameters, &[], start, Some(problem.patterns() - 1), progress, stop)?;
         self.last = Some((fit.fit.weights.clone(), fit.multipliers.clone()));
         Ok(fit)
     }

@@ -154,7 +154,7 @@ pub(super) fn change_of(
     pattern: &SpikeTrains,
     targets: &[f64],
 ) -> Result<(Vec<f64>, Vec<f64>)> {
-    let laid = neuron.lay_out(pattern)?;
+    let laid = neuron.lay_out(pattern, Stop::never())?;
     let of = Presented { neuron, laid: &laid, trains: pattern, targets };
     let (mut fired, mut corrections, mut change) = (Vec::new(), Vec::new(), vec![0.0; weights.len()]);
     neuron.fire(weights, &laid, &mut fired);
@@ -252,7 +252,7 @@ impl Training {
                 (0..trains).map(|_| low + (high - low) * random.random::<f64>()).collect()
             }
         };
-        let laid = patterns.iter().map(|p| neuron.lay_out(p)).collect::<Result<Vec<Laid>>>()?;
+        let laid = patterns.iter().map(|p| neuron.lay_out(p, stop)).collect::<Result<Vec<Laid>>>()?;
         let shown = |p: usize| Presented { neuron, laid: &laid[p], trains: &patterns[p], targets: &targets[p] };
         let mut at_targets: Vec<Vec<Option<Vec<f64>>>> = targets.iter().map(|t| vec![None; t.len()]).collect();
         let mut order: Vec<usize> = (0..patterns.len()).collect();

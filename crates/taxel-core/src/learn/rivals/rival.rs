@@ -162,13 +162,13 @@ impl SteppedNeuron {
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters, weights or a pattern that make no sense.
-    pub fn run(&self, weights: &[f64], pattern: &SpikeTrains) -> Result<Vec<f64>> {
+    /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
+    pub fn run(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
         crate::learn::statement::check_heard(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         let mut fired = Vec::new();
-        self.fire(weights, &self.lay_out(pattern)?, &mut fired);
+        self.fire(weights, &self.lay_out(pattern, stop)?, &mut fired);
         Ok(fired)
     }
 }

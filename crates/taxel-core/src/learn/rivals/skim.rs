@@ -214,21 +214,23 @@ impl Skim {
     }
 
     /// The branches of a pattern, each with its own inputs; weights and delays come from the seed alone.
-    fn branches(&self, pattern: &SpikeTrains) -> Vec<Branch> {
+    fn branches(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<Branch>> {
         let branch = |inputs| Branch { inputs, next: 0, state: KernelSum::default() };
         let Some(layer) = self.layer() else {
-            return (0..pattern.len()).map(|n| branch(pattern.train(n).iter().map(|&t| (t, 1.0)).collect())).collect();
+            return Ok((0..pattern.len())
+                .map(|n| branch(pattern.train(n).iter().map(|&t| (t, 1.0)).collect()))
+                .collect());
         };
         let mut random = StdRng::seed_from_u64(self.seed);
-        let spikes = pattern.by_time();
-        (0..layer.count)
+        let spikes = pattern.by_time(stop)?;
+        Ok((0..layer.count)
             .map(|_| {
                 let weights: Vec<f64> =
                     (0..pattern.len()).map(|_| layer.spread * (2.0 * random.random::<f64>() - 1.0)).collect();
                 let delay = layer.delay_ms * random.random::<f64>();
                 branch(spikes.iter().map(|s| (s.t + delay, weights[s.train as usize])).collect())
             })
-            .collect()
+            .collect())
     }
 
     /// Walks a pattern block by block of rows: what each branch puts out, columns first, from row `first` on.
@@ -241,7 +243,7 @@ impl Skim {
         let shape = Shape::new(self.kernel, self.tau, self.tau_s());
         let step = shape.step(self.step_ms);
         let compress = self.branches.is_some() && self.nonlinearity == Nonlinearity::Tanh;
-        let mut branches = self.branches(pattern);
+        let mut branches = self.branches(pattern, stop)?;
         let points = points_between(pattern.start, pattern.stop, self.step_ms);
         check_points(points, MOST_LAID_OUT, self.step_ms)?;
         let rows = points as usize;

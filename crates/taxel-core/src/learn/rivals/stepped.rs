@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::allowed::{Parameter, Range, ranges};
 use crate::neuron::{MOST_LAID_OUT, check_points, points_between};
-use crate::{Result, SpikeTrains, problem};
+use crate::{Result, SpikeTrains, Stop, problem};
 
 /// What drives the membrane after an input.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -204,14 +204,14 @@ impl SteppedNeuron {
     ///
     /// # Errors
     ///
-    /// `Problem` where its grid has too many points.
-    pub(super) fn lay_out(&self, trains: &SpikeTrains) -> Result<Laid> {
+    /// `Problem` where its grid has too many points; `Interrupted` where the caller stops it.
+    pub(super) fn lay_out(&self, trains: &SpikeTrains, stop: Stop<'_>) -> Result<Laid> {
         let kernels = self.kernels();
         let points = points_between(trains.start, trains.stop, self.step_ms);
         check_points(points, MOST_LAID_OUT, self.step_ms)?;
         let steps = points as usize - 1;
         let inputs = trains
-            .by_time()
+            .by_time(stop)?
             .into_iter()
             .map(|spike| {
                 let step = ((spike.t - trains.start) / self.step_ms - 1e-9).ceil().max(0.0) as usize;

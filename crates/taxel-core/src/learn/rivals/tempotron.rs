@@ -116,9 +116,9 @@ impl Tempotron {
         Shape::new(Kernel::DoubleExponential, self.tau, self.tau_s())
     }
 
-    fn lay_out(&self, pattern: &SpikeTrains) -> Inputs {
+    fn lay_out(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Inputs> {
         let shape = self.shape();
-        let spikes = pattern.by_time();
+        let spikes = pattern.by_time(stop)?;
         let mut last = pattern.start;
         let steps = spikes
             .iter()
@@ -128,13 +128,13 @@ impl Tempotron {
                 step
             })
             .collect();
-        Inputs {
+        Ok(Inputs {
             start: pattern.start,
             stop: pattern.stop,
             times: spikes.iter().map(|s| s.t).collect(),
             trains: spikes.iter().map(|s| s.train as usize).collect(),
             steps,
-        }
+        })
     }
 
     /// The highest point of the potential, exactly: between inputs it has one maximum at most, and its time is known.
@@ -178,7 +178,7 @@ impl Tempotron {
         self.check()?;
         crate::learn::statement::check_heard(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
-        Ok(self.reach(&self.shape(), weights, &self.lay_out(pattern)).peak)
+        Ok(self.reach(&self.shape(), weights, &self.lay_out(pattern, Stop::never())?).peak)
     }
 
     /// What one presentation changes, over the learning rate: nothing where the neuron is right; else the potential that
@@ -191,7 +191,7 @@ impl Tempotron {
         self.check()?;
         crate::learn::statement::check_heard(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
-        let (shape, events) = (self.shape(), self.lay_out(pattern));
+        let (shape, events) = (self.shape(), self.lay_out(pattern, Stop::never())?);
         let mut change = vec![0.0; weights.len()];
         let reached = self.reach(&shape, weights, &events);
         if reached.peak.t_spike.is_some() != label {
@@ -246,7 +246,7 @@ impl Tempotron {
         };
         let length = patterns.iter().map(|p| p.stop - p.start).sum::<f64>() / patterns.len() as f64;
         let eta = self.eta.unwrap_or(3e-3 * length / (self.tau * trains as f64 * shape.scale));
-        let events: Vec<Inputs> = patterns.iter().map(|p| self.lay_out(p)).collect();
+        let events = patterns.iter().map(|p| self.lay_out(p, stop)).collect::<Result<Vec<Inputs>>>()?;
         let mut order: Vec<usize> = (0..patterns.len()).collect();
         let (mut change, mut before) = (vec![0.0; trains], vec![0.0; trains]);
         let mut trained = Trained { weights: weights.clone(), right: Vec::new(), best_epoch: 0, ended: Ended::Epochs };

@@ -6,7 +6,7 @@
 
 use super::peak::{Peak, exceeds};
 use super::rows::{Sheet, Statement, lost};
-use crate::neuron::{AfterSpike, KernelSum, Shape, Step};
+use crate::neuron::{AfterSpike, Grid, KernelSum, Place, Shape, Step};
 use crate::vectors::{add, dot};
 use crate::{Result, Stop};
 
@@ -38,8 +38,7 @@ struct Lane {
     /// The number of its first row among all.
     first: usize,
     points: usize,
-    /// When its first point is, ms.
-    start: f64,
+    grid: Grid,
 }
 
 /// All silent rows: one a grid point that lies neither at a target nor in the refractory time behind it.
@@ -105,16 +104,16 @@ impl SilentRows {
 
     /// Adds the rows of one more pattern; where the caller stops it, they are as before.
     pub(crate) fn push(&mut self, statement: &Statement, pattern: usize, stop: Stop<'_>) -> Result<()> {
-        let (neuron, sheet, step) = (&statement.neuron, &statement.sheets[pattern], self.step_ms);
+        let (neuron, sheet) = (&statement.neuron, &statement.sheets[pattern]);
         let Sheet { start, end, targets, .. } = sheet;
-        let time = |point: f64| start + point * step;
+        let grid = Grid::new(*start, self.step_ms);
         let points = neuron.points(*start, *end) as usize;
         let (mut next, mut limit) = (0, Vec::with_capacity(points));
         for k in 0..points {
             if k % 4096 == 0 {
                 stop.check()?;
             }
-            let t = time(k as f64);
+            let t = grid.time(k as f64);
             while targets.get(next).is_some_and(|&target| target < t) {
                 next += 1;
             }
@@ -130,39 +129,33 @@ impl SilentRows {
             if k % 4096 == 0 {
                 stop.check()?;
             }
-            let point = ((t - start) / step).ceil();
+            let place = grid.place(t);
             // An input on a point itself is felt behind it; where its kernel begins above 0, from the next point on.
-            let late = time(point) - t <= 0.0 && self.shape.input().b != 0.0;
-            let felt = if late { point + 1.0 } else { point };
-            if felt < points as f64 && !lost(neuron, targets, t, time(felt)) {
-                let KernelSum { a, b } = self.shape.after(self.shape.input(), (time(felt) - t).max(0.0));
+            let felt = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
+            if felt < points as f64 && !lost(neuron, targets, t, grid.time(felt)) {
+                let age = grid.between(place, Place::at(felt)).max(0.0);
+                let KernelSum { a, b } = self.shape.after(self.shape.input(), age);
                 inputs.push(GridInput { point: felt as u32, train, a, b });
             }
         }
         inputs.sort_by_key(|i| i.point);
         let resets = match neuron.after_spike {
             AfterSpike::Reset => {
-                let after = targets.iter().map(|&t| self.point_after(*start, t));
-                after.filter(|&r| r < points).map(|r| r as u32).collect()
+                let behind = targets.iter().map(|&t| grid.place(t).behind());
+                behind.filter(|&point| point < points as f64).map(|point| point as u32).collect()
             }
             AfterSpike::Keep | AfterSpike::Ignore => vec![],
         };
         let stations = stations(&inputs, &resets);
-        self.lanes.push(Lane { inputs, stations, first: self.limit.len(), points, start: *start });
+        self.lanes.push(Lane { inputs, stations, first: self.limit.len(), points, grid });
         self.limit.append(&mut limit);
         Ok(())
     }
 
-    /// The first grid point behind `t`, of a pattern that begins at `start`.
-    fn point_after(&self, start: f64, t: f64) -> usize {
-        let k = ((t - start) / self.step_ms).floor() as usize;
-        if start + k as f64 * self.step_ms > t { k } else { k + 1 }
-    }
-
     /// The numbers of the rows that lie in the `near_ms` before `t`, or at it.
     pub(crate) fn before(&self, pattern: usize, t: f64, near_ms: f64) -> std::ops::Range<usize> {
-        let Lane { first, points, start, .. } = self.lanes[pattern];
-        let after = self.point_after(start, t).min(points);
+        let Lane { first, points, grid, .. } = self.lanes[pattern];
+        let after = (grid.place(t).behind() as usize).min(points);
         let near = (near_ms / self.step_ms).ceil() as usize;
         first + after.saturating_sub(near + 1)..first + after
     }
@@ -255,7 +248,7 @@ impl SilentRows {
                 if excess <= tolerance {
                     found.extend(worst.take());
                 } else if worst.is_none_or(|w| exceeds(excess, w.excess)) {
-                    worst = Some(Peak { pattern, t: lane.start + k as f64 * self.step_ms, excess });
+                    worst = Some(Peak { pattern, t: lane.grid.time(k as f64), excess });
                 }
             }
             found.extend(worst);

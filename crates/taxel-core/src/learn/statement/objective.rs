@@ -84,11 +84,15 @@ pub(crate) struct Choice {
 impl Objective {
     /// Normalises the terms; `d_max` gives what D comes to at the largest weights, `unit` is what a potential of 1 is, mV.
     ///
+    /// `silent` are the largest weights of trains without a spike, which no row has a coefficient for: their weights are 0, and
+    /// the normalisers of l1 and l2 count them as they count every train.
+    ///
     /// Reading: 6.3.2 takes each term's largest value over the bounds, which lie at -ub and ub; where they do not, over
     /// -max(|lb|, |ub|) to max(|lb|, |ub|), synapse by synapse.
     pub(crate) fn new(
         choice: Choice,
         bounds: Bounds,
+        silent: &[f64],
         targets: &Targets,
         unit: f64,
         d_max: impl FnOnce(&[f64]) -> f64,
@@ -100,9 +104,9 @@ impl Objective {
         let over = |share: f64, most: f64| if most > 0.0 { share / most } else { 0.0 };
         let lifted = |row: TargetRow<'_>| (dot(row.behind, &most) + kappa * row.threshold).powi(2);
         let missed = |row: TargetRow<'_>| dot(row.at, &most) + row.threshold;
-        let square = dot(&most, &most);
+        let square = dot(&most, &most) + dot(silent, silent);
         Self {
-            l1: over(l1, most.iter().sum()),
+            l1: over(l1, most.iter().chain(silent).sum()),
             l2: match norm {
                 Norm::Norm => over(l2, square.sqrt()),
                 Norm::Square => over(l2, square),

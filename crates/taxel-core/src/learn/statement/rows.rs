@@ -11,12 +11,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, KernelSum, Neuron, Shape, Time, rounding_ms};
-use crate::{Result, SpikeTrains, problem};
+use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Grid, KernelSum, Neuron, Shape, Time, rounding_ms};
+use crate::{Result, SpikeTrains, Stop, problem};
 
-/// From so near a target on the target's row and its slope row stand for silence, ms; an input so near before it is at it and
-/// adds nothing there. A hair less than in the neuron, so that a crossing that is met to rounding falls on the same side.
-pub(crate) const AT_TARGET: f64 = 0.99 * AT_EDGE;
+/// From so near a target on the target's row and its slope row stand for silence, ms: rows of silence nearer than that are
+/// parallel to the target's to rounding. A neuron that crosses its threshold there fires at the target.
+const AT_TARGET: f64 = 0.99 * AT_EDGE;
 
 /// The name of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -200,14 +200,16 @@ impl Statement {
         Self { neuron, shape, margin, unit, taper, trains, sheets: vec![] }
     }
 
-    /// Takes one more pattern, which has been checked, and where silence ends in it, ms.
-    pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64) {
+    /// Adds one more pattern, which has been checked, and where silence ends in it, ms; where the caller stops it, all is as before.
+    pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64, stop: Stop<'_>) -> Result<()> {
+        let spikes = pattern.by_time(stop)?;
         self.sheets.push(Sheet {
             start: pattern.start,
             end,
             targets: targets.to_vec(),
-            inputs: pattern.by_time().iter().map(|s| (s.t, s.train)).collect(),
+            inputs: spikes.iter().map(|s| (s.t, s.train)).collect(),
         });
+        Ok(())
     }
 
     /// Takes the first pattern away; the others are numbered anew from 0.
@@ -265,8 +267,7 @@ impl Statement {
         match row {
             Row::Target { pattern, target } => {
                 let (sheet, t) = self.target(pattern, target)?;
-                let heard = self.heard_at(sheet, t);
-                self.sum(heard, t, &sheet.targets[..target], |state| state.b, coefficients);
+                self.sum(sheet, t, &sheet.targets[..target], |state| state.b, coefficients);
                 Ok(self.threshold(sheet, t))
             }
             Row::Slope { pattern, target } => {
@@ -276,8 +277,8 @@ impl Statement {
                     ));
                 }
                 let (sheet, t) = self.target(pattern, target)?;
-                let (heard, slope) = (self.heard_at(sheet, t), |state| -self.shape.slope(state));
-                self.sum(heard, t, &sheet.targets[..target], slope, coefficients);
+                let slope = |state| -self.shape.slope(state);
+                self.sum(sheet, t, &sheet.targets[..target], slope, coefficients);
                 let falls = (self.threshold(sheet, t) - self.neuron.theta_0) / self.neuron.tau_rec();
                 Ok(falls - self.margin.slope)
             }
@@ -285,7 +286,7 @@ impl Statement {
                 let sheet = self.sheet(pattern)?;
                 self.check_silent(pattern, t)?;
                 let fired = sheet.targets.partition_point(|&target| target < t);
-                self.sum(sheet.before(t), t, &sheet.targets[..fired], |state| state.b, coefficients);
+                self.sum(sheet, t, &sheet.targets[..fired], |state| state.b, coefficients);
                 Ok(self.threshold(sheet, t) - self.margin_at(sheet, t))
             }
         }
@@ -315,7 +316,7 @@ impl Statement {
         let (sheet, t) = self.target(pattern, target)?;
         let t_behind = t + delta_t;
         let earlier = &sheet.targets[..target];
-        self.sum(sheet.before(t_behind), t_behind, earlier, |state| state.b, coefficients);
+        self.sum(sheet, t_behind, earlier, |state| state.b, coefficients);
         Ok(self.threshold(sheet, t))
     }
 
@@ -337,7 +338,8 @@ impl Statement {
     fn check_silent(&self, pattern: usize, t: f64) -> Result<()> {
         let sheet = self.sheet(pattern)?;
         let Sheet { start, end, .. } = sheet;
-        if !(*start <= t && t <= *end) {
+        let last = if self.neuron.time == Time::Grid { end + rounding_ms(*end) } else { *end };
+        if !(*start <= t && t <= last) {
             return Err(problem!("pattern {pattern}: {t} ms lies outside of what is asked for, {start} to {end} ms"));
         }
         if self.neuron.time == Time::Grid && !self.is_point(sheet, t) {
@@ -369,8 +371,7 @@ impl Statement {
 
     /// Whether `t` is a point of the grid.
     pub(crate) fn is_point(&self, sheet: &Sheet, t: f64) -> bool {
-        let step = self.neuron.step_ms;
-        t == sheet.start + ((t - sheet.start) / step).round() * step
+        Grid::new(sheet.start, self.neuron.step_ms).place(t).is_point()
     }
 
     /// Whether `t` lies neither at a target nor in the refractory time behind it.
@@ -406,17 +407,11 @@ impl Statement {
         }
     }
 
-    /// The inputs that count at a target, by time.
-    fn heard_at<'a>(&self, sheet: &'a Sheet, target: f64) -> &'a [(f64, u32)] {
-        match self.neuron.time {
-            Time::Grid => sheet.before(target),
-            Time::Continuous => sheet.before(target - AT_TARGET),
-        }
-    }
-
-    /// Adds up, by train, what `part` sees at `t` of inputs before, the neuron having fired at `earlier` targets only.
-    fn sum(&self, inputs: &[(f64, u32)], t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
+    /// Adds up, by train, what `part` gives at `t` of the inputs before, the neuron having fired at `earlier` targets only.
+    fn sum(&self, sheet: &Sheet, t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
         out.fill(0.0);
+        let inputs = sheet.before(t);
+        let age = self.neuron.ages(sheet.start, t);
         let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
         let (mut at, mut one) = (f64::NAN, 0.0);
         for &(s, train) in &inputs[from..] {
@@ -426,7 +421,7 @@ impl Statement {
                 one = if lost(&self.neuron, earlier, s, t) {
                     0.0
                 } else {
-                    part(self.shape.after(self.shape.input(), t - s))
+                    part(self.shape.after(self.shape.input(), age(s)))
                 };
             }
             out[train as usize] += one;

@@ -1,12 +1,12 @@
 //! A block in continuous time: from one input time to the next, exact.
 
-use super::lanes::{FADED, LANES, Lanes, SLACK, Weight};
-use crate::SpikeTrains;
+use super::lanes::{FADED, LANES, LOOK, Lanes, SLACK, Weight};
 use crate::neuron::continuous::ContinuousStream;
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AT_EDGE, AfterSpike, Neuron};
 use crate::neuron::threshold::OutputSpike;
 use crate::vectors::wide;
+use crate::{Result, SpikeTrains, Stop};
 
 /// From this share of tau on the tangent says less than the kernel's largest value.
 const LONG: f64 = 0.3;
@@ -42,8 +42,8 @@ struct Interval {
 }
 
 impl Script {
-    pub(super) fn new(neuron: &Neuron, trains: &SpikeTrains, threshold: f64) -> Self {
-        let (shape, spikes) = (neuron.shape(), trains.by_time());
+    pub(super) fn new(neuron: &Neuron, trains: &SpikeTrains, threshold: f64, stop: Stop<'_>) -> Result<Self> {
+        let (shape, spikes) = (neuron.shape(), trains.by_time(stop)?);
         let mut intervals: Vec<Interval> = vec![];
         let mut from = trains.start;
         let mut push = |from: f64, until: f64, inputs_end: usize| {
@@ -61,13 +61,16 @@ impl Script {
             });
         };
         for (k, spike) in spikes.iter().enumerate() {
+            if k % LOOK == 0 {
+                stop.check()?;
+            }
             if spike.t > from {
                 push(from, spike.t, k);
                 from = spike.t;
             }
         }
         push(from, trains.stop, spikes.len());
-        Self {
+        Ok(Self {
             begin: ContinuousStream::new(neuron, threshold, trains.start),
             inputs: spikes.iter().map(|s| s.train).collect(),
             all_hear: neuron.after_spike == AfterSpike::Keep,
@@ -77,18 +80,27 @@ impl Script {
             },
             floor: neuron.theta_0 * threshold - SLACK * neuron.unit(),
             intervals,
-        }
+        })
     }
 }
 
 /// Runs a block of neurons from start to stop; adds each one's spikes to `fired`.
-pub(super) fn run<W: Weight>(neuron: &Neuron, script: &Script, block: &[[W; LANES]], fired: &mut [Vec<f64>; LANES]) {
+pub(super) fn run<W: Weight>(
+    neuron: &Neuron,
+    script: &Script,
+    block: &[[W; LANES]],
+    fired: &mut [Vec<f64>; LANES],
+    stop: Stop<'_>,
+) -> Result<()> {
     let mut streams: Vec<ContinuousStream> = vec![script.begin.clone(); LANES];
     let mut lanes = Lanes::new(script.begin.edge());
     let mut perhaps = [false; LANES];
     let mut found: Vec<OutputSpike> = vec![];
     let mut k = 0;
     while let Some(at) = quiet(&mut lanes, script, block, k, &mut perhaps) {
+        if at % LOOK == LOOK - 1 {
+            stop.check()?;
+        }
         let interval = &script.intervals[at];
         let before = (lanes.a, lanes.b);
         pass(&mut lanes, interval);
@@ -112,6 +124,7 @@ pub(super) fn run<W: Weight>(neuron: &Neuron, script: &Script, block: &[[W; LANE
         }
         k = at + 1;
     }
+    Ok(())
 }
 
 /// Whether a neuron may cross its threshold within an interval, or its refractory time may end.
@@ -166,7 +179,7 @@ wide! {
 
 wide! {
     /// Moves a block on from the beginning of interval `from`, its inputs still to come, up to the next one in which a
-    /// neuron may matter; that one is given, its inputs added, with who may.
+    /// neuron may matter, or the next at which to look for Ctrl-C; that one is given, its inputs added, with who may.
     fn quiet<W: Weight>(
         lanes: &mut Lanes,
         script: &Script,
@@ -208,7 +221,7 @@ wide! {
                     any |= may_matter(lanes.a[l], lanes.b[l], lanes.rise[l], lanes.edge[l], script, interval);
                 }
             }
-            if any {
+            if any || k % LOOK == LOOK - 1 {
                 for (l, perhaps) in perhaps.iter_mut().enumerate() {
                     *perhaps = may_matter(lanes.a[l], lanes.b[l], lanes.rise[l], lanes.edge[l], script, interval);
                 }

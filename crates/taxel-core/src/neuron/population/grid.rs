@@ -1,16 +1,18 @@
 //! A block on a grid: from point to point.
 
-use super::lanes::{FADED, LANES, Lanes, SLACK, Weight};
-use crate::SpikeTrains;
+use super::lanes::{FADED, LANES, LOOK, Lanes, SLACK, Weight};
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AfterSpike, Neuron};
+use crate::neuron::points::{Grid, Place};
 use crate::neuron::rounding_ms;
 use crate::neuron::threshold::Threshold;
 use crate::vectors::wide;
+use crate::{Result, SpikeTrains, Stop};
 
 /// What all neurons have in common: the grid and its inputs.
 pub(super) struct Script {
     threshold: Threshold,
+    grid: Grid,
     /// The base of the threshold, less the rounding of the bound, mV.
     floor: f64,
     points: Vec<Point>,
@@ -87,22 +89,21 @@ impl Lanes {
 }
 
 impl Script {
-    pub(super) fn new(neuron: &Neuron, trains: &SpikeTrains, threshold: f64) -> Self {
+    pub(super) fn new(neuron: &Neuron, trains: &SpikeTrains, threshold: f64, stop: Stop<'_>) -> Result<Self> {
         let (shape, step_ms, start) = (neuron.shape(), neuron.step_ms, trains.start);
-        let time = |point: f64| start + point * step_ms;
-        let spikes = trains.by_time();
-        let point_of = |t: f64| ((t - start) / step_ms).ceil();
-        // The last point that is compared; rounding may put an input's own point a hair beyond the floor.
-        let last = spikes.iter().map(|s| point_of(s.t)).filter(|&p| time(p) <= trains.stop);
-        let last = last.fold(((trains.stop - start) / step_ms).floor(), f64::max);
+        let (grid, spikes) = (Grid::new(start, step_ms), trains.by_time(stop)?);
+        let last = grid.place(trains.stop).until();
         let mut inputs: Vec<Input> = Vec::with_capacity(spikes.len());
         let (mut points, mut rest) = (vec![], spikes.iter().peekable());
         let mut point = 0.0;
         while point <= last {
-            let t = time(point);
+            if points.len() % LOOK == 0 {
+                stop.check()?;
+            }
+            let t = grid.time(point);
             let mut arriving = vec![];
-            while let Some(spike) = rest.next_if(|s| point_of(s.t) <= point) {
-                let age = t - spike.t;
+            while let Some(spike) = rest.next_if(|s| grid.place(s.t).from() <= point) {
+                let age = grid.between(grid.place(spike.t), Place::at(point));
                 if age > 0.0 {
                     let one = shape.after(shape.input(), age);
                     inputs.push(Input { train: spike.train, t: spike.t, one });
@@ -115,30 +116,44 @@ impl Script {
             points.push(Point { t, aged_end, arriving_end: inputs.len() });
             point += 1.0;
         }
-        Self {
-            threshold: Threshold::new(neuron, threshold, start),
-            floor: neuron.theta_0 * threshold - SLACK * neuron.unit(),
+        let far = grid.rounding_ms(trains.stop);
+        let threshold = Threshold::new(neuron, threshold, start);
+        Ok(Self {
+            floor: threshold.base - threshold.slack(far) - SLACK * neuron.unit(),
+            threshold,
+            grid,
             step: shape.step(step_ms),
             fade: (-step_ms / neuron.tau_rec()).exp(),
             all_hear: neuron.after_spike == AfterSpike::Keep,
             points,
             inputs,
-        }
+        })
     }
 }
 
 /// Runs a block of neurons from start to stop; adds each one's spikes to `fired`.
-pub(super) fn run<W: Weight>(neuron: &Neuron, script: &Script, block: &[[W; LANES]], fired: &mut [Vec<f64>; LANES]) {
+pub(super) fn run<W: Weight>(
+    neuron: &Neuron,
+    script: &Script,
+    block: &[[W; LANES]],
+    fired: &mut [Vec<f64>; LANES],
+    stop: Stop<'_>,
+) -> Result<()> {
     let mut thresholds: Vec<Threshold> = vec![script.threshold.clone(); LANES];
     let mut lanes = Lanes::new(script.threshold.edge());
+    let shape = neuron.shape();
     let mut perhaps = [false; LANES];
     let mut from = None;
     while let Some(at) = quiet(&mut lanes, script, block, from, &mut perhaps) {
+        if at % LOOK == LOOK - 1 {
+            stop.check()?;
+        }
         let t = script.points[at].t;
         for lane in (0..LANES).filter(|&l| perhaps[l]) {
             let threshold = &mut thresholds[lane];
             lanes.recover(lane, threshold, t);
-            if threshold.reached(t, lanes.b[lane]) {
+            let slope = shape.slope(KernelSum { a: lanes.a[lane], b: lanes.b[lane] });
+            if threshold.reached(t, lanes.b[lane], slope, script.grid.rounding_ms(t)) {
                 fired[lane].push(t);
                 threshold.fire(t);
                 lanes.fire(lane, t, t + neuron.refractory, neuron.after_spike);
@@ -150,6 +165,7 @@ pub(super) fn run<W: Weight>(neuron: &Neuron, script: &Script, block: &[[W; LANE
         }
         from = Some(at);
     }
+    Ok(())
 }
 
 #[inline(always)]
@@ -187,7 +203,7 @@ wide! {
             for l in 0..LANES {
                 any |= may_matter(lanes, l, point.t, floor);
             }
-            if any {
+            if any || k % LOOK == LOOK - 1 {
                 for (l, perhaps) in perhaps.iter_mut().enumerate() {
                     *perhaps = may_matter(lanes, l, point.t, floor);
                 }

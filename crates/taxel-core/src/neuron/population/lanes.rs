@@ -9,6 +9,9 @@ pub(super) const LANES: usize = 32;
 pub(super) const FADED: f64 = 1.0 - 1e-9;
 pub(super) const SLACK: f64 = 1e-11;
 
+/// A block looks for Ctrl-C at every so manieth interval or point.
+pub(super) const LOOK: usize = 1 << 16;
+
 /// A number that weights come in.
 pub trait Weight: Copy + Default + Into<f64> {}
 impl Weight for f32 {}

@@ -19,24 +19,24 @@ pub(in crate::wire) struct Clock {
     /// Where the last stamp was a step back: its time, in stamps.
     pub(super) behind: Option<i64>,
     /// When, by the host's clock, the last stamp came, us.
-    pub(super) heard: Option<i64>,
+    pub(super) arrived: Option<i64>,
 }
 
 impl Clock {
     /// Gives the unwrapped time in stamps, and whether it is a step back.
     pub(in crate::wire) fn unwrap(&mut self, stamp: u16, arrived: Option<i64>) -> (i64, bool) {
         let Some(latest) = self.latest else {
-            (self.latest, self.heard) = (Some(i64::from(stamp)), arrived);
+            (self.latest, self.arrived) = (Some(i64::from(stamp)), arrived);
             return (i64::from(stamp), false);
         };
         let ahead = (i64::from(stamp) - latest).rem_euclid(TURN);
         let mut time = if ahead >= TURN - FARTHEST_BACK { latest + ahead - TURN } else { latest + ahead };
-        if let (Some(now), Some(before)) = (arrived, self.heard) {
-            // The silence as the host heard it says how many whole turns the stamps do not show.
+        if let (Some(now), Some(before)) = (arrived, self.arrived) {
+            // The host's clock shows how many whole turns of the stamps the silence had.
             let expected = latest + silence(before, now) / STAMP_US;
             time += ((expected - time + TURN / 2).div_euclid(TURN)).max(0) * TURN;
         }
-        self.heard = arrived;
+        self.arrived = arrived;
         self.latest = Some(latest.max(time));
         self.behind = (time < latest).then_some(time);
         (time, time < latest)

@@ -321,7 +321,8 @@ fn long_stretches_into_aligned_columns_decode_alike() {
         let [x, y, ticks] = [&mut x, &mut y, &mut ticks].map(|column| behind_edge(column, shift));
         let room = Room::new(t, [x, y, ticks], [p, present]).unwrap();
         let mut decoder = Decoder::new(Array::thesis()).instructions(set).unwrap();
-        let (filled, markers) = decoder.fill(&bytes, None, room, true, Stop::never()).unwrap();
+        let crate::wire::Columns { filled, markers, .. } =
+            decoder.fill(&bytes, None, room, true, Stop::never()).unwrap();
         let n = filled.rows;
         let columns = (t[..n].to_vec(), [x, y, ticks].map(|column| column[..n].to_vec()));
         (columns, [p, present].map(|column| column[..n].to_vec()), markers, *decoder.counts())

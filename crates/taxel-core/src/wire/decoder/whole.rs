@@ -37,7 +37,7 @@ impl Decoder {
     }
 
     /// As [`Self::fill`] to the end of the stream, of datagrams that lie one behind the other, each as long as `lengths` say and
-    /// heard by itself: a change whose intensity is not in its datagram has none.
+    /// decoded by itself: a change whose intensity is not in its datagram has none.
     ///
     /// # Errors
     ///

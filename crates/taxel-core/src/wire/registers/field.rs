@@ -1,4 +1,4 @@
-//! What a field of a register is, and what rules are told.
+//! What a field of a register is, and the numbers of the array that rules need.
 
 /// Where a field lies, and what it may hold (Table 5.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

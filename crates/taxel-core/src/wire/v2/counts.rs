@@ -1,4 +1,4 @@
-//! What a decoder of version 2 heard and missed, and what the board says of itself.
+//! What a decoder of version 2 received and missed, and the board's own totals.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ pub struct Status {
     pub faults: u64,
 }
 
-/// What a decoder heard, and all that it missed, by cause.
+/// What a decoder received, and all that it missed, by cause.
 ///
 /// `datagrams = intact + repeated + old + short + long + foreign + checksum`; of each session `missing` numbers lie between the first and the last
 /// intact one and never came.
@@ -29,7 +29,7 @@ pub struct Counts {
     pub intact: u64,
     /// Came again, and were not decoded again.
     pub repeated: u64,
-    /// Came more than 65 536 numbers late, so that nobody can tell whether they had come before; not decoded.
+    /// Came more than 65 536 numbers late, so that it is unknown whether they came before; not decoded.
     pub old: u64,
     /// Refused: too short.
     pub short: u64,
@@ -61,11 +61,11 @@ pub struct Counts {
     pub markers: u64,
     /// Markers of a code that is not known; left out.
     pub unknown_marker: u64,
-    /// Times that the board said it had dropped events.
+    /// Datagrams in which the board reports dropped events.
     pub dropped: u64,
     /// Resets that were noticed.
     pub resets: u64,
-    /// Differences from a value that was not heard: their events have none.
+    /// Differences from an unknown value: their events have none.
     pub unknown_value: u64,
 }
 

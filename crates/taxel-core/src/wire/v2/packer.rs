@@ -124,7 +124,7 @@ impl Packer {
         self.last_event = Some(t);
     }
 
-    /// Says that everything before `now` was added, and that this is said again at `next`; sends what is due: events, or a
+    /// Ends a frame: everything before `now` was added, and the next frame ends at `next`; sends what is due: events, or a
     /// heartbeat.
     pub fn over(&mut self, now: u64, next: u64, sink: &mut impl FnMut(&[u8], usize)) {
         if self.events > 0 {
@@ -255,7 +255,7 @@ impl Packer {
 }
 
 /// The line that positions begin in where the first event lies in a column.
-fn first_line(x: u16) -> u8 {
+pub(super) fn first_line(x: u16) -> u8 {
     x.min(LAST_LINE) as u8
 }
 
@@ -269,13 +269,13 @@ fn layout(kind: Kind) -> Result<Layout> {
 }
 
 /// Words that a gap and its event take.
-fn steps(word: Layout, gap: i64) -> usize {
+pub(super) fn steps(word: Layout, gap: i64) -> usize {
     let (step, most) = word.advance();
     if gap < i64::from(word.control()) { 1 } else { 1 + ((gap / step) as u64).div_ceil(most as u64) as usize }
 }
 
 /// Adds an event `gap` positions behind the one expected.
-fn add(body: &mut Vec<u8>, word: Layout, mut gap: i64, p: bool, value: u16) {
+pub(super) fn add(body: &mut Vec<u8>, word: Layout, mut gap: i64, p: bool, value: u16) {
     let (step, most) = word.advance();
     if gap >= i64::from(word.control()) {
         let mut left = gap / step;
@@ -290,7 +290,7 @@ fn add(body: &mut Vec<u8>, word: Layout, mut gap: i64, p: bool, value: u16) {
     put(body, word, p, gap as u32, u32::from(value).min(largest));
 }
 
-fn put(body: &mut Vec<u8>, word: Layout, p: bool, skip: u32, value: u32) {
+pub(super) fn put(body: &mut Vec<u8>, word: Layout, p: bool, skip: u32, value: u32) {
     let bits = u32::from(p) << (word.skip + word.value) | skip << word.value | value;
     body.extend(&bits.to_le_bytes()[..word.bytes]);
 }

@@ -36,8 +36,8 @@ impl StreamReader {
     }
 }
 
-/// Who takes the datagrams of a stream.
-trait Listener {
+/// Where the datagrams of a stream go.
+trait Sink {
     /// Takes those that lie ahead, as many as it likes; gives how many bytes they have, with their lengths.
     fn run(&mut self, ahead: &[u8]) -> usize;
 
@@ -45,7 +45,7 @@ trait Listener {
     fn take(&mut self, datagram: &[u8], header: &Header, body: &[u8]);
 }
 
-impl<F: FnMut(&[u8])> Listener for F {
+impl<F: FnMut(&[u8])> Sink for F {
     fn run(&mut self, _: &[u8]) -> usize {
         0
     }
@@ -55,12 +55,12 @@ impl<F: FnMut(&[u8])> Listener for F {
     }
 }
 
-/// Gives each whole datagram that begins in `bytes` to a listener; gives how many bytes are done with: all of them where the
+/// Gives each whole datagram that begins in `bytes` to a sink; gives how many bytes are done with: all of them where the
 /// stream ends there.
-fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, listener: &mut impl Listener) -> usize {
+fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl Sink) -> usize {
     let mut at = 0;
     loop {
-        at += listener.run(&bytes[at..]);
+        at += sink.run(&bytes[at..]);
         let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) else { break };
         let length = usize::from(u16::from_le_bytes([rest[0], rest[1]]));
         let likely =
@@ -71,7 +71,7 @@ fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, listener: &mut impl Listener
                 return at;
             }
             if let Some((datagram, (header, body))) = whole.and_then(|bytes| Some((bytes, Header::read(bytes).ok()?))) {
-                listener.take(datagram, &header, body);
+                sink.take(datagram, &header, body);
                 at += LENGTH_BYTES + length;
                 continue;
             }
@@ -110,7 +110,7 @@ fn ahead(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
 /// A decoder and the columns that it fills.
 struct Filling<'a>(Decoder, Laid<'a>);
 
-impl Listener for Filling<'_> {
+impl Sink for Filling<'_> {
     fn run(&mut self, bytes: &[u8]) -> usize {
         let taken = self.0.plain(ahead(bytes), stream_rows(bytes.len()), &mut self.1);
         taken.bytes + LENGTH_BYTES * taken.datagrams

@@ -111,7 +111,7 @@ fn held(data: &[u8]) -> Option<Vec<u16>> {
 }
 
 /// Gives a decoder the values that the taxels held before the recording's first datagram.
-pub(crate) fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
+pub fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
     if let Some(held) = held(data) {
         receiver.begin_with(held.iter().map(|ticks| (*ticks != u16::MAX).then_some(*ticks)));
     }

@@ -1,4 +1,4 @@
-//! What each taxel holds as far as was heard, and since when.
+//! What each taxel holds, and since when, as far as it is known.
 
 use crate::Array;
 use crate::wire::v2::stride;
@@ -12,18 +12,18 @@ pub(super) struct Held {
     /// Bits that name a row.
     pub(super) stride: u8,
     pub(super) values: Vec<u16>,
-    /// us; [`NEVER`] where nothing was heard.
+    /// us; [`NEVER`] where nothing is known.
     pub(super) since: Vec<i64>,
     /// No entry of `since` is later.
     pub(super) newest: i64,
-    /// What a taxel holds that was not heard of: 0 where all was heard since the board's reset.
+    /// What a taxel holds of which nothing was received: 0 where the session was received from its start.
     pub(super) unheard: Option<u16>,
 }
 
 /// Before any time.
 pub(super) const NEVER: i64 = i64::MIN;
 
-/// Of what is known from elsewhere: before anything that is heard.
+/// Of what is known from elsewhere: before anything that is received.
 const BEFORE: i64 = NEVER + 1;
 
 impl Held {
@@ -41,7 +41,7 @@ impl Held {
         }
     }
 
-    /// The same array, of whose taxels nothing was heard.
+    /// The same array, of whose taxels nothing is known.
     pub(super) fn blank(&self) -> Self {
         let places = self.values.len();
         Self { values: vec![0; places], since: vec![NEVER; places], newest: NEVER, unheard: None, ..*self }

@@ -2,7 +2,7 @@
 //!
 //! Plain is a datagram ahead in the latest session, with changes as they are (no differences, no time of their own), no
 //! earlier than what is held and all on the array. Anything else ends the run, and the decoder takes it by itself, which alone
-//! says what a datagram means. So both ways give the same rows, held values and counts.
+//! defines what a datagram means. So both ways give the same rows, held values and counts.
 
 use super::held::Held;
 use super::session::Session;
@@ -21,7 +21,7 @@ const ROWS: usize = ((LONGEST - HEADER_BYTES - TRAILER_BYTES) / 2).next_multiple
 
 /// What the decoder knows, as a run goes on with it.
 pub(super) struct Run<'a> {
-    /// What its datagrams have in common, as [`Header::common`] says it of plain ones.
+    /// What its datagrams have in common, as [`Header::common`] has it of plain ones.
     common: u64,
     /// The latest one.
     session: &'a mut Session,
@@ -53,7 +53,7 @@ impl<'a> Run<'a> {
             return None;
         }
         let value = kind.layout()?.value;
-        // Positions, and sums that are too large, must be told apart in 16 bits.
+        // Positions, and sums that are too large, must be distinct in 16 bits.
         if held.values.len() >= usize::from(FULL) {
             return None;
         }

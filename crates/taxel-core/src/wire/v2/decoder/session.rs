@@ -2,7 +2,7 @@
 
 use crate::wire::v2::Header;
 
-/// How far behind the highest sequence number a datagram may come and still be told from a repeated one.
+/// How far behind the highest sequence number a datagram may come and still be distinguished from a repeated one.
 pub(super) const WINDOW: usize = 65_536;
 
 /// What is known of the datagrams between two resets.
@@ -60,7 +60,7 @@ impl Session {
     }
 
     /// Notes a number at most 64 ahead, as nearly all are: what came a window ago in the places of those between is forgotten.
-    /// Without a branch, as nobody guesses in a scene which datagram comes behind a gap.
+    /// Without a branch, as no processor predicts in a scene which datagram comes behind a gap.
     #[inline(always)]
     fn note_ahead(&mut self, number: i64) {
         let (word, bit) = place(number);

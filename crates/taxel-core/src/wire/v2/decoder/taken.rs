@@ -1,6 +1,6 @@
 //! Datagrams that were decoded in one go; none on a machine without the instructions for it.
 
-/// How many there were, and what the last one says.
+/// How many there were, and the time and promise of the last.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::wire::v2) struct Taken {
     /// How many.

@@ -1,7 +1,7 @@
 //! Words of a body to rows: one by one on any machine, in blocks where it has the instructions.
 //!
 //! The blocks take what is plain (on the array, no earlier than anything that is held, values as they are) and stop at
-//! anything else, which [`single::words`] takes: it alone says what a word means, so every set of instructions gives
+//! anything else, which [`single::words`] takes: it alone defines what a word means, so every set of instructions gives
 //! the same rows, held values and counts.
 
 #[cfg(target_arch = "x86_64")]

@@ -141,7 +141,7 @@ impl Constants {
         let Words { skip, value, .. } = *words;
         let one = _mm512_set1_epi16(1);
         let mut steps = _mm512_maskz_add_epi16(taken, skip, one);
-        // Of small words without a branch: in a scene nobody guesses which block has one.
+        // Of small words without a branch: in a scene no processor predicts which block has one.
         if VALUE == 8 || advances != 0 {
             let advance = if VALUE == 8 {
                 _mm512_slli_epi16::<6>(_mm512_add_epi16(value, one))
@@ -192,12 +192,12 @@ impl Constants {
         let places = _mm512_permutexvar_epi16(repeated, found.position);
         let values = _mm512_permutexvar_epi16(repeated, found.ticks);
         if found.n > EIGHT {
-            let (mut at, mut told) = (Lanes([0; WORDS]), Lanes([0; WORDS]));
+            let (mut at, mut ticks) = (Lanes([0; WORDS]), Lanes([0; WORDS]));
             // SAFETY: both are 64 bytes long, and begin where a line of the cache does; the places are those of events.
             unsafe {
                 _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
-                _mm512_store_si512(told.0.as_mut_ptr().cast(), values);
-                hold_many(&at, &told, t, held);
+                _mm512_store_si512(ticks.0.as_mut_ptr().cast(), values);
+                hold_many(&at, &ticks, t, held);
             }
             return;
         }

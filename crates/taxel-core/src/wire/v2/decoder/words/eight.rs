@@ -61,7 +61,7 @@ impl Eight {
         if advances & polarity != 0 {
             return None;
         }
-        // Without a branch: in a scene nobody guesses which datagram has an advance.
+        // Without a branch: in a scene no processor predicts which datagram has an advance.
         let advance = if VALUE == 8 {
             _mm_slli_epi16::<6>(_mm_add_epi16(value, one))
         } else {
@@ -120,7 +120,7 @@ impl Eight {
     #[target_feature(enable = "avx512f,avx512bw,avx512vl")]
     pub(crate) unsafe fn hold(&self, t: i64, held: &mut Held) {
         held.newest = t;
-        // Lanes without an event repeat the last one, so that nothing hangs on how many there are: nobody guesses that.
+        // Lanes without an event repeat the last one, so that no branch depends on how many there are: no processor predicts that.
         let lane = _mm_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7);
         let repeated = _mm_min_epu16(_mm_set1_epi16(self.n as i16 - 1), lane);
         let places = _mm_permutexvar_epi16(repeated, self.position);

@@ -45,7 +45,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
             continue;
         }
         let (x, y) = (x as u16, y as u16);
-        let (mut p, mut told, mut known) = (p, value, VALUE > 0);
+        let (mut p, mut ticks, mut known) = (p, value, VALUE > 0);
         if VALUE > 0 {
             let place = held.place(x, y);
             let newest = t >= held.since[place];
@@ -55,7 +55,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
                     let from = held.get(place).or(held.unheard);
                     known = from.is_some();
                     counts.unknown_value += u64::from(!known);
-                    told =
+                    ticks =
                         from.map_or(0, |from| if p { from.saturating_add(value) } else { from.saturating_sub(value) });
                 }
                 Meaning::States => {
@@ -78,7 +78,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
                 }
             }
             if known && (newest || body.meaning == Meaning::Differences) {
-                held.set(place, told, t);
+                held.set(place, ticks, t);
             }
         }
         latest = latest.max(t);
@@ -87,7 +87,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
         room.y[n].write(y);
         room.p[n].write(p);
         if paired {
-            room.ticks[n].write(if known { told } else { 0 });
+            room.ticks[n].write(if known { ticks } else { 0 });
             room.present[n].write(known);
         }
         n += 1;

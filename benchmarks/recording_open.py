@@ -1,0 +1,89 @@
+"""What opening, listing, cutting and converting a large .mcap cost, in time and memory, beside decoding its datagrams.
+
+Datagrams of 280 words (1400 bytes), change and intensity alternating. Each step runs in a process of its own; its peak
+memory and CPU time are its result, the memory less that of one that only imports taxel. "listed" asks for notes,
+registers, losses and all else that stands beside the events, and reads no datagram.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from _rounds import stamp
+from recording_write import BYTES, HEADER, datagrams
+
+from taxel import _core
+
+#: What each process runs, with the file's path as `path` and a folder as `folder`.
+STEPS = {
+    "imported": "",
+    "opened": "taxel.open(path)",
+    "listed": "r = taxel.open(path); r.notes, r.registers, r.zeroings, r.detections, r.verdict, list(r.sources)",
+    "decoded": "from taxel import _core; _core.RecordingReader(path).decode('direct')",
+    "read": "taxel.open(path).events",
+    "sliced": "r = taxel.open(path); r.between(0, float(r.events.t[-1]) / 2).events",
+    "cut": "taxel.cut(taxel.open(path), columns=slice(0, 32))[0].events",
+    "copied": "taxel.convert(path, folder + '/copy.mcap', overwrite=True)",
+    "to .npz": "taxel.convert(taxel.open(path).between(0, 1e5), folder + '/copy.npz', overwrite=True)",
+}
+MEASURED = """
+import resource, sys, time
+import taxel
+path, folder = sys.argv[1:]
+cpu, wall = time.process_time(), time.perf_counter()
+{step}
+use = resource.getrusage(resource.RUSAGE_SELF)
+print(time.process_time() - cpu, time.perf_counter() - wall, use.ru_maxrss / 1024)
+"""
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    n, rounds = (3_500, 2) if quick else (70_000, 5)
+    raw = datagrams(n)
+    found: dict[str, list[list[float]]] = {name: [] for name in STEPS}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.mcap"
+        writer = _core.RecordingWriter(path, HEADER, "none", True)
+        offsets = np.arange(n + 1, dtype=np.int64) * BYTES
+        writer.datagrams(np.arange(n, dtype=np.int64) * 13_100, np.arange(n, dtype=np.uint64), offsets, raw)
+        writer.finish("{}")
+        for _ in range(rounds):
+            for name, step in STEPS.items():
+                code = MEASURED.format(step=step)
+                done = subprocess.run(
+                    [sys.executable, "-c", code, path, folder], capture_output=True, text=True, check=True
+                )
+                found[name].append([float(value) for value in done.stdout.split()])
+    none = statistics.median(one[2] for one in found["imported"])
+    results = {
+        name: {
+            "cpu_s": {"median": statistics.median(one[0] for one in all_of_them), "rounds": rounds},
+            "wall_s": {"median": statistics.median(one[1] for one in all_of_them)},
+            "peak_mb": statistics.median(one[2] for one in all_of_them) - none,
+        }
+        for name, all_of_them in found.items()
+    }
+    decoded = results["decoded"]
+    ratios = {}
+    for name in ("opened", "listed", "read", "sliced", "cut", "copied"):
+        ratios[f"{name} / decoded, time"] = results[name]["cpu_s"]["median"] / decoded["cpu_s"]["median"]
+        ratios[f"{name} / decoded, memory"] = results[name]["peak_mb"] / max(1.0, decoded["peak_mb"])
+    return {
+        "question": __doc__.splitlines()[0],
+        **stamp(),
+        "bytes": raw.size,
+        "results": results,
+        "ratios": ratios,
+        "stable": True,
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps(run(quick="--quick" in sys.argv), indent=1))

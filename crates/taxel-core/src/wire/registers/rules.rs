@@ -1,0 +1,108 @@
+//! Made from registers.toml by tools/registers.py (`make registers`): edit that.
+
+use super::field::{Scanned, us};
+use super::table::Registers;
+
+/// The first rule that refuses these registers, with its numbers.
+pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {
+    let wire_version = i64::from(registers.wire_version);
+    let line_period = i64::from(registers.line_period);
+    let line_read = i64::from(registers.line_read);
+    let step_period = i64::from(registers.step_period);
+    let step_read = i64::from(registers.step_read);
+    let ramp = i64::from(registers.ramp);
+    let lines = i64::from(registers.lines);
+    let channels = i64::from(registers.channels);
+    let steps = i64::from(scanned.steps);
+    let driven_lines = i64::from(scanned.driven_lines);
+    let sense_lines = i64::from(scanned.sense_lines);
+    if lines > driven_lines {
+        return Some((4, format!("{} lines: the array has {} columns to drive (rule 4)", lines, driven_lines)));
+    }
+    if line_read > line_period {
+        return Some((
+            1,
+            format!("line_read {} us is longer than line_period {} us (rule 1)", us(line_read), us(line_period)),
+        ));
+    }
+    if step_read > step_period {
+        return Some((
+            1,
+            format!("step_read {} us is longer than step_period {} us (rule 1)", us(step_read), us(step_period)),
+        ));
+    }
+    if steps * step_period > line_read {
+        return Some((
+            2,
+            format!(
+                "{} x step_period {} us is longer than line_read {} us (rule 2)",
+                steps,
+                us(step_period),
+                us(line_read)
+            ),
+        ));
+    }
+    if ramp >= 3 * step_read {
+        return Some((
+            3,
+            format!(
+                "ramp {} ticks is not shorter than step_read {} us = {} ticks (rule 3)",
+                ramp,
+                us(step_read),
+                3 * step_read
+            ),
+        ));
+    }
+    if channels + 10 > step_period {
+        return Some((
+            7,
+            format!(
+                "step_period {} us is too short for {} channels: the logic compares one a clock and wants {} us (rule 7)",
+                us(step_period),
+                channels,
+                us(channels + 10)
+            ),
+        ));
+    }
+    if wire_version != 2 && (driven_lines > 64 || sense_lines > 64) {
+        return Some((
+            8,
+            format!(
+                "version 1 of the wire names 64 x 64 taxels, the array has {} x {}: choose version 2 (rule 8)",
+                sense_lines, driven_lines
+            ),
+        ));
+    }
+    None
+}
+
+/// What is allowed but hardly meant.
+pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {
+    let mut warnings = vec![];
+    let step_period = i64::from(registers.step_period);
+    let step_read = i64::from(registers.step_read);
+    let ramp = i64::from(registers.ramp);
+    let noise_floor = i64::from(registers.noise_floor);
+    if step_period - step_read < 20 {
+        warnings.push((
+            5,
+            format!(
+                "step_period {} us leaves {} us before step_read {} us: taxels settle in {} us (rule 5)",
+                us(step_period),
+                us(step_period - step_read),
+                us(step_read),
+                us(20)
+            ),
+        ));
+    }
+    if noise_floor >= ramp {
+        warnings.push((
+            6,
+            format!(
+                "noise_floor {} ticks is not below ramp {} ticks: no event can ever come (rule 6)",
+                noise_floor, ramp
+            ),
+        ));
+    }
+    warnings
+}

@@ -1,0 +1,100 @@
+//! Datagrams of version 2 to events.
+
+use super::*;
+use crate::board::Board;
+use crate::wire::Registers;
+use crate::wire::v2::Kind;
+
+/// A datagram with its checksum.
+fn datagram(kind: Kind, session: u16, sequence: u32, base: u64, body: &[u8]) -> Vec<u8> {
+    let (kind, stride) = (kind as u8, crate::wire::v2::stride(64));
+    let header = Header { kind, board: 0, sequence, base, session, stride, line: 0, flags: 0, span: 0 };
+    let mut bytes = vec![];
+    header.write(body, &mut bytes);
+    bytes
+}
+
+#[test]
+fn changes_as_they_are_go_the_short_way_where_the_machine_has_it() {
+    let short = usize::from(Instructions::best() == Instructions::Avx512Bytes);
+    for (kind, body, flags, taken) in [
+        (Kind::Small, vec![], 0, short),
+        (Kind::Small, vec![5, 0x80, 7, 0x03], FRAME_SYNC, short),
+        // Advances, and more words than eight.
+        (Kind::Small, [1, 0x7f, 5, 0x83].repeat(6), 0, short),
+        (Kind::Changes, vec![5, 0x80], 0, short),
+        (Kind::Large, vec![5, 1, 0, 0x80], 0, short),
+        // A time, differences, what the board dropped, states, a part of a word, a place beyond the array, a long one.
+        (Kind::Small, vec![0, 0xff, 9, 0, 5, 0x83], 0, 0),
+        (Kind::Small, vec![5, 0x80], DIFFERENCES, 0),
+        (Kind::Small, vec![5, 0x80], DROPPED, 0),
+        (Kind::SmallStates, vec![5, 0x80], 0, 0),
+        (Kind::Small, vec![5, 0x80, 7], 0, 0),
+        (Kind::Small, vec![63, 0x7f, 0, 0], 0, 0),
+        (Kind::Small, [5, 0x80].repeat(30), 0, 0),
+    ] {
+        let mut decoder = Decoder::new(Array::thesis());
+        let mut events = Events::empty(Array::thesis());
+        decoder.push(&datagram(Kind::Small, 1, 0, 0, &[9, 0]), None, &mut events);
+        let mut bytes = datagram(kind, 1, 1, 192, &body);
+        bytes[17] |= flags;
+        let sum = bytes.len() - 4;
+        let sealed = crc32c::crc32c(&bytes[..sum]).to_le_bytes();
+        bytes[sum..].copy_from_slice(&sealed);
+        let plain = decoder.plain(std::iter::once(&bytes[..]), stream_rows(bytes.len()), &mut events);
+        assert_eq!(plain.datagrams, taken, "{kind:?}, flags {flags}, {body:?}");
+    }
+}
+
+#[test]
+fn the_newest_status_of_the_latest_session_counts() {
+    let mut decoder = Decoder::new(Array::thesis());
+    let mut events = Events::empty(Array::thesis());
+    let totals = |n: u64| [n; 5].map(u64::to_le_bytes).concat();
+    for (session, sequence, body, frames) in [
+        (1, 5, totals(50), 50),
+        (1, 4, totals(40), 50),
+        (1, 7, totals(70)[..39].to_vec(), 50),
+        (2, 0, totals(1), 1),
+        (1, 9, totals(90), 1),
+        (2, 1, totals(2), 2),
+    ] {
+        decoder.push(&datagram(Kind::Status, session, sequence, 1000, &body), None, &mut events);
+        assert_eq!(decoder.status().unwrap().frames, frames, "session {session}, number {sequence}");
+    }
+    assert_eq!((decoder.counts().malformed, decoder.counts().intact), (1, 6));
+}
+
+#[test]
+fn a_straggler_of_before_a_reset_changes_nothing_that_is_held_since() {
+    let array = Array::thesis();
+    let registers = Registers { wire_version: 2, ..Registers::default() };
+    let mut board = Board::new(registers, &array).unwrap();
+    let mut said = |ticks: u16, taxels: usize| {
+        let mut out = vec![];
+        for level in [0, ticks, ticks + 20] {
+            let mut pressed = vec![0; 4096];
+            pressed[..taxels].fill(level);
+            board
+                .frame(&pressed, |datagram| {
+                    out.push(datagram.to_vec());
+                    true
+                })
+                .unwrap();
+        }
+        board.reset().unwrap();
+        out
+    };
+    let (before, since) = (said(50, 4096), said(200, 100));
+    let (late, begun) = before.split_last().unwrap();
+    let mut decoder = Decoder::new(array.clone());
+    let mut events = Events::empty(array);
+    for datagram in begun.iter().chain(&since) {
+        decoder.push(datagram, None, &mut events);
+    }
+    let held = decoder.held();
+    let heard = events.len();
+    assert!(matches!(decoder.push(late, None, &mut events), Heard::Intact { reset: false, .. }));
+    assert!(events.len() > heard, "its events are events");
+    assert_eq!(decoder.held(), held);
+}

@@ -1,0 +1,332 @@
+//! Events of any origin as datagrams of version 2, in their own order: what a file keeps of a table.
+//!
+//! Unlike a board ([`super::Packer`]) a table may step back in time, mix events with values and without, and hold events
+//! that states gave. Every event is written; decoding gives back the same columns.
+
+use super::packer::{add, first_line, put, steps};
+use super::{
+    BASE_BITS, DATAGRAM_BYTES, HEADER_BYTES, Header, Kind, LATEST_OFFSET, Layout, START, STOP, TRAILER_BYTES, before,
+    checked_stride,
+};
+use crate::events::EventsView;
+use crate::{Result, problem};
+
+/// Bytes of a body at most.
+const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
+
+/// The first number: 0 would say that the board was reset, and that every taxel holds 0.
+const FIRST_SEQUENCE: u32 = 1;
+
+/// Before any time.
+const NEVER: i64 = i64::MIN;
+
+/// Events as datagrams.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Encoded {
+    /// What is added to times in the datagrams, us.
+    pub origin_us: i64,
+    /// Where each begins, and at last where all end.
+    pub offsets: Vec<i64>,
+    /// Their bytes.
+    pub bytes: Vec<u8>,
+    /// A time of each, us: what it promises, or the latest of its events.
+    pub times: Vec<i64>,
+    /// The numbers of events that are marked as repaired and could not be written as states: a decoder would have made another
+    /// event of them.
+    pub unmarked: Vec<i64>,
+}
+
+/// Writes events as datagrams.
+///
+/// `held` is what the taxels hold at first by index, 65 535 where that is not known: what a file says before its first datagram.
+/// With `promised` each datagram promises that nothing before a time follows, as far as that is so.
+///
+/// # Errors
+///
+/// `Problem` where the array has more than 65 536 positions, or times span more than 8.9 years.
+pub fn encode(events: EventsView<'_>, held: Option<&[u16]>, promised: bool) -> Result<Encoded> {
+    let times = || events.t.iter().copied().chain(events.markers.iter().map(|marker| marker.t));
+    let (first, last) = (times().min().unwrap_or(0), times().max().unwrap_or(0));
+    let fits = |origin: i64| first >= origin && last.abs_diff(origin) < 1 << BASE_BITS;
+    let origin_us = if fits(0) { 0 } else { first };
+    if !fits(origin_us) {
+        return Err(problem!("times from {first} to {last} us: a file of datagrams holds at most 8.9 years"));
+    }
+    let mut writer = Writing::new(events, held, origin_us)?;
+    // The earliest time from each event on, and behind the last one.
+    let mut from_here = vec![i64::MAX; events.t.len() + 1];
+    if promised {
+        for k in (0..events.t.len()).rev() {
+            from_here[k] = from_here[k + 1].min(events.t[k]);
+        }
+    } else {
+        from_here.fill(NEVER);
+    }
+    let mut markers = events.markers.iter().peekable();
+    for k in 0..events.t.len() {
+        while let Some(marker) = markers.next_if(|marker| marker.t <= events.t[k]) {
+            writer.flush(from_here[k]);
+            writer.marker(marker.t, marker.start);
+        }
+        writer.event(k, from_here[k]);
+    }
+    writer.flush(from_here[events.t.len()]);
+    for marker in markers {
+        writer.marker(marker.t, marker.start);
+    }
+    writer.out.offsets.push(writer.out.bytes.len() as i64);
+    Ok(writer.out)
+}
+
+/// The datagram that fills, and what a decoder holds after what is written.
+struct Writing<'a> {
+    events: EventsView<'a>,
+    out: Encoded,
+    sequence: u32,
+    stride: u8,
+    /// Whether every value fits 8 bits.
+    small: bool,
+    kind: Kind,
+    body: Vec<u8>,
+    base: i64,
+    at: i64,
+    latest: i64,
+    line: u8,
+    position: i64,
+    values: Vec<u16>,
+    since: Vec<i64>,
+}
+
+impl<'a> Writing<'a> {
+    fn new(events: EventsView<'a>, held: Option<&[u16]>, origin_us: i64) -> Result<Self> {
+        let stride = checked_stride(events.array)?;
+        let values = held.map_or_else(|| vec![u16::MAX; events.array.len()], <[u16]>::to_vec);
+        let since = values.iter().map(|&value| if value == u16::MAX { NEVER } else { NEVER + 1 }).collect();
+        let small = events.intensity.is_none_or(|all| all.ticks.iter().all(|&ticks| ticks <= u16::from(u8::MAX)));
+        Ok(Self {
+            events,
+            out: Encoded { origin_us, ..Encoded::default() },
+            sequence: FIRST_SEQUENCE,
+            stride,
+            small,
+            kind: Kind::Changes,
+            body: vec![],
+            base: 0,
+            at: 0,
+            latest: 0,
+            line: 0,
+            position: -1,
+            values,
+            since,
+        })
+    }
+
+    /// Adds an event; nothing from here on is earlier than `promise`.
+    fn event(&mut self, k: usize, promise: i64) {
+        let events = self.events;
+        let (t, x, y, p) = (events.t[k], events.x[k], events.y[k], events.p[k]);
+        let value = events.intensity.filter(|all| all.present[k]).map(|all| all.ticks[k]);
+        let index = usize::from(y) * usize::from(events.array.columns) + usize::from(x);
+        let kind = self.kind_of(k, index, value);
+        let position = i64::from(x) << self.stride | i64::from(y);
+        let Some(word) = kind.layout() else { return };
+        let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
+        let offset = t.checked_sub(self.base).and_then(|us| u64::try_from(us).ok());
+        // A state's time is that of its datagram, and its places ascend.
+        let goes_on = !self.body.is_empty()
+            && kind == self.kind
+            && offset.is_some_and(|us| if states { us == 0 && position > self.position } else { us <= LATEST_OFFSET })
+            && self.body.len() + self.room(word, t, position) <= BODY_BYTES;
+        if !goes_on {
+            self.flush(promise);
+            (self.kind, self.base, self.at, self.latest, self.line) = (kind, t, t, t, first_line(x));
+            self.position = before(self.line, self.stride);
+        }
+        if t != self.at || position <= self.position {
+            put(&mut self.body, word, true, word.control(), 0);
+            let offset = ((t - self.base) as u32).to_le_bytes();
+            self.body.extend(&offset[..word.bytes]);
+            (self.at, self.position) = (t, -1);
+        }
+        add(&mut self.body, word, position - self.position - 1, p, value.unwrap_or(0));
+        (self.position, self.latest) = (position, self.latest.max(t));
+        if let Some(value) = value
+            && t >= self.since[index]
+        {
+            (self.values[index], self.since[index]) = (value, t);
+        }
+    }
+
+    /// What an event is written as: a state only where a decoder makes the same event of it.
+    fn kind_of(&mut self, k: usize, index: usize, value: Option<u16>) -> Kind {
+        let repaired = self.events.is_repaired(k);
+        let Some(value) = value else {
+            self.out.unmarked.extend(repaired.then_some(k as i64));
+            return Kind::Changes;
+        };
+        let (before, known) = (self.values[index], self.since[index] != NEVER);
+        let same = !(known && before == value)
+            && self.events.t[k] >= self.since[index]
+            && self.events.p[k] == (!known || value > before);
+        self.out.unmarked.extend((repaired && !same).then_some(k as i64));
+        match (repaired && same, self.small) {
+            (false, true) => Kind::Small,
+            (false, false) => Kind::Large,
+            (true, true) => Kind::SmallStates,
+            (true, false) => Kind::LargeStates,
+        }
+    }
+
+    /// Bytes that an event takes at most in the body that fills.
+    fn room(&self, word: Layout, t: i64, position: i64) -> usize {
+        let again = t != self.at || position <= self.position;
+        let gap = if again { position } else { position - self.position - 1 };
+        word.bytes * (steps(word, gap) + if again { 2 } else { 0 })
+    }
+
+    /// Ends the datagram that fills, where there is one; nothing behind it is earlier than `promise`.
+    fn flush(&mut self, promise: i64) {
+        if self.body.is_empty() {
+            return;
+        }
+        let body = std::mem::take(&mut self.body);
+        // A promise at the end of all is that of the last event.
+        let until = if promise == i64::MAX { self.latest + 1 } else { promise };
+        let span = until.saturating_sub(self.base).clamp(0, i64::from(u16::MAX)) as u16;
+        let time = if span > 0 { self.base + i64::from(span) } else { self.latest };
+        self.write(self.kind, (self.base, self.line, span), &body, time);
+        self.body = body;
+        self.body.clear();
+    }
+
+    fn marker(&mut self, t: i64, start: bool) {
+        let mut body = vec![0; 4];
+        body.extend((if start { START } else { STOP }).to_le_bytes());
+        body.extend([0, 0]);
+        self.write(Kind::Markers, (t, 0, 0), &body, t);
+    }
+
+    fn write(&mut self, kind: Kind, (base, line, span): (i64, u8, u16), body: &[u8], time: i64) {
+        let header = Header {
+            kind: kind.number(),
+            board: 0,
+            sequence: self.sequence,
+            base: base.abs_diff(self.out.origin_us),
+            session: 0,
+            stride: self.stride,
+            line,
+            flags: 0,
+            span,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        let mut datagram = Vec::with_capacity(DATAGRAM_BYTES);
+        header.write(body, &mut datagram);
+        self.out.offsets.push(self.out.bytes.len() as i64);
+        self.out.bytes.extend(datagram);
+        self.out.times.push(time);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::v2::Decoder;
+    use crate::{Array, Events, Intensities, Marker};
+
+    /// Decodes what was written, as a file's reader does.
+    fn again(encoded: &Encoded, array: &Array, held: Option<&[u16]>) -> Events {
+        let (mut decoder, mut events) = (Decoder::new(array.clone()), Events::empty(array.clone()));
+        decoder.begin_with(held.unwrap_or_default().iter().map(|&h| (h != u16::MAX).then_some(h)));
+        for pair in encoded.offsets.windows(2) {
+            decoder.push(&encoded.bytes[pair[0] as usize..pair[1] as usize], None, &mut events);
+        }
+        events.t.iter_mut().for_each(|t| *t += encoded.origin_us);
+        events.markers.iter_mut().for_each(|m| m.t += encoded.origin_us);
+        assert_eq!((decoder.counts().intact, decoder.counts().missing), (encoded.offsets.len() as u64 - 1, 0));
+        events
+    }
+
+    #[test]
+    fn any_table_comes_back_in_its_own_order() {
+        let mut seed = 7_u64;
+        let mut draw = |n: u64| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) % n
+        };
+        for round in 0..300 {
+            let array = Array::new(1 + draw(90) as u16, 1 + draw(200) as u16, 1.0, "any").unwrap();
+            let n = draw(if round % 10 == 0 { 4000 } else { 60 }) as usize;
+            let mut t = draw(1 << 40) as i64 - (1 << 39);
+            let large = round % 2 == 0;
+            let mut events = Events::empty(array.clone());
+            let (mut ticks, mut present) = (vec![], vec![]);
+            for _ in 0..n {
+                t += match draw(8) {
+                    0 => -(draw(100_000) as i64),
+                    1 => draw(1 << 30) as i64,
+                    2 | 3 => draw(40_000) as i64,
+                    _ => 0,
+                };
+                events.t.push(t);
+                events.x.push(draw(array.columns.into()) as u16);
+                events.y.push(draw(array.rows.into()) as u16);
+                events.p.push(draw(2) == 0);
+                let there = round % 3 != 0 && draw(5) > 0;
+                present.push(there);
+                ticks.push(if there { draw(if large { 65_536 } else { 256 }) as u16 } else { 0 });
+            }
+            if present.iter().any(|&there| there) {
+                events.intensity = Some(Intensities { ticks, present });
+            }
+            for _ in 0..draw(4) {
+                events.markers.push(Marker { t: t - draw(1000) as i64, start: draw(2) == 0 });
+            }
+            events.markers.sort_by_key(|marker| marker.t);
+            for promised in [false, true] {
+                let encoded = encode(events.view(), None, promised).unwrap();
+                assert_eq!(again(&encoded, &array, None), events, "round {round}");
+                assert_eq!(encoded.unmarked, [0; 0]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_promise_holds_of_all_that_follows() {
+        let array = Array::thesis();
+        let mut events = Events::empty(array);
+        for (k, t) in [0, 100, 50, 40_000, 200_000, 199_000].into_iter().enumerate() {
+            events.t.push(t);
+            events.x.push(k as u16);
+            events.y.push(0);
+            events.p.push(true);
+        }
+        let encoded = encode(events.view(), None, true).unwrap();
+        let mut earliest = i64::MAX;
+        for pair in encoded.offsets.windows(2).rev() {
+            let (header, _) = Header::read(&encoded.bytes[pair[0] as usize..pair[1] as usize]).unwrap();
+            assert!(header.base as i64 + i64::from(header.span) <= earliest);
+            earliest = earliest.min(header.base as i64);
+        }
+    }
+
+    #[test]
+    fn what_a_state_gave_stays_marked_where_a_decoder_can_give_it_again() {
+        let array = Array::new(2, 2, 1.0, "four").unwrap();
+        let mut events = Events::empty(array.clone());
+        // Known 5 to 9, unknown to 7, 9 to 9 (no event of a decoder), 9 to 3 said to rise.
+        for (t, x, p, repaired) in [(0, 0, true, true), (1, 1, true, true), (2, 0, true, true), (3, 0, true, true)] {
+            events.t.push(t);
+            events.x.push(x);
+            events.y.push(0);
+            events.p.push(p);
+            events.repaired.get_or_insert_default().push(repaired);
+        }
+        events.intensity = Some(Intensities { ticks: vec![9, 7, 9, 3], present: vec![true; 4] });
+        let held = [5, u16::MAX, u16::MAX, u16::MAX];
+        let encoded = encode(events.view(), Some(&held), false).unwrap();
+        assert_eq!(encoded.unmarked, [2, 3]);
+        let back = again(&encoded, &array, Some(&held));
+        assert_eq!(back.repaired, Some(vec![true, true, false, false]));
+        assert_eq!((&back.t, &back.p, &back.intensity), (&events.t, &events.p, &events.intensity));
+    }
+}

@@ -1,0 +1,138 @@
+//! Recordings that begin and end while the pipeline runs, of all its sources: those of `taxel record` and of the panel.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, Weak};
+
+use crossbeam_channel as channel;
+use taxel_core::problem;
+
+use super::counters::{Counters, SourceCounts, Summary};
+use super::options::{LiveOptions, Record};
+use super::recorder::{Host, Part, Recorder, losses};
+use super::shared::{Ended, Request, Shared};
+use super::sources::Numbers;
+use crate::capture::Origin;
+use crate::locked::lock;
+use crate::recording::Counts;
+use crate::{Error, Result};
+
+/// Begins and ends the recordings of a pipeline.
+pub(super) struct Recordings {
+    shared: Arc<Shared>,
+    /// The other sources of a recording, by name.
+    boards: Vec<(String, Arc<Shared>)>,
+    numbers: Vec<(String, Arc<Numbers>)>,
+    /// Held while one recording replaces another.
+    replacing: Mutex<()>,
+}
+
+impl Recordings {
+    pub(super) fn new(
+        shared: Arc<Shared>,
+        boards: Vec<(String, Arc<Shared>)>,
+        numbers: Vec<(String, Arc<Numbers>)>,
+    ) -> Self {
+        Self { shared, boards, numbers, replacing: Mutex::default() }
+    }
+
+    /// As [`Handle::record`](super::Handle::record).
+    pub(super) fn record(&self, record: &Record) -> Result<Option<Summary>> {
+        if !self.shared.records.load(Ordering::Acquire) {
+            // An error that ended an earlier recording and that nobody has been given.
+            self.take_error()?;
+        }
+        let options = &self.shared.options;
+        let header = LiveOptions { registers: *lock(&self.shared.registers), ..options.clone() };
+        let next = Recorder::reserve(record, &header, self.shared.receiver.place())?;
+        self.replace(Some(next))
+    }
+
+    /// As [`Handle::end_recording`](super::Handle::end_recording).
+    pub(super) fn end(&self) -> Result<Summary> {
+        self.replace(None)?.ok_or_else(|| problem!("nothing is recorded").into())
+    }
+
+    /// As [`Handle::records`](super::Handle::records).
+    pub(super) fn run(&self) -> bool {
+        let whole = |board: &Arc<Shared>| lock(&board.broken).is_none();
+        self.shared.records.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| whole(board))
+    }
+
+    /// The error that ended a recording early, of this board or another one.
+    fn take_error(&self) -> Result<()> {
+        let all = self.boards.iter().map(|(_, board)| board).chain([&self.shared]);
+        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.broken).take()).collect();
+        errors.into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Ends the recording that runs and begins the next one, where there is one; returns how the first ended.
+    fn replace(&self, next: Option<Recorder>) -> Result<Option<Summary>> {
+        let replacing = lock(&self.replacing);
+        let mut sources = BTreeMap::new();
+        let mut ended = vec![];
+        for (name, board) in &self.boards {
+            let host: Weak<dyn Host> = Arc::<Shared>::downgrade(&self.shared);
+            let part = Part { host, name: name.clone() };
+            let place = board.receiver.place();
+            let part = next.as_ref().map(|next| next.part_of(part, &board.options, place)).transpose()?;
+            let (recorder, counts) = replace_of(board, part)?;
+            let counters =
+                recorder.as_ref().and_then(Recorder::since).map_or_else(Counters::default, |s| counts.since(s));
+            sources.insert(name.clone(), SourceCounts::Board(Box::new(counters)));
+            ended.push((recorder, counts));
+        }
+        for (name, numbers) in &self.numbers {
+            let track = next.as_ref().map(|next| next.writer(name)).transpose()?;
+            sources.insert(name.clone(), numbers.keep_in(track));
+        }
+        let (recorder, counters) = replace_of(&self.shared, next)?;
+        // Parts end before the whole.
+        for (part, counts) in ended {
+            part.map_or(Ok(None), |part| part.finish(&counts))?;
+        }
+        drop(replacing);
+        self.take_error()?;
+        let Some(recorder) = recorder else { return Ok(None) };
+        let came =
+            Counters { sources, ..recorder.since().map_or_else(Counters::default, |since| counters.since(since)) };
+        let lost = recorder.losses(&counters);
+        let path = recorder.finish(&counters)?;
+        let verdict = verdict(self.shared.receiver.place(), &came, came.nothing_came(), &lost);
+        let tare = self.shared.published().tare.clone();
+        Ok(Some(Summary { counters: came, verdict, path, tare }))
+    }
+}
+
+/// Has the decoding thread of one board record into `next`, or into nothing; returns the recorder before it.
+fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
+    // Set before the request, so that the recording runs for whoever asks after this call.
+    shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
+    let (give, ended) = channel::bounded(1);
+    shared.request(Request::Record(next.map(Box::new), give));
+    let ended = shared.wait(&ended).and_then(std::convert::identity);
+    if ended.is_err() {
+        shared.records.store(lock(&shared.recorder).is_some(), Ordering::Release);
+    }
+    ended
+}
+
+/// One line: what was lost, or that nothing arrived.
+pub(super) fn verdict(place: &Origin, counters: &Counters, nothing: bool, lost: &Counts) -> String {
+    let verdict = if nothing { nothing_arrived(place, counters.seconds) } else { lost.verdict() };
+    let others = counters.sources.iter().filter_map(|(name, counts)| match counts {
+        SourceCounts::Board(counts) => Some(format!("{name}: {}", losses(counts, None).verdict())),
+        SourceCounts::Numbers { strange: 0, .. } => None,
+        SourceCounts::Numbers { strange, .. } => Some(format!("{name}: {strange} lines could not be read")),
+    });
+    std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ")
+}
+
+/// What to check where nothing arrived.
+fn nothing_arrived(place: &Origin, seconds: f64) -> String {
+    let ask = match place {
+        Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
+        Origin::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
+    };
+    format!("nothing arrived at {place} in {seconds:.1} s: {ask}")
+}

@@ -1,0 +1,502 @@
+//! What the array holds at a moment: held values, rest, the largest recent changes, and the last seconds by column of time.
+//!
+//! The same for live events and for recordings: a state that was begun earlier and one that was begun from a keyframe are
+//! equal as soon as [`FORGET`] columns of time have passed.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
+use taxel_live::pipeline::{Change, UNKNOWN};
+
+/// Columns of [`COLUMN_US`] after which a change has decayed: 127, less a sixteenth per column, is then 0.
+pub const FORGET: i64 = 64;
+
+/// Size of a change whose event has no value.
+const UNVALUED: i8 = 16;
+
+/// State of an array at a moment, from which an [`ArrayState`] can begin.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Keyframe {
+    /// Board time of the latest event, us; `None` before the first.
+    pub latest: Option<i64>,
+    /// Number of events up to there.
+    pub events: u64,
+    /// Held value of each taxel; [`UNKNOWN`] before its first event.
+    pub held: Vec<u16>,
+    /// Value of each taxel at rest.
+    pub rest: Vec<u16>,
+}
+
+/// Held values, rest and recent changes of every taxel, with raster and curves by column of time.
+#[derive(Debug, Clone)]
+pub struct ArrayState {
+    /// Column and row of each taxel, looked up because a division per change would dominate the cost.
+    places: Arc<[(u16, u16)]>,
+    floor: u16,
+    held: Vec<u16>,
+    rest: Vec<u16>,
+    /// Whether the rest follows the lowest value so far; otherwise it was set.
+    rest_is_lowest: bool,
+    /// Taxels whose rest was set one by one: a lower value does not change it.
+    zeroed: BTreeSet<usize>,
+    /// Number of changes of the rest.
+    rests: u64,
+    change: Vec<i8>,
+    time_columns: TimeColumns,
+    column_us: i64,
+    /// The current column of time.
+    column: Option<i64>,
+    /// The current column of [`COLUMN_US`], by which changes decay.
+    decay_column: i64,
+    /// Times that lie in both current columns, us.
+    within: std::ops::Range<i64>,
+    latest: Option<i64>,
+    /// Number of times that time was set back or the board was reset.
+    restarts: u64,
+    events: u64,
+    sum: u64,
+    sum_x: u64,
+    sum_y: u64,
+    area: u32,
+}
+
+impl ArrayState {
+    /// State of an array with `columns` columns, begun from a keyframe; its columns of time are `column_us` wide.
+    #[must_use]
+    pub fn new(columns: u16, floor: u16, from: &Keyframe, column_us: i64, time_column_bytes: usize) -> Self {
+        let columns = usize::from(columns).max(1);
+        // An array has 65 535 rows and columns at most.
+        #[allow(clippy::cast_possible_truncation)]
+        let place = |taxel: usize| ((taxel % columns) as u16, (taxel / columns) as u16);
+        let mut state = Self {
+            places: (0..from.held.len()).map(place).collect(),
+            floor,
+            held: from.held.clone(),
+            rest: from.rest.clone(),
+            rest_is_lowest: true,
+            zeroed: BTreeSet::new(),
+            rests: 1,
+            change: vec![0; from.held.len()],
+            time_columns: TimeColumns::new(from.held.len() / columns, time_column_bytes),
+            column_us,
+            column: None,
+            decay_column: 0,
+            within: 0..0,
+            latest: from.latest,
+            restarts: 0,
+            events: from.events,
+            sum: 0,
+            sum_x: 0,
+            sum_y: 0,
+            area: 0,
+        };
+        state.sum_above_rest();
+        if let Some(t) = from.latest {
+            state.advance(t);
+        }
+        state
+    }
+
+    /// A keyframe of the current state.
+    #[must_use]
+    pub fn keyframe(&self) -> Keyframe {
+        Keyframe { latest: self.latest, events: self.events, held: self.held.clone(), rest: self.rest.clone() }
+    }
+
+    /// Computes the sums above rest from all taxels.
+    fn sum_above_rest(&mut self) {
+        (self.sum, self.sum_x, self.sum_y, self.area) = (0, 0, 0, 0);
+        for taxel in 0..self.held.len() {
+            self.change_above_rest(taxel, 0, self.above(taxel));
+        }
+    }
+
+    /// Ticks of a taxel above rest; 0 up to the noise floor.
+    fn above(&self, taxel: usize) -> u16 {
+        let (held, rest) = (self.held[taxel], self.rest[taxel]);
+        let above = held.saturating_sub(rest);
+        // No branch: which taxels are pressed is unpredictable.
+        if (held != UNKNOWN) & (rest != UNKNOWN) & (above > self.floor) { above } else { 0 }
+    }
+
+    /// Updates the sums for a taxel that was `before` ticks above rest and is `now`.
+    fn change_above_rest(&mut self, taxel: usize, before: u16, now: u16) {
+        let (x, y) = self.places[taxel];
+        // A decrease wraps to a large number; the sums are right modulo 2^64.
+        let moved = u64::from(now).wrapping_sub(before.into());
+        self.sum = self.sum.wrapping_add(moved);
+        self.sum_x = self.sum_x.wrapping_add(moved.wrapping_mul(x.into()));
+        self.sum_y = self.sum_y.wrapping_add(moved.wrapping_mul(y.into()));
+        self.area = self.area + u32::from(now > 0) - u32::from(before > 0);
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
+    fn curve(&self) -> Curve {
+        if self.sum == 0 {
+            return NOTHING;
+        }
+        let (x, y) = (self.sum_x as f64 / self.sum as f64, self.sum_y as f64 / self.sum as f64);
+        Curve { sum: self.sum.min(u64::from(u32::MAX)) as u32, area: self.area, x: x as f32, y: y as f32 }
+    }
+
+    /// Applies changes in order; those of one time together, because most of the work is per time.
+    pub fn apply(&mut self, changes: &[Change]) {
+        for together in changes.chunk_by(|one, next| one.t == next.t) {
+            let t = together[0].t;
+            self.advance(t);
+            self.events += together.len() as u64;
+            together.iter().for_each(|change| self.apply_to_taxel(change));
+            let column = match self.column {
+                Some(column) if self.within.contains(&t) => column,
+                _ => column_of(t, self.column_us),
+            };
+            self.time_columns
+                .count(column, together.iter().map(|change| (self.places[change.taxel as usize].1, change.up)));
+        }
+    }
+
+    /// Applies a single change.
+    #[cfg(test)]
+    pub fn apply_one(&mut self, change: &Change) {
+        self.apply(std::slice::from_ref(change));
+    }
+
+    /// Updates the held value, rest and recent change of the taxel of a change.
+    #[inline]
+    fn apply_to_taxel(&mut self, change: &Change) {
+        let taxel = change.taxel as usize;
+        if change.ticks == UNKNOWN {
+            let size = if change.up { UNVALUED } else { -UNVALUED };
+            self.change[taxel] = self.change[taxel].saturating_add(size).max(-127);
+            return;
+        }
+        let before = self.held[taxel];
+        // The first value of a taxel is not a change.
+        let moved = if before == UNKNOWN { 0 } else { i32::from(change.ticks) - i32::from(before) };
+        #[allow(clippy::cast_possible_truncation)]
+        let size = moved.clamp(-127, 127) as i8;
+        let largest = self.change[taxel];
+        self.change[taxel] = if size.unsigned_abs() >= largest.unsigned_abs() { size } else { largest };
+        let above = self.above(taxel);
+        self.held[taxel] = change.ticks;
+        if (self.rest[taxel] == UNKNOWN || self.rest_is_lowest && change.ticks < self.rest[taxel])
+            && !self.zeroed.contains(&taxel)
+        {
+            self.rest[taxel] = change.ticks;
+            self.rests += 1;
+        }
+        self.change_above_rest(taxel, above, self.above(taxel));
+    }
+
+    /// Moves time forward; an earlier time does nothing.
+    pub fn advance(&mut self, t: i64) {
+        if self.latest.is_some_and(|latest| t < latest) {
+            return;
+        }
+        self.latest = Some(t);
+        if self.within.contains(&t) {
+            return;
+        }
+        let (column, decay_column) = (column_of(t, self.column_us), column_of(t, COLUMN_US));
+        match self.column {
+            None => self.decay_column = decay_column,
+            Some(now) if now == column => {}
+            Some(now) => {
+                let curve = self.curve();
+                self.time_columns.set_curve(now, curve);
+                if column > now + 1 {
+                    self.time_columns.set_curve(now + 1, curve);
+                }
+            }
+        }
+        for _ in 0..(decay_column - self.decay_column).min(FORGET) {
+            for change in &mut self.change {
+                // Towards 0, so that 1 becomes 0.
+                #[allow(clippy::cast_possible_truncation)]
+                {
+                    *change = (i16::from(*change) * 15 / 16) as i8;
+                }
+            }
+        }
+        self.enter_column(column, decay_column);
+    }
+
+    /// Makes these the current columns.
+    fn enter_column(&mut self, column: i64, decay_column: i64) {
+        (self.column, self.decay_column) = (Some(column), decay_column);
+        let begin = (column * self.column_us).max(decay_column * COLUMN_US);
+        self.within = begin..((column + 1) * self.column_us).min((decay_column + 1) * COLUMN_US);
+        self.time_columns.extend_to(column);
+    }
+
+    /// Sets time back after it had been moved forward through an assumed silence; a later time does nothing.
+    pub fn set_back(&mut self, t: i64) {
+        if self.latest.is_none_or(|latest| latest <= t) {
+            return;
+        }
+        self.latest = Some(t);
+        let column = column_of(t, self.column_us);
+        self.time_columns.truncate_after(column);
+        self.enter_column(column, column_of(t, COLUMN_US));
+        self.restarts += 1;
+    }
+
+    /// Clears all held values after a reset of the board: they are unknown until the next event of each taxel.
+    pub fn clear(&mut self) {
+        self.held.fill(UNKNOWN);
+        self.sum_above_rest();
+        self.restarts += 1;
+    }
+
+    /// Number of times that time was set back or the board was reset.
+    #[must_use]
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+
+    /// Sets all held values where events are missing; `events` is the number of events up to now.
+    pub fn set_held(&mut self, held: &[u16], events: u64) {
+        self.held.copy_from_slice(held);
+        self.events = events;
+        for (taxel, (rest, &held)) in self.rest.iter_mut().zip(held).enumerate() {
+            let lower = *rest == UNKNOWN || self.rest_is_lowest && held < *rest;
+            if held != UNKNOWN && lower && !self.zeroed.contains(&taxel) {
+                *rest = held;
+                self.rests += 1;
+            }
+        }
+        self.sum_above_rest();
+    }
+
+    /// Sets the rest of one taxel, until the rest of all taxels is set.
+    pub fn zero(&mut self, taxel: usize, rest: u16) {
+        let above = self.above(taxel);
+        self.rest[taxel] = rest;
+        self.zeroed.insert(taxel);
+        self.rests += 1;
+        self.change_above_rest(taxel, above, self.above(taxel));
+    }
+
+    /// Sets the rest of all taxels to their held values.
+    pub fn rest_now(&mut self) {
+        self.zeroed.clear();
+        self.rest.copy_from_slice(&self.held);
+        (self.rest_is_lowest, self.rests) = (false, self.rests + 1);
+        self.sum_above_rest();
+    }
+
+    /// Lets the rest of all taxels follow their lowest value from now on.
+    pub fn rest_lowest(&mut self) {
+        self.zeroed.clear();
+        self.rest.copy_from_slice(&self.held);
+        (self.rest_is_lowest, self.rests) = (true, self.rests + 1);
+        self.sum_above_rest();
+    }
+
+    /// Copies rest and noise floor from another state of the same source, where they differ.
+    pub fn copy_rest(&mut self, other: &Self) {
+        if self.floor != other.floor || self.rest != other.rest {
+            self.floor = other.floor;
+            self.rest.copy_from_slice(&other.rest);
+            self.sum_above_rest();
+        }
+        self.rest_is_lowest = other.rest_is_lowest;
+        self.zeroed.clone_from(&other.zeroed);
+    }
+
+    /// Sets the noise floor: ticks above rest that count as none.
+    pub fn set_noise_floor(&mut self, floor: u16) {
+        self.floor = floor;
+        self.sum_above_rest();
+    }
+
+    /// Held value of each taxel.
+    #[must_use]
+    pub fn held(&self) -> &[u16] {
+        &self.held
+    }
+
+    /// Value of each taxel at rest.
+    #[must_use]
+    pub fn rest(&self) -> &[u16] {
+        &self.rest
+    }
+
+    /// Number of changes of the rest.
+    #[must_use]
+    pub fn rests(&self) -> u64 {
+        self.rests
+    }
+
+    /// The largest recent change of each taxel, ticks, decaying.
+    #[must_use]
+    pub fn change(&self) -> &[i8] {
+        &self.change
+    }
+
+    /// Board time of the state, us.
+    #[must_use]
+    pub fn latest(&self) -> Option<i64> {
+        self.latest
+    }
+
+    /// Number of events so far.
+    #[must_use]
+    pub fn events(&self) -> u64 {
+        self.events
+    }
+
+    /// Writes the current curve into the current column.
+    pub fn update_curve(&mut self) {
+        if let Some(now) = self.column {
+            let curve = self.curve();
+            self.time_columns.set_curve(now, curve);
+        }
+    }
+
+    /// Raster and curves; the current column is as of the last [`ArrayState::update_curve`].
+    #[must_use]
+    pub fn time_columns(&self) -> &TimeColumns {
+        &self.time_columns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::time_columns::SPAN;
+    use super::*;
+
+    fn blank(taxels: usize) -> Keyframe {
+        Keyframe { latest: None, events: 0, held: vec![UNKNOWN; taxels], rest: vec![UNKNOWN; taxels] }
+    }
+
+    fn change(t: i64, taxel: u32, ticks: u16) -> Change {
+        Change { t, taxel, ticks, up: true, repaired: false }
+    }
+
+    #[test]
+    fn a_state_from_a_keyframe_equals_one_from_the_beginning() {
+        [COLUMN_US, 500].into_iter().for_each(from_a_keyframe);
+    }
+
+    fn from_a_keyframe(us: i64) {
+        use rand::{Rng, SeedableRng, rngs::StdRng};
+        let mut random = StdRng::seed_from_u64(18);
+        let (taxels, mut t) = (12, 0_i64);
+        let mut changes = vec![];
+        for _ in 0..5000 {
+            // Pauses of an hour too.
+            t += match random.random_range(0..500) {
+                0 => 3_600_000_000,
+                // Of one moment.
+                1..200 => 0,
+                _ => random.random_range(0..5000),
+            };
+            // Some arrive late.
+            let back = if random.random_range(0..9) == 0 { random.random_range(0..9000) } else { 0 };
+            changes.push(change(t - back, random.random_range(0..taxels), random.random_range(0..300)));
+        }
+        let mut whole = ArrayState::new(4, 3, &blank(taxels as usize), us, 1 << 20);
+        let mut keyframes = vec![];
+        for (k, one) in changes.iter().enumerate() {
+            if k % 100 == 0 {
+                keyframes.push((k, whole.keyframe()));
+            }
+            whole.apply_one(one);
+        }
+        for (k, keyframe) in keyframes {
+            let mut fresh = ArrayState::new(4, 3, &keyframe, us, 1 << 20);
+            fresh.apply(&changes[k..]);
+            assert_eq!(fresh.held(), whole.held());
+            assert_eq!(fresh.rest(), whole.rest());
+            assert_eq!((fresh.events(), fresh.latest()), (whole.events(), whole.latest()));
+            let begun = keyframe.latest.map_or(0, |t| column_of(t, us));
+            let now = column_of(whole.latest().unwrap(), us);
+            if (now - begun) * us > FORGET * COLUMN_US {
+                assert_eq!(fresh.change(), whole.change());
+            }
+            fresh.update_curve();
+            whole.update_curve();
+            let (one, other) = (fresh.time_columns(), whole.time_columns());
+            for column in (begun + 30).max(now - SPAN)..=now {
+                let (mut a, mut b) = (vec![], vec![]);
+                one.raster(column, &mut a);
+                other.raster(column, &mut b);
+                assert_eq!(a, b, "column {column}");
+                assert_eq!(format!("{:?}", one.curve(column)), format!("{:?}", other.curve(column)), "column {column}");
+            }
+        }
+    }
+
+    #[test]
+    fn above_rest_is_more_than_the_floor_and_its_centre_is_known() {
+        let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        for taxel in 0..4 {
+            state.apply_one(&change(0, taxel, 48));
+        }
+        state.apply_one(&change(100, 0, 51));
+        state.update_curve();
+        assert_eq!(state.time_columns().curve(0).sum, 0, "the floor is no touch");
+        state.apply_one(&change(200, 0, 58));
+        state.apply_one(&change(300, 3, 78));
+        state.update_curve();
+        let curve = state.time_columns().curve(0);
+        assert_eq!((curve.sum, curve.area, curve.x, curve.y), (40, 2, 0.75, 0.75));
+        assert_eq!(state.change(), [7, 0, 0, 30], "the larger of two changes, 3 and 7");
+        state.rest_now();
+        state.update_curve();
+        assert_eq!(state.time_columns().curve(0).sum, 0);
+        state.advance(FORGET * COLUMN_US);
+        assert_eq!(state.change(), [0; 4]);
+    }
+
+    #[test]
+    fn a_zeroed_taxel_keeps_its_rest_until_the_rest_of_all_is_set() {
+        let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        for (t, ticks) in [(0, 40), (100, 60)] {
+            (0..4).for_each(|taxel| state.apply_one(&change(t, taxel, ticks)));
+        }
+        state.zero(1, 60);
+        state.update_curve();
+        assert_eq!((state.time_columns().curve(0).sum, state.time_columns().curve(0).area), (60, 3));
+        state.apply_one(&change(200, 1, 30));
+        state.apply_one(&change(200, 0, 30));
+        assert_eq!(state.rest(), [30, 60, 40, 40]);
+        state.apply_one(&change(300, 1, 80));
+        state.update_curve();
+        assert_eq!(state.time_columns().curve(0).sum, 60);
+        state.rest_lowest();
+        state.apply_one(&change(400, 1, 20));
+        assert_eq!(state.rest()[1], 20);
+    }
+
+    #[test]
+    fn time_set_back_removes_the_assumed_silence_and_goes_on() {
+        let mut once = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        let mut stalled = once.clone();
+        for t in [0, 40_000] {
+            once.apply_one(&change(t, 1, 60));
+            stalled.apply_one(&change(t, 1, 60));
+        }
+        stalled.advance(9_000_000);
+        stalled.set_back(40_000);
+        stalled.set_back(50_000);
+        for t in [80_000, 81_000] {
+            once.apply_one(&change(t, 2, 70));
+            stalled.apply_one(&change(t, 2, 70));
+        }
+        once.update_curve();
+        stalled.update_curve();
+        assert_eq!(stalled.restarts(), 1);
+        assert_eq!(stalled.time_columns().reach(), once.time_columns().reach());
+        for column in 0..=column_of(81_000, COLUMN_US) {
+            let (mut a, mut b) = (vec![], vec![]);
+            once.time_columns().raster(column, &mut a);
+            stalled.time_columns().raster(column, &mut b);
+            assert_eq!(a, b, "column {column}");
+            let curves = [once.time_columns().curve(column), stalled.time_columns().curve(column)];
+            assert_eq!(format!("{:?}", curves[0]), format!("{:?}", curves[1]), "column {column}");
+        }
+    }
+}

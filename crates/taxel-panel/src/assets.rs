@@ -1,0 +1,82 @@
+//! The panel's files, inside the program: a table of exact names, so that no request can leave it.
+
+use taxel_core::{Error, Result};
+
+/// A file of the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asset {
+    /// Its name below `web/`, as the page asks for it.
+    pub name: &'static str,
+    /// Its media type.
+    pub media: &'static str,
+    /// What it holds.
+    pub bytes: &'static [u8],
+}
+
+/// A row of the table: name and media type once, the bytes from the folder.
+macro_rules! assets {
+    ($($media:literal: $($name:literal)+;)+) => {
+        &[$($(Asset { name: $name, media: $media, bytes: include_bytes!(concat!("../web/", $name)) },)+)+]
+    };
+}
+
+/// All of them.
+pub const ASSETS: &[Asset] = assets! {
+    "text/html; charset=utf-8": "index.html";
+    "text/javascript; charset=utf-8":
+        "actions.js" "board.js" "colours.js" "connection.js" "counters.js" "cursor.js" "detections.js" "dom.js" "image.js" "keys.js" "labels.js" "lanes.js" "main.js" "maps.js" "notice.js" "player.js"
+        "protocol.js" "raster.js" "recorder.js" "registers.js" "server.js" "settings.js" "state.js" "strip.js" "tabs.js" "timeline.js"
+        "tones.js" "view.js" "vendor/uPlot.js" "words.js" "zoom.js";
+    "text/css; charset=utf-8": "style.css" "vendor/uPlot.css";
+    "image/svg+xml": "icon.svg";
+    "text/plain; charset=utf-8": "vendor/colour-maps.LICENSE" "vendor/uPlot.LICENSE";
+};
+
+/// Gives the file of exactly this name.
+///
+/// # Errors
+/// `Problem` where there is none; it lists those that are.
+pub fn asset(name: &str) -> Result<&'static Asset> {
+    ASSETS.iter().find(|asset| asset.name == name).ok_or_else(|| {
+        let known: Vec<&str> = ASSETS.iter().map(|asset| asset.name).collect();
+        Error::Problem(format!("{name:?} is no file of the panel: must be one of {}", known.join(", ")))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::{Path, PathBuf};
+
+    /// Everything in the folder but what only the linter and readers of the source want.
+    fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()) {
+            if entry.is_dir() {
+                files(&entry, found);
+            } else if !entry.to_string_lossy().ends_with(".d.ts") && !entry.ends_with("README.md") {
+                found.push(entry);
+            }
+        }
+    }
+
+    #[test]
+    fn the_table_holds_what_the_folder_holds() {
+        let web = Path::new(env!("CARGO_MANIFEST_DIR")).join("web");
+        let mut found = Vec::new();
+        files(&web, &mut found);
+        let mut found: Vec<_> =
+            found.iter().map(|f| f.strip_prefix(&web).expect("below").display().to_string()).collect();
+        let mut known: Vec<_> = ASSETS.iter().map(|asset| asset.name.to_owned()).collect();
+        found.sort();
+        known.sort();
+        assert_eq!(known, found);
+    }
+
+    #[test]
+    fn only_exact_names_are_known() {
+        for name in ["", "/", "vendor", "vendor/../registers.js", "REGISTERS.JS", "../Cargo.toml", "registers.js\0"] {
+            assert!(asset(name).is_err(), "{name:?}");
+        }
+        assert!(asset("registers.js").is_ok_and(|asset| asset.media.starts_with("text/javascript")));
+    }
+}

@@ -1,0 +1,79 @@
+//! The connected clients: how many there are, and what is sent to all of them.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use serde_json::{Map, Value};
+use tokio::sync::{broadcast, watch};
+
+/// Messages that wait for one client at most.
+pub(super) const MOST_WAITING: usize = 256;
+
+/// A message to all clients.
+#[derive(Debug, Clone)]
+pub(super) enum Broadcast {
+    /// The same text for everybody.
+    Text(Arc<str>),
+    /// Counters, to which each session adds those of its client.
+    Counters(Arc<Map<String, Value>>),
+    /// The labels of a recording have changed: for the clients that show it.
+    Labels(String),
+    /// The contents of `hello` have changed.
+    Hello,
+}
+
+/// See the module.
+pub(super) struct Clients {
+    messages: broadcast::Sender<Broadcast>,
+    /// Counts up when a new picture can be shown.
+    pictures: watch::Sender<u64>,
+    count: Arc<AtomicUsize>,
+}
+
+/// The place of a connected client; dropping it frees the place.
+pub(super) struct ClientSlot(Arc<AtomicUsize>);
+
+impl Drop for ClientSlot {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+impl Clients {
+    pub(super) fn new() -> Self {
+        Self {
+            messages: broadcast::channel(MOST_WAITING).0,
+            pictures: watch::channel(0).0,
+            count: Arc::new(AtomicUsize::new(0)),
+        }
+    }
+
+    /// A place for another client, unless `most` are connected.
+    pub(super) fn admit(&self, most: usize) -> Option<ClientSlot> {
+        let before = self.count.fetch_add(1, Ordering::Relaxed);
+        let slot = ClientSlot(Arc::clone(&self.count));
+        (before < most).then_some(slot)
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.count.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn send(&self, message: Broadcast) {
+        // Without a client the channel reports an error, which loses nothing.
+        let _ = self.messages.send(message);
+    }
+
+    pub(super) fn send_json(&self, message: &Value) {
+        self.send(Broadcast::Text(message.to_string().into()));
+    }
+
+    /// Tells all sessions that a new picture can be shown.
+    pub(super) fn new_picture(&self) {
+        self.pictures.send_modify(|n| *n += 1);
+    }
+
+    pub(super) fn subscribe(&self) -> (broadcast::Receiver<Broadcast>, watch::Receiver<u64>) {
+        (self.messages.subscribe(), self.pictures.subscribe())
+    }
+}

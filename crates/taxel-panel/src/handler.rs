@@ -1,0 +1,125 @@
+//! Requests that the server passes to the program that started it.
+//!
+//! They concern other parts of that program (the board's serial line, cutting, label tables, presets) and may block, so
+//! the server makes them in threads of their own.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use taxel_core::Array;
+use taxel_core::wire::Command;
+
+use super::keyframe_index::Activity;
+
+/// The answer to a request, or the reason for a refusal in words for a person.
+pub type Reply<T> = Result<T, String>;
+
+/// New lines from the board's serial line, and the number of resets that the board has reported.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct BoardLines {
+    /// The lines, oldest first.
+    pub lines: Vec<String>,
+    /// Resets so far.
+    pub resets: u64,
+}
+
+/// A value in a preset of the user, whose file may have been edited by hand.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PresetValue {
+    /// Of a register of one bit.
+    Flag(bool),
+    /// Of any other register, in its own unit.
+    Number(i64),
+    /// Anything else in the file, which no register accepts.
+    Other(String),
+}
+
+/// A preset of the user: value by register name.
+pub type UserPreset = BTreeMap<String, PresetValue>;
+
+/// The presets of the user.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct UserPresets {
+    /// The file that holds them.
+    pub path: PathBuf,
+    /// The presets by name.
+    pub presets: BTreeMap<String, UserPreset>,
+}
+
+/// A label of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LabelRow {
+    /// Its text.
+    pub label: String,
+    /// Board time, us.
+    pub t_us: i64,
+}
+
+/// Taxels (column, row) that do not work as they should.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct UnhealthyTaxels {
+    /// Without events although their neighbours have some.
+    pub dead: Vec<(u16, u16)>,
+    /// With one value only.
+    pub stuck: Vec<(u16, u16)>,
+    /// With far more events than their neighbours.
+    pub noisy: Vec<(u16, u16)>,
+}
+
+/// The stretch of a recording that is to be cut out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cut<'a> {
+    /// The recording.
+    pub path: &'a Path,
+    /// The new file.
+    pub out: &'a Path,
+    /// Start, us of the board's clock.
+    pub start_us: i64,
+    /// End, us of the board's clock.
+    pub stop_us: i64,
+}
+
+/// Handles the requests of a panel; called from any thread, and several at a time.
+///
+/// Every method returns the reason where it cannot do what was asked.
+#[allow(clippy::missing_errors_doc)]
+pub trait RequestHandler: Send + Sync {
+    /// Sends a register command to the board; returns the value that the board reports.
+    fn command(&self, command: Command) -> Reply<u32>;
+
+    /// Asks the board for its greeting; returns the number of converter channels.
+    fn channels(&self) -> Reply<u8>;
+
+    /// Returns the lines that the board has sent since the last call.
+    fn board_lines(&self) -> Reply<BoardLines>;
+
+    /// Connects the board's serial line, or disconnects it.
+    fn connect(&self, place: Option<&str>) -> Reply<()>;
+
+    /// Receives the board's datagrams on another address.
+    fn listen(&self, host: &str, port: u16) -> Reply<()>;
+
+    /// Interprets intensities as differences, or as values.
+    fn set_differences(&self, on: bool) -> Reply<()>;
+
+    /// Returns the IPv4 addresses of this machine, each with the name of its network interface.
+    fn addresses(&self) -> Reply<Vec<(String, String)>>;
+
+    /// Finds taxels that are dead, stuck or noisy.
+    fn health(&self, array: &Array, activity: &Activity) -> Reply<UnhealthyTaxels>;
+
+    /// Writes a stretch of a recording to a new file; returns what that file cannot hold.
+    fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>>;
+
+    /// Reads the labels of a recording from a table.
+    fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>>;
+
+    /// Writes a table of labels.
+    fn write_labels(&self, table: &Path, labels: &[LabelRow]) -> Reply<()>;
+
+    /// Reads the presets of the user.
+    fn read_presets(&self) -> Reply<UserPresets>;
+
+    /// Writes the presets of the user.
+    fn write_presets(&self, presets: &BTreeMap<String, UserPreset>) -> Reply<()>;
+}

@@ -1,0 +1,276 @@
+//! What all clients share: the live source, the board's registers, the folder of recordings, labels, and the recorder.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use taxel_core::encode;
+use taxel_core::wire::Registers;
+use taxel_live::Result;
+use taxel_live::capture::Origin;
+use taxel_live::locked::lock;
+use taxel_live::pipeline::{Counters, Handle};
+use taxel_live::recording::now_ns;
+use tokio::sync::Notify;
+
+use super::clients::{Broadcast, Clients};
+use super::folder::Folder;
+use super::handler::{Reply, RequestHandler, UserPresets};
+use super::labels::LabelTables;
+use super::limits::{MOST_BYTES, MOST_CREDITS};
+use super::live_source::LiveSource;
+use super::messages;
+use super::options::PanelOptions;
+use super::presets;
+use super::recorder::Recorder;
+use super::time_columns::{COLUMN_US, COLUMNS_US, SPAN};
+
+/// How often new events are fetched from the live source.
+const RECEIVE_EVERY: Duration = Duration::from_millis(16);
+
+/// How often counters are sent.
+const COUNT_EVERY: Duration = Duration::from_millis(250);
+
+/// The board behind the live source, as far as the panel knows it.
+#[derive(Debug, Default)]
+pub(super) struct BoardState {
+    /// Its serial line, where one is connected.
+    pub(super) control: Option<String>,
+    pub(super) registers: Registers,
+    /// Whether the registers were read from the board.
+    pub(super) known: bool,
+}
+
+/// See the module.
+pub(super) struct Hub {
+    options: PanelOptions,
+    handler: Arc<dyn RequestHandler>,
+    live: Mutex<Option<Arc<LiveSource>>>,
+    board: Mutex<BoardState>,
+    presets: Mutex<UserPresets>,
+    /// Resets that the board has reported on its serial line.
+    resets: AtomicU64,
+    pub(super) clients: Clients,
+    pub(super) folder: Folder,
+    pub(super) labels: LabelTables,
+    pub(super) recorder: Recorder,
+    /// Notified when the board was reset: its registers are to be read again.
+    pub(super) registers_unknown: Notify,
+}
+
+impl Hub {
+    pub(super) fn new(
+        options: PanelOptions,
+        live: Option<Handle>,
+        handler: Box<dyn RequestHandler>,
+    ) -> Result<Arc<Self>> {
+        let board = BoardState { control: options.control.clone(), ..BoardState::default() };
+        let hub = Arc::new(Self {
+            folder: Folder::new(options.folder.clone()),
+            options,
+            handler: handler.into(),
+            live: Mutex::default(),
+            board: Mutex::new(board),
+            presets: Mutex::default(),
+            resets: AtomicU64::new(0),
+            clients: Clients::new(),
+            labels: LabelTables::default(),
+            recorder: Recorder::default(),
+            registers_unknown: Notify::new(),
+        });
+        if let Some(live) = live {
+            hub.attach(live)?;
+        }
+        Ok(hub)
+    }
+
+    pub(super) fn options(&self) -> &PanelOptions {
+        &self.options
+    }
+
+    /// Shows another live source from now on.
+    pub(super) fn attach(&self, handle: Handle) -> Result<()> {
+        let noise_floor = {
+            let mut board = self.board();
+            if board.known {
+                // It is the board whose registers were read: the other source begins with them.
+                handle.wrote(board.registers);
+            } else {
+                board.registers = handle.registers();
+            }
+            board.registers.noise_floor
+        };
+        *lock(&self.live) = Some(Arc::new(LiveSource::new(handle, noise_floor)?));
+        self.clients.send(Broadcast::Hello);
+        self.clients.send_json(&self.zeroed_message());
+        Ok(())
+    }
+
+    pub(super) fn live(&self) -> Option<Arc<LiveSource>> {
+        lock(&self.live).clone()
+    }
+
+    pub(super) fn board(&self) -> MutexGuard<'_, BoardState> {
+        lock(&self.board)
+    }
+
+    pub(super) fn presets(&self) -> MutexGuard<'_, UserPresets> {
+        lock(&self.presets)
+    }
+
+    /// Makes a request of the program that started the panel, in a thread where it may block.
+    pub(super) async fn ask<T: Send + 'static>(
+        &self,
+        request: impl FnOnce(&dyn RequestHandler) -> Reply<T> + Send + 'static,
+    ) -> Reply<T> {
+        let handler = Arc::clone(&self.handler);
+        let answer = tokio::task::spawn_blocking(move || request(&*handler)).await;
+        answer.unwrap_or_else(|_| Err("failed within taxel; please report it".to_owned()))
+    }
+
+    // ------------------------------------------------------------------------------------------ the live source
+
+    /// Fetches new events from the live source and sends news of it to the clients; never returns.
+    pub(super) async fn serve_live(self: Arc<Self>) {
+        let (mut counted, mut before) = (Instant::now(), None);
+        let mut reading_lines = None::<tokio::task::JoinHandle<()>>;
+        let mut ticks = tokio::time::interval(RECEIVE_EVERY);
+        ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        loop {
+            ticks.tick().await;
+            let Some(live) = self.live() else {
+                tokio::time::sleep(COUNT_EVERY).await;
+                continue;
+            };
+            let has_clients = self.clients.count() > 0;
+            let received = live.receive(has_clients);
+            if received.reset {
+                self.forget_registers();
+            }
+            for detection in &received.detections {
+                self.clients.send_json(&messages::detection(detection));
+            }
+            if received.zeroed {
+                self.clients.send_json(&self.zeroed_message());
+            }
+            if received.picture {
+                self.clients.new_picture();
+            }
+            if counted.elapsed() < COUNT_EVERY {
+                continue;
+            }
+            let counters = live.handle.counters();
+            if let Some(offset) = counters.offset {
+                live.follow_clock(offset);
+            }
+            self.send_counters(&live, &counters, before.as_ref(), counted.elapsed().as_secs_f64());
+            (counted, before) = (Instant::now(), Some(counters));
+            self.clients.new_picture();
+            let connected = self.board().control.is_some();
+            if has_clients && connected && reading_lines.as_ref().is_none_or(tokio::task::JoinHandle::is_finished) {
+                let hub = Arc::clone(&self);
+                reading_lines = Some(tokio::spawn(async move { hub.read_board_lines().await }));
+            }
+        }
+    }
+
+    fn send_counters(&self, live: &LiveSource, now: &Counters, before: Option<&Counters>, seconds: f64) {
+        let frame_us = self.board().registers.frame_us();
+        let message = messages::counters(live, now, before, seconds, frame_us, self.clients.count());
+        self.clients.send(Broadcast::Counters(Arc::new(message)));
+    }
+
+    /// After a reset the board holds other registers than were read.
+    fn forget_registers(&self) {
+        if std::mem::take(&mut self.board().known) {
+            self.clients.send_json(&self.registers_message());
+        }
+        self.registers_unknown.notify_one();
+    }
+
+    /// Sends the new lines of the board's serial line to the clients.
+    async fn read_board_lines(&self) {
+        if let Ok(new) = self.ask(|handler| handler.board_lines()).await {
+            for line in new.lines {
+                self.clients.send_json(&json!({ "type": "board_line", "at_ns": now_ns(), "text": line }));
+            }
+            // With version 1 of the wire only the serial line reports a reset.
+            if self.resets.swap(new.resets, Ordering::Relaxed) != new.resets && new.resets > 0 {
+                self.forget_registers();
+            }
+        }
+    }
+
+    // ------------------------------------------------------------------------------------------ messages
+
+    pub(super) fn hello_message(&self) -> Value {
+        let live = self.live();
+        json!({
+            "type": "hello",
+            "protocol": 1,
+            "taxel": env!("CARGO_PKG_VERSION"),
+            "live": live.is_some(),
+            "array": live.as_ref().map(|live| messages::array(live.array())),
+            "udp": live.as_ref().and_then(|live| match live.handle.place() {
+                Origin::Udp(address) => Some(address.to_string()),
+                Origin::Bridge(_) => None,
+            }),
+            "delta_intensity": live.as_ref().map(|live| live.handle.options().differences),
+            "control": self.board().control,
+            "folder": self.options.folder,
+            "open": self.options.open,
+            "readout": self.options.readout,
+            "encoders": encode::NAMES,
+            "column_us": COLUMN_US,
+            "columns_us": COLUMNS_US,
+            "time_columns": SPAN,
+            "most_message_bytes": MOST_BYTES,
+            "most_credits": MOST_CREDITS,
+        })
+    }
+
+    /// The taxels of the live source that were zeroed.
+    pub(super) fn zeroed_message(&self) -> Value {
+        let zeroed = self.live().map(|live| live.handle.zeroed().0).unwrap_or_default();
+        json!({ "type": "zeroed", "taxels": zeroed.iter().map(messages::zeroing).collect::<Vec<_>>() })
+    }
+
+    pub(super) fn registers_message(&self) -> Value {
+        let live = self.live();
+        let (registers, known) = {
+            let board = self.board();
+            (board.registers, board.known)
+        };
+        let held = Registers { record: false, ..registers };
+        let own = || presets::equal_to(&held, &self.presets().presets);
+        json!({
+            "type": "registers",
+            "known": known,
+            "values": registers,
+            "preset": presets::built_in_equal_to(&held, live.as_ref().map(|live| live.array())).or_else(own),
+            "frame_us": registers.frame_us(),
+            "warnings": registers.warnings(),
+        })
+    }
+
+    pub(super) fn presets_message(&self) -> Value {
+        let live = self.live();
+        let held = self.board().registers;
+        let built_in: Vec<_> = presets::fitting(&held, live.as_ref().map(|live| live.array()));
+        let built_in: Vec<_> = built_in.into_iter().map(|preset| preset.name).collect();
+        let UserPresets { path, presets } = self.presets().clone();
+        let own: BTreeMap<_, _> = presets.into_iter().map(|(name, preset)| (name, presets::to_json(&preset))).collect();
+        json!({ "type": "presets", "built_in": built_in, "own": own, "path": path })
+    }
+
+    /// The recordings of the folder.
+    pub(super) fn recordings_message(&self) -> Value {
+        let files = self.folder.list().into_iter().map(|file| {
+            let labels = self.labels.count(&file.name);
+            json!({ "name": file.name, "bytes": file.bytes, "modified_ns": file.modified_ns, "labels": labels })
+        });
+        json!({ "type": "recordings", "folder": self.folder.path(), "files": files.collect::<Vec<_>>() })
+    }
+}

@@ -1,0 +1,67 @@
+//! Keyframe indices: the changes of a source, readable from any time on.
+//!
+//! A source is the last minute of a live board ([`live`]) or a recording of any length ([`recording`]). Both store
+//! keyframes. Decoding on from a keyframe gives the same as decoding from the beginning.
+
+mod activity;
+mod event_rate;
+pub mod live;
+pub mod recording;
+
+use taxel_core::Array;
+use taxel_live::Result;
+use taxel_live::pipeline::Change;
+
+use super::array_state::Keyframe;
+use super::time_columns::TimeColumns;
+
+pub use activity::Activity;
+
+/// Result of [`ChangeReader::read`].
+#[derive(Debug)]
+pub enum Read {
+    /// Changes were appended.
+    Changes,
+    /// Changes are missing; these are the values held after the gap, and the number of events up to there.
+    Held(Vec<u16>, u64),
+    /// No more changes for now.
+    End,
+}
+
+/// Reads the changes that follow a keyframe.
+pub trait ChangeReader: Send {
+    /// Appends the next changes.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the file cannot be read.
+    fn read(&mut self, out: &mut Vec<Change>) -> Result<Read>;
+}
+
+/// Keyframes of a source and what reads on from them.
+pub trait KeyframeIndex: Send + Sync {
+    /// The sensor.
+    fn array(&self) -> &Array;
+
+    /// The noise floor, ticks above rest.
+    fn noise_floor(&self) -> u16;
+
+    /// First and last time with events, us; `None` without events.
+    fn range(&self) -> Option<(i64, i64)>;
+
+    /// The last keyframe at or before `t` (us), or the first one, and a reader of the changes that follow it.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where there is no keyframe.
+    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)>;
+
+    /// Time of the last keyframe before `t`, us.
+    fn keyframe_before(&self, t: i64) -> Option<i64>;
+
+    /// Raster and curves of the whole source, where they are stored.
+    fn time_columns(&self) -> Option<&TimeColumns>;
+
+    /// Number of events up to the last keyframe at or before `t`.
+    fn events_before(&self, t: i64) -> u64;
+}

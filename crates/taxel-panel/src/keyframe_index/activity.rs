@@ -1,0 +1,63 @@
+//! Counts by taxel from which dead, stuck and noisy ones are found.
+
+use taxel_live::pipeline::{Change, UNKNOWN};
+
+/// Events and held values of each taxel so far.
+#[derive(Debug, Clone)]
+pub struct Activity {
+    /// Events at each taxel.
+    pub events: Vec<u32>,
+    /// Events of the same direction as the taxel's previous event: a touch causes such events, noise at the floor hardly any.
+    pub moved: Vec<u32>,
+    /// Number of different values in the taxel's events: 0, 1, or 2 for more.
+    pub values: Vec<u8>,
+    /// Least and greatest held value, ticks; [`UNKNOWN`] and 0 before the first event.
+    pub range: Vec<(u16, u16)>,
+    first: Vec<u16>,
+    up: Vec<bool>,
+}
+
+impl Activity {
+    /// Counts of `taxels` taxels without any event.
+    #[must_use]
+    pub fn new(taxels: usize) -> Self {
+        Self {
+            events: vec![0; taxels],
+            moved: vec![0; taxels],
+            values: vec![0; taxels],
+            range: vec![(UNKNOWN, 0); taxels],
+            first: vec![UNKNOWN; taxels],
+            up: vec![false; taxels],
+        }
+    }
+
+    /// Counts a change. A repaired one only updates the held value: states of version 2 also report dead taxels.
+    pub fn count(&mut self, change: &Change) {
+        let taxel = change.taxel as usize;
+        self.set_held(taxel, change.ticks);
+        if change.repaired {
+            return;
+        }
+        if self.events[taxel] > 0 && self.up[taxel] == change.up {
+            self.moved[taxel] = self.moved[taxel].saturating_add(1);
+        }
+        self.up[taxel] = change.up;
+        self.events[taxel] = self.events[taxel].saturating_add(1);
+        if change.ticks == UNKNOWN {
+            return;
+        }
+        if self.values[taxel] == 0 {
+            (self.values[taxel], self.first[taxel]) = (1, change.ticks);
+        } else if self.first[taxel] != change.ticks {
+            self.values[taxel] = 2;
+        }
+    }
+
+    /// Updates the range of held values, unless the value is unknown.
+    pub(super) fn set_held(&mut self, taxel: usize, ticks: u16) {
+        if ticks != UNKNOWN {
+            let (least, greatest) = self.range[taxel];
+            self.range[taxel] = (least.min(ticks), greatest.max(ticks));
+        }
+    }
+}

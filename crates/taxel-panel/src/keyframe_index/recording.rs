@@ -1,0 +1,413 @@
+//! The keyframe index of a recording of any length.
+//!
+//! A keyframe contains a copy of the decoder, so that decoding continues with its clock, sequence numbers and pending
+//! events as they were.
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crossbeam_channel as channel;
+use taxel_core::wire::{self, Decoder};
+use taxel_core::{Array, Events, problem};
+
+use super::event_rate::EventRate;
+use super::{Activity, ChangeReader, KeyframeIndex, Read};
+use crate::array_state::{ArrayState, Keyframe};
+use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
+use taxel_live::pipeline::{Change, UNKNOWN};
+use taxel_live::recording::{Ending, Header, NOTHING_LOST, Place, Reader, Remarks, Topic, begin_with};
+use taxel_live::{Error, Result};
+
+/// Memory that the keyframes of a recording may take, bytes.
+const KEYFRAME_BYTES: usize = 128 << 20;
+/// Memory that its raster and curves may take, bytes.
+const TIME_COLUMN_BYTES: usize = 256 << 20;
+
+/// Minimum distance between keyframes, bytes of the file.
+const SPACING: u64 = 1 << 16;
+
+/// Decoded blocks that may wait for the indexing thread.
+const AHEAD: usize = 4;
+
+/// Bytes of a `.lsa` in a block.
+const LSA_PIECE: u64 = 1 << 16;
+
+#[derive(Debug)]
+enum Source {
+    Mcap(Box<Reader>),
+    Lsa(File, u64),
+}
+
+/// The decoder of a recording.
+#[derive(Debug, Clone)]
+enum Decoding {
+    Datagrams(Box<wire::Receiver>),
+    Bytes(Box<Decoder>),
+}
+
+/// A keyframe, and the decoder as it is before the next block.
+#[derive(Debug)]
+struct Key {
+    block: usize,
+    place: Place,
+    decoding: Decoding,
+    frame: Keyframe,
+}
+
+/// An indexed recording.
+#[derive(Debug)]
+pub struct RecordingIndex {
+    path: PathBuf,
+    source: Source,
+    header: Header,
+    keys: Vec<Key>,
+    time_columns: Option<TimeColumns>,
+    range: Option<(i64, i64)>,
+    /// Size of the file, bytes.
+    pub bytes: u64,
+    /// Number of events.
+    pub events: u64,
+    /// Number of events over time: start and width of a bin (us), counts.
+    pub event_rate: (i64, i64, Vec<u64>),
+    /// Event counts of each taxel.
+    pub activity: Activity,
+    /// Notes, markers, detections, registers.
+    pub remarks: Remarks,
+    /// One line that states what was lost.
+    pub verdict: String,
+    /// Whether the end of the file is missing.
+    pub unfinished: bool,
+}
+
+impl RecordingIndex {
+    /// Reads a recording (`.mcap`, `.lsa`) once and indexes it.
+    ///
+    /// # Errors
+    ///
+    /// `File` where it cannot be read, `Core` where it is not a recording.
+    pub fn open(path: &Path) -> Result<Arc<Self>> {
+        let bytes = std::fs::metadata(path).map_err(Error::file(path))?.len();
+        let (source, header, verdict, unfinished) = match path.extension().and_then(|e| e.to_str()) {
+            Some("mcap") => {
+                let reader = Reader::open(path)?;
+                let verdict = match reader.ending() {
+                    Some(Ending::Finished { verdict, .. }) => verdict.clone(),
+                    Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
+                    None => "not finished: what came last is missing".to_owned(),
+                };
+                let (header, unfinished) = (reader.header().clone(), reader.rebuilt().unfinished);
+                (Source::Mcap(Box::new(reader)), header, verdict, unfinished)
+            }
+            Some("lsa") => {
+                let file = File::open(path).map_err(Error::file(path))?;
+                let header = Header::of_board(Array::thesis(), None, path.display().to_string(), 0);
+                let complete = path.with_extension("lss").exists();
+                let verdict =
+                    if complete { NOTHING_LOST.to_owned() } else { "no .lss: perhaps not complete".to_owned() };
+                (Source::Lsa(file, bytes), header, verdict, !complete)
+            }
+            _ => {
+                let name = path.display();
+                return Err(problem!("{name}: the panel shows .mcap and .lsa; taxel convert makes a .mcap").into());
+            }
+        };
+        let taxels = header.array.len();
+        let mut index = Self {
+            path: path.to_owned(),
+            source,
+            header,
+            keys: vec![],
+            time_columns: None,
+            range: None,
+            bytes,
+            events: 0,
+            event_rate: (0, COLUMN_US, vec![]),
+            activity: Activity::new(taxels),
+            remarks: Remarks::default(),
+            verdict,
+            unfinished,
+        };
+        index.build()?;
+        Ok(Arc::new(index))
+    }
+
+    /// The header of the file.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    fn noise_floor(&self) -> u16 {
+        self.header.registers.map_or(0, |registers| registers.noise_floor.into())
+    }
+
+    fn blocks(&self) -> usize {
+        match &self.source {
+            Source::Mcap(reader) => reader.blocks(),
+            Source::Lsa(_, length) => usize::try_from(length.div_ceil(LSA_PIECE)).unwrap_or(usize::MAX),
+        }
+    }
+
+    fn decoding(&self) -> Decoding {
+        let decoder = Decoder::new(self.header.array.clone()).differences(self.header.difference);
+        match &self.source {
+            Source::Mcap(_) => Decoding::Datagrams(Box::new(wire::Receiver::new(decoder, 1))),
+            Source::Lsa(..) => Decoding::Bytes(Box::new(decoder)),
+        }
+    }
+
+    /// Decodes a block, with the pending events after the last one. Returns the number of bytes decoded.
+    fn block(
+        &self,
+        k: usize,
+        place: &mut Place,
+        decoding: &mut Decoding,
+        events: &mut Events,
+        mut remarks: Option<&mut Remarks>,
+    ) -> Result<u64> {
+        let mut bytes = 0;
+        match (&self.source, &mut *decoding) {
+            (Source::Mcap(reader), Decoding::Datagrams(receiver)) => {
+                reader.block(k, place, |message| {
+                    if message.topic == Topic::Datagrams {
+                        receiver.push(message.data, Some(message.at_ns / 1000), events);
+                        bytes += message.data.len() as u64;
+                    } else if message.topic == Topic::Held {
+                        begin_with(receiver, message.data);
+                    } else if message.topic == Topic::Pressure {
+                        return Ok(());
+                    }
+                    if let Some(remarks) = &mut remarks {
+                        remarks.take(&message);
+                    }
+                    Ok(())
+                })?;
+            }
+            (Source::Lsa(file, length), Decoding::Bytes(decoder)) => {
+                let offset = k as u64 * LSA_PIECE;
+                bytes = LSA_PIECE.min(length - offset);
+                let mut piece = vec![0; usize::try_from(bytes).unwrap_or(0)];
+                file.read_exact_at(&mut piece, offset).map_err(Error::file(&self.path))?;
+                decoder.push_into(&piece, None, events);
+            }
+            _ => {}
+        }
+        if k + 1 == self.blocks() {
+            match decoding {
+                Decoding::Datagrams(receiver) => receiver.finish_into(events),
+                Decoding::Bytes(decoder) => decoder.finish_into(events),
+            }
+        }
+        Ok(bytes)
+    }
+
+    fn changes(&self, events: &Events, out: &mut Vec<Change>) {
+        let columns = usize::from(self.header.array.columns);
+        out.extend((0..events.len()).map(|k| {
+            let ticks = match &events.intensity {
+                Some(intensity) if intensity.present[k] => intensity.ticks[k],
+                _ => UNKNOWN,
+            };
+            // A sensor has 2^22 taxels at most (recording's limits).
+            #[allow(clippy::cast_possible_truncation)]
+            let taxel = (usize::from(events.y[k]) * columns + usize::from(events.x[k])) as u32;
+            Change {
+                t: events.t[k] + self.header.origin_us,
+                taxel,
+                ticks,
+                up: events.p[k],
+                repaired: events.is_repaired(k),
+            }
+        }));
+    }
+
+    /// Reads the whole file once: another thread decodes, this one builds keyframes.
+    fn build(&mut self) -> Result<()> {
+        let taxels = self.header.array.len();
+        let blank = Keyframe { latest: None, events: 0, held: vec![UNKNOWN; taxels], rest: vec![UNKNOWN; taxels] };
+        let mut state =
+            ArrayState::new(self.header.array.columns, self.noise_floor(), &blank, COLUMN_US, TIME_COLUMN_BYTES);
+        let mut keys: Vec<Key> = vec![];
+        let (decoded, blocks) = channel::bounded(AHEAD);
+        let index = &*self;
+        let contents = std::thread::scope(|scope| {
+            let decoding = scope.spawn(move || index.decode_all(&decoded));
+            for Decoded { key, thin, held, changes } in blocks {
+                keys.extend(key.map(|(block, place, decoding)| Key {
+                    block,
+                    place,
+                    decoding,
+                    frame: state.keyframe(),
+                }));
+                if thin {
+                    let mut odd = false;
+                    keys.retain(|_| {
+                        odd = !odd;
+                        odd
+                    });
+                }
+                if let Some(held) = held.filter(|_| state.events() == 0) {
+                    // A recording begun in mid-stream starts with the held values, before all datagrams of the first block.
+                    state.set_held(&held, 0);
+                    if let Some(key) = keys.first_mut() {
+                        key.frame = state.keyframe();
+                    }
+                }
+                state.apply(&changes);
+            }
+            decoding.join().unwrap_or_else(|_| Err(problem!("indexing failed within taxel; please report it").into()))
+        })?;
+        self.keys = keys;
+        self.events = state.events();
+        self.range = contents.first.zip(state.latest());
+        self.event_rate = contents.event_rate.into_bins();
+        self.activity = contents.activity;
+        self.remarks = contents.remarks;
+        state.update_curve();
+        let columns = state.time_columns().clone();
+        let whole =
+            columns.reach().zip(contents.first).is_none_or(|((begin, _), first)| begin <= column_of(first, COLUMN_US));
+        self.time_columns = whole.then_some(columns);
+        Ok(())
+    }
+
+    /// Decodes the whole file, block by block.
+    fn decode_all(&self, to: &channel::Sender<Decoded>) -> Result<Contents> {
+        let taxels = self.header.array.len();
+        let (mut decoding, mut place) = (self.decoding(), Place::default());
+        // Beside the held values, a decoder of version 2 stores the last 65 536 sequence numbers.
+        let each = 4 * taxels + (80 << 10);
+        let (mut spacing, mut since, mut keys) = (SPACING, u64::MAX, 0);
+        let mut events = Events::empty(self.header.array.clone());
+        let mut contents = Contents {
+            first: None,
+            event_rate: EventRate::default(),
+            activity: Activity::new(taxels),
+            remarks: Remarks::default(),
+        };
+        for k in 0..self.blocks() {
+            let mut piece = Decoded { key: None, thin: false, held: None, changes: vec![] };
+            if since >= spacing {
+                (since, keys) = (0, keys + 1);
+                piece.key = Some((k, place.kept(), decoding.clone()));
+                if keys * each > KEYFRAME_BYTES {
+                    (piece.thin, keys, spacing) = (true, keys.div_ceil(2), 2 * spacing);
+                }
+            }
+            events.clear();
+            let held_before = contents.remarks.held.is_some();
+            since = since.saturating_add(self.block(
+                k,
+                &mut place,
+                &mut decoding,
+                &mut events,
+                Some(&mut contents.remarks),
+            )?);
+            if !held_before {
+                piece.held = contents.remarks.held.clone().filter(|held| held.len() == taxels);
+                let known = piece.held.iter().flatten().enumerate();
+                known.for_each(|(taxel, &ticks)| contents.activity.set_held(taxel, ticks));
+            }
+            self.changes(&events, &mut piece.changes);
+            for change in &piece.changes {
+                contents.activity.count(change);
+            }
+            for together in piece.changes.chunk_by(|one, next| one.t == next.t) {
+                let t = together[0].t;
+                contents.first = Some(contents.first.map_or(t, |first: i64| first.min(t)));
+                contents.event_rate.add(t, together.len() as u64);
+            }
+            if to.send(piece).is_err() {
+                break;
+            }
+        }
+        Ok(contents)
+    }
+}
+
+/// A decoded block.
+struct Decoded {
+    /// Where decoding can begin again: the block, and the reader and decoder before it.
+    key: Option<(usize, Place, Decoding)>,
+    /// The keyframes take too much memory: every second one is to be dropped.
+    thin: bool,
+    /// Held values at the start of the recording.
+    held: Option<Vec<u16>>,
+    changes: Vec<Change>,
+}
+
+/// Contents of a whole recording beside its changes.
+struct Contents {
+    first: Option<i64>,
+    event_rate: EventRate,
+    activity: Activity,
+    remarks: Remarks,
+}
+
+struct RecordingChanges {
+    index: Arc<RecordingIndex>,
+    block: usize,
+    place: Place,
+    decoding: Decoding,
+    events: Events,
+}
+
+impl ChangeReader for RecordingChanges {
+    fn read(&mut self, out: &mut Vec<Change>) -> Result<Read> {
+        if self.block >= self.index.blocks() {
+            return Ok(Read::End);
+        }
+        self.events.clear();
+        self.index.block(self.block, &mut self.place, &mut self.decoding, &mut self.events, None)?;
+        self.block += 1;
+        self.index.changes(&self.events, out);
+        Ok(Read::Changes)
+    }
+}
+
+impl KeyframeIndex for Arc<RecordingIndex> {
+    fn array(&self) -> &Array {
+        &self.header.array
+    }
+
+    fn noise_floor(&self) -> u16 {
+        RecordingIndex::noise_floor(self)
+    }
+
+    fn range(&self) -> Option<(i64, i64)> {
+        self.range
+    }
+
+    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
+        let place = self.keys.partition_point(|key| key.frame.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
+        let Some(Key { block, place, decoding, frame }) = self.keys.get(place) else {
+            return Err(problem!("{}: holds no events", self.path.display()).into());
+        };
+        let reader = RecordingChanges {
+            index: Arc::clone(self),
+            block: *block,
+            place: place.clone(),
+            decoding: decoding.clone(),
+            events: Events::empty(self.header.array.clone()),
+        };
+        Ok((frame.clone(), Box::new(reader)))
+    }
+
+    fn keyframe_before(&self, t: i64) -> Option<i64> {
+        self.keys.iter().rev().filter_map(|key| key.frame.latest).find(|&latest| latest < t)
+    }
+
+    fn time_columns(&self) -> Option<&TimeColumns> {
+        self.time_columns.as_ref()
+    }
+
+    fn events_before(&self, t: i64) -> u64 {
+        let place = self.keys.partition_point(|key| key.frame.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
+        self.keys.get(place).map_or(0, |key| key.frame.events)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests;

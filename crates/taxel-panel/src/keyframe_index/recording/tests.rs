@@ -1,0 +1,211 @@
+//! The view of any time of a recording equals that of a full decode.
+
+use rand::{Rng, SeedableRng, rngs::StdRng};
+use taxel_core::board::Board;
+use taxel_core::encode::{ChangeEvents, Encoder};
+use taxel_core::wire::{Command, Registers};
+
+use super::*;
+use crate::encoded_spikes::EncodedSpikes;
+use crate::picture::{About, of_player};
+use crate::player::{Player, ViewOptions};
+use crate::time_columns::SPAN;
+use taxel_live::recording::{Writer, WriterOptions};
+
+/// The taxel whose history is shown.
+const WATCHED: u32 = 2080;
+
+/// Recording of a simulated board, with pauses longer than a turn of its clock and changes of the wire version.
+fn recorded(name: &str, ending: &str, seed: u64) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("taxel-{name}-{}.{ending}", std::process::id()));
+    let array = Array::thesis();
+    let mut random = StdRng::seed_from_u64(seed);
+    let mut board = Board::new(Registers::default(), &array).unwrap();
+    let header = Header::of_board(array.clone(), Some(Registers::default()), String::new(), 0);
+    let how = WriterOptions { overwrite: true, ..WriterOptions::default() };
+    let writer = (ending == "mcap").then(|| Writer::create(&path, &header, how).unwrap());
+    let (mut ticks, mut bytes, mut number) = (vec![48_u16; array.len()], vec![], 0);
+    for part in 0..6 {
+        if part % 2 == 1 && ending == "mcap" {
+            let version = if part % 4 == 1 { 2 } else { 1 };
+            let registers = Registers { wire_version: version, ..*board.registers() };
+            board.command(&Command { register: 0, value: registers.word(0) }.to_bytes());
+        }
+        for frame in 0..4000 {
+            // A pause between frames 1500 and 2000.
+            if !(1500..2000).contains(&frame) && random.random_range(0..3) == 0 {
+                for _ in 0..random.random_range(1..300) {
+                    let taxel = random.random_range(0..array.len());
+                    ticks[taxel] = random.random_range(20..140);
+                }
+            }
+            let now_ns = (board.time_us() * 1000.0) as i64 + 1_000_000_000;
+            board
+                .frame(&ticks, |datagram| {
+                    if let Some(writer) = &writer {
+                        writer.datagram(now_ns, number, datagram).unwrap();
+                        number += 1;
+                    } else {
+                        bytes.extend_from_slice(datagram);
+                    }
+                    true
+                })
+                .unwrap();
+        }
+    }
+    match writer {
+        Some(writer) => drop(writer.finish(taxel_live::recording::Counts::default()).unwrap()),
+        None => std::fs::write(&path, bytes).unwrap(),
+    }
+    path
+}
+
+/// Held values at a time, computed from the changes alone, without state or keyframe.
+pub(in crate::keyframe_index) fn held_at(changes: &[Change], t: i64, taxels: usize) -> (Vec<u16>, u64) {
+    let (mut held, mut events) = (vec![UNKNOWN; taxels], 0);
+    for change in changes.iter().take_while(|change| change.t <= t) {
+        if change.ticks != UNKNOWN {
+            held[change.taxel as usize] = change.ticks;
+        }
+        events += 1;
+    }
+    (held, events)
+}
+
+fn decode_all(index: &Arc<RecordingIndex>) -> Vec<Change> {
+    let mut events = Events::empty(index.header.array.clone());
+    match &index.source {
+        Source::Mcap(reader) => {
+            events = reader.decode(wire::Pairing::Direct, taxel_core::Stop::never()).unwrap().events;
+        }
+        Source::Lsa(..) => {
+            let bytes = std::fs::read(&index.path).unwrap();
+            let mut decoder = Decoder::new(index.header.array.clone());
+            decoder.push_into(&bytes, None, &mut events);
+            decoder.finish_into(&mut events);
+        }
+    }
+    let mut changes = vec![];
+    index.changes(&events, &mut changes);
+    changes
+}
+
+/// Raster and curves of a picture, and of which columns they are.
+fn shown(player: &mut Player, us: i64) -> (std::ops::Range<i64>, Vec<u8>, Vec<u8>) {
+    let about = About { flags: 0, number: 0, from: i64::MIN, with_rest: false, watched: Some(WATCHED), column_us: us };
+    let (bytes, _) = of_player(player, about);
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let section = |k: usize| bytes[word(64 + 8 * k)..][..word(68 + 8 * k)].to_vec();
+    let first = i64::from_le_bytes(bytes[48..56].try_into().unwrap());
+    assert_eq!(word(44) as i64, us);
+    (first..first + word(56) as i64, section(2), section(3))
+}
+
+/// The same computed from the changes alone: each change up to `t` counts in its column, at most 15 per row.
+fn counted(changes: &[Change], columns: std::ops::Range<i64>, us: i64, t: i64, array: &Array) -> Vec<u8> {
+    let rows = usize::from(array.rows);
+    let mut raster = vec![0_u8; (columns.end - columns.start) as usize * rows];
+    for change in changes.iter().filter(|c| c.t <= t && columns.contains(&column_of(c.t, us))) {
+        let row = change.taxel as usize / usize::from(array.columns);
+        let cell = &mut raster[(column_of(change.t, us) - columns.start) as usize * rows + row];
+        let (ups, downs) = (*cell & 15, *cell >> 4);
+        *cell = if change.up { (ups + 1).min(15) | downs << 4 } else { ups | (downs + 1).min(15) << 4 };
+    }
+    raster
+}
+
+#[test]
+fn any_time_of_a_recording_looks_as_after_a_full_decode() {
+    for (ending, seed) in [("mcap", 1), ("lsa", 2)] {
+        let path = recorded("any-time", ending, seed);
+        let index = RecordingIndex::open(&path).unwrap();
+        let changes = decode_all(&index);
+        assert_eq!(index.events, changes.len() as u64);
+        assert!(index.keys.len() >= 5, "{ending}: {} keyframes", index.keys.len());
+        let (first, last) = index.range.unwrap();
+        let (mut random, mut some) = (StdRng::seed_from_u64(7), 0);
+        for turn in 0..25 {
+            let t = if turn == 24 { last } else { random.random_range(first..=last) };
+            let us = [COLUMN_US, 500, 64_000][turn % 3];
+            // With this floor every change counts, so that the held value is the one that was sent last.
+            let spiking = ChangeEvents { noise_floor: 0.5, ..ChangeEvents::default() };
+            let spiking = Encoder::ChangeEvents(spiking);
+            let options =
+                ViewOptions { watched: Some(WATCHED), encoder: Some(spiking.clone()), ..ViewOptions::plain(us) };
+            let mut player = Player::open(Arc::new(Arc::clone(&index)), t, options).unwrap();
+            let (held, events) = held_at(&changes, t, index.header.array.len());
+            assert_eq!((player.state().held(), player.state().events()), (&held[..], events), "{ending} at {t} us");
+            let (columns, raster, curves) = shown(&mut player, us);
+            assert_eq!(columns.end, column_of(t, us) + 1);
+            let begin = (columns.end - SPAN).max(column_of(first, us));
+            assert_eq!(columns.start, begin, "{ending} at {t} us: all of the window");
+            assert!(
+                raster == counted(&changes, columns.clone(), us, t, &index.header.array),
+                "{ending}: raster at {t} us by {us} us"
+            );
+            // Curves and changes by a state of the same column width, from the beginning, without a keyframe.
+            let blank = Keyframe {
+                latest: None,
+                events: 0,
+                held: vec![UNKNOWN; index.header.array.len()],
+                rest: vec![UNKNOWN; index.header.array.len()],
+            };
+            let mut slow = ArrayState::new(index.header.array.columns, index.noise_floor(), &blank, us, 1 << 28);
+            changes.iter().filter(|change| change.t <= t).for_each(|change| slow.apply_one(change));
+            slow.advance(t);
+            slow.update_curve();
+            assert_eq!(player.state().change(), slow.change(), "{ending} at {t} us");
+            let mut same = vec![];
+            for column in columns.clone() {
+                let curve = slow.time_columns().curve(column);
+                same.extend_from_slice(&curve.sum.to_le_bytes());
+                same.extend_from_slice(&curve.area.to_le_bytes());
+                same.extend_from_slice(&curve.x.to_le_bytes());
+                same.extend_from_slice(&curve.y.to_le_bytes());
+            }
+            assert!(curves == same, "{ending}: curves at {t} us by {us} us");
+            // An encoder that is given all changes from the beginning has the same spikes. Where stamps are not multiples of
+            // its period it may sample one period earlier or later, so that a spike may cross an edge of the window.
+            let mut full = EncodedSpikes::new(&spiking, &index.header.array, us, &[], None).unwrap();
+            changes.iter().filter(|change| change.t <= t).for_each(|change| full.push(&[*change]));
+            full.advance(if t >= last { last + 1 } else { t });
+            let (mut spikes, mut all) = (vec![], vec![]);
+            player.spikes().unwrap().write(columns.clone(), &mut spikes);
+            full.write(columns, &mut all);
+            let rows = usize::from(index.header.array.rows);
+            let of_row = |cells: &[u8], row: usize| -> i64 {
+                cells.iter().skip(row).step_by(rows).map(|&cell| i64::from(cell & 15) + i64::from(cell >> 4)).sum()
+            };
+            // Its period is 0.1 ms.
+            let edges = [begin * us, t];
+            let at_edge = |t: i64| edges.iter().any(|edge| (t - edge).abs() <= 100);
+            for row in 0..rows {
+                let of = |change: &&Change| change.taxel as usize / usize::from(index.header.array.columns) == row;
+                let may = changes.iter().filter(|change| at_edge(change.t)).filter(of).count() as i64;
+                let differ = (of_row(&spikes, row) - of_row(&all, row)).abs();
+                assert!(differ <= may, "{ending}: spikes of row {row} at {t} us by {us} us: {differ}, not {may}");
+            }
+            assert!(ending != "lsa" || spikes == all, "{ending}: spikes at {t} us by {us} us");
+            some += all.iter().filter(|&&n| n > 0).count();
+        }
+        assert!(some > 1000, "{ending}: {some} spikes");
+        std::fs::remove_file(&path).unwrap();
+    }
+}
+
+#[test]
+fn steps_go_from_stamp_to_stamp_both_ways_and_through_silence() {
+    let path = recorded("steps", "mcap", 3);
+    let index = RecordingIndex::open(&path).unwrap();
+    let mut stamps: Vec<i64> = decode_all(&index).iter().map(|change| change.t).collect();
+    stamps.dedup();
+    let mut random = StdRng::seed_from_u64(8);
+    for _ in 0..20 {
+        let place = random.random_range(1..stamps.len() - 1);
+        let mut player =
+            Player::open(Arc::new(Arc::clone(&index)), stamps[place], ViewOptions::plain(COLUMN_US)).unwrap();
+        assert_eq!(player.last_stamp().unwrap(), Some(stamps[place - 1]));
+        assert_eq!(player.next_stamp().unwrap(), Some(stamps[place + 1]));
+    }
+    std::fs::remove_file(&path).unwrap();
+}

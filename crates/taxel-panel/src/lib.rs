@@ -1,0 +1,40 @@
+//! The live panel: a server for browsers and other clients that show a board or recordings (docs/panel-protocol.md).
+//!
+//! One thread serves all clients. It works on copies of the events ([`taxel_live::pipeline::Outlet`]) and sends a picture
+//! only when a client has asked for one, so that a client that reads slowly, or never, delays nothing but its own
+//! pictures. What takes long or belongs to other parts of the program (the board's serial line, cutting, label tables) is
+//! left to the program that started the panel, through [`RequestHandler`].
+
+mod array_state;
+pub mod assets;
+mod clients;
+mod connections;
+mod encoded_spikes;
+mod folder;
+mod handler;
+mod hub;
+mod keyframe_index;
+mod labels;
+mod limits;
+mod live_source;
+mod messages;
+mod options;
+mod picture;
+mod player;
+mod presets;
+mod recorder;
+mod recording_session;
+mod registers;
+mod request;
+mod requests;
+mod server;
+mod session;
+mod taxel_history;
+mod time_columns;
+
+pub use handler::{
+    BoardLines, Cut, LabelRow, PresetValue, Reply, RequestHandler, UnhealthyTaxels, UserPreset, UserPresets,
+};
+pub use keyframe_index::Activity;
+pub use options::PanelOptions;
+pub use server::Panel;

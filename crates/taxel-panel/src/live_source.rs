@@ -1,0 +1,163 @@
+//! A live source: copies of a board's events from the pipeline, and the state and the keyframe index made of them.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crossbeam_channel as channel;
+use taxel_core::Array;
+use taxel_live::Result;
+use taxel_live::clock::Offset;
+use taxel_live::locked::lock;
+use taxel_live::pipeline::{Handle, Outlet, Said, UNKNOWN};
+use taxel_live::recording::now_ns;
+
+use super::array_state::{ArrayState, Keyframe};
+use super::clients::MOST_WAITING;
+use super::keyframe_index::live::{LiveIndex, REACH_US};
+use super::keyframe_index::{Activity, KeyframeIndex};
+use super::time_columns::{COLUMN_US, TimeColumns};
+
+/// The time shown follows the host's clock this far behind it while no events arrive, ns: events arrive within that.
+const BEHIND_NS: i64 = 40_000_000;
+
+/// A source this far behind the time shown has stalled, us; less is network delay and error of the clocks.
+const STALLED_US: i64 = 200_000;
+
+/// See the module.
+pub(super) struct LiveSource {
+    pub(super) handle: Handle,
+    outlet: Mutex<Outlet>,
+    detections: channel::Receiver<Said>,
+    pub(super) state: Mutex<ArrayState>,
+    pub(super) index: LiveIndex,
+    pub(super) activity: Mutex<Activity>,
+    /// Events that the outlet had no room for.
+    missing: AtomicU64,
+    /// Number of zeroings that the state has applied.
+    zeroings: AtomicU64,
+    silence: Mutex<Silence>,
+}
+
+/// Where the board's time is while no events arrive.
+#[derive(Debug, Default)]
+struct Silence {
+    /// Arrival (ns since 1970) and board time (us) of the latest event.
+    latest: Option<(i64, i64)>,
+    /// How far a stalled source is behind the host's clock, us.
+    behind_us: i64,
+}
+
+/// What arrived since the last call of [`LiveSource::receive`].
+#[derive(Default)]
+pub(super) struct Received {
+    /// A new picture can be shown.
+    pub(super) picture: bool,
+    /// The board was reset.
+    pub(super) reset: bool,
+    /// Taxels were zeroed.
+    pub(super) zeroed: bool,
+    /// New detections.
+    pub(super) detections: Vec<Said>,
+}
+
+impl LiveSource {
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the source has ended.
+    pub(super) fn new(handle: Handle, noise_floor: u8) -> Result<Self> {
+        let (detections, outlet) = (handle.hear(MOST_WAITING), handle.look()?);
+        let array = handle.options().array.clone();
+        let unknown = vec![UNKNOWN; array.len()];
+        let blank = Keyframe { latest: None, events: 0, held: unknown.clone(), rest: unknown };
+        // Enough for all that a view of the past can show, at the widest columns too.
+        let bytes = TimeColumns::bytes_for(array.rows.into(), REACH_US / COLUMN_US);
+        Ok(Self {
+            state: Mutex::new(ArrayState::new(array.columns, noise_floor.into(), &blank, COLUMN_US, bytes)),
+            activity: Mutex::new(Activity::new(array.len())),
+            index: LiveIndex::new(array, noise_floor.into()),
+            outlet: Mutex::new(outlet),
+            handle,
+            detections,
+            missing: AtomicU64::new(0),
+            zeroings: AtomicU64::new(0),
+            silence: Mutex::default(),
+        })
+    }
+
+    pub(super) fn array(&self) -> &Array {
+        self.index.array()
+    }
+
+    /// Events that only the panel lacks.
+    pub(super) fn missing(&self) -> u64 {
+        self.missing.load(Ordering::Relaxed)
+    }
+
+    /// Applies what the pipeline has copied; it copies more often while a client is connected.
+    pub(super) fn receive(&self, has_clients: bool) -> Received {
+        let mut received = Received::default();
+        let outlet = lock(&self.outlet);
+        outlet.look(has_clients);
+        while let Some(piece) = outlet.next() {
+            let mut state = lock(&self.state);
+            self.missing.fetch_add(piece.missing, Ordering::Relaxed);
+            if let (Some(first), Some(latest)) = (piece.changes.first(), state.latest()) {
+                // A sensor whose driver stalled is behind the time that the host's clock gave to its silence.
+                let t = self.index.range().map_or(first.t, |(_, last)| last.max(first.t));
+                if t < latest - STALLED_US {
+                    state.set_back(t);
+                }
+            }
+            if let Some(last) = piece.changes.last() {
+                lock(&self.silence).latest = Some((now_ns(), last.t));
+            }
+            if piece.reset {
+                state.clear();
+                received.reset = true;
+            }
+            let stored = self.index.push(piece, &state);
+            let gap = stored.piece.missing > 0 || state.latest().is_none();
+            if let Some(held) = stored.piece.held.as_ref().filter(|_| gap) {
+                state.set_held(held, stored.piece.before);
+            }
+            state.apply(&stored.piece.changes);
+            let mut activity = lock(&self.activity);
+            stored.piece.changes.iter().for_each(|change| activity.count(change));
+            received.picture |= !stored.piece.changes.is_empty();
+        }
+        drop(outlet);
+        received.detections.extend(self.detections.try_iter());
+        received.zeroed = self.apply_zeroings();
+        received.picture |= received.zeroed;
+        received
+    }
+
+    /// Sets the rest of taxels that were zeroed since the last call; returns whether there were any.
+    fn apply_zeroings(&self) -> bool {
+        let zeroings = self.handle.zeroings();
+        if self.zeroings.swap(zeroings, Ordering::Relaxed) == zeroings {
+            return false;
+        }
+        let columns = usize::from(self.array().columns);
+        let mut state = lock(&self.state);
+        for one in self.handle.zeroed().0 {
+            // The rest is a held value, which has 16 bits.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            state.zero(usize::from(one.y) * columns + usize::from(one.x), one.rest as u16);
+        }
+        true
+    }
+
+    /// Moves the time shown on while no events arrive; that of a stalled source from where it is.
+    pub(super) fn follow_clock(&self, offset: Offset) {
+        let mut silence = lock(&self.silence);
+        if let Some((arrived_ns, t)) = silence.latest.take() {
+            let late = offset.board_us(arrived_ns) - t;
+            silence.behind_us = if late > STALLED_US { late } else { 0 };
+        }
+        let mut state = lock(&self.state);
+        if state.latest().is_some() {
+            state.advance(offset.board_us(now_ns() - BEHIND_NS) - silence.behind_us);
+        }
+    }
+}

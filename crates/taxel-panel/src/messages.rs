@@ -1,0 +1,85 @@
+//! Parts of the protocol's JSON messages that several requests use: docs/panel-protocol.md, *From the server*.
+
+use serde_json::{Map, Value, json};
+use taxel_core::Array;
+use taxel_core::encode::Zeroing;
+use taxel_live::pipeline::{Counters, Said};
+use taxel_live::recording::now_ns;
+
+use super::keyframe_index::KeyframeIndex;
+use super::live_source::LiveSource;
+
+/// A sensor.
+pub(super) fn array(array: &Array) -> Value {
+    let digit = |&exists: &bool| if exists { '1' } else { '0' };
+    let exists = array.exists.as_ref().map(|all| all.iter().map(digit).collect::<String>());
+    json!({ "rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm, "name": array.name, "exists": exists })
+}
+
+/// A taxel that was zeroed.
+pub(super) fn zeroing(zeroing: &Zeroing) -> Value {
+    let Zeroing { t, x, y, rest, before } = zeroing;
+    json!({ "taxel": [x, y], "t_us": t, "rest": rest, "before": before })
+}
+
+/// `detection`.
+pub(super) fn detection(said: &Said) -> Value {
+    let Said { detection, said, .. } = said;
+    json!({
+        "type": "detection", "label": detection.label, "t_us": detection.t, "known_us": detection.known, "said_us": said,
+        "latency_us": said - detection.known, "slope_mv_per_ms": detection.slope,
+    })
+}
+
+/// `warning`.
+pub(super) fn warning(text: impl std::fmt::Display) -> Value {
+    json!({ "type": "warning", "text": text.to_string() })
+}
+
+/// `counters` of a live source; rates are those of the last `seconds`, since the counters `before`.
+#[allow(clippy::cast_precision_loss)]
+pub(super) fn counters(
+    live: &LiveSource,
+    now: &Counters,
+    before: Option<&Counters>,
+    seconds: f64,
+    frame_us: f64,
+    clients: usize,
+) -> Map<String, Value> {
+    let rate = |now: u64, before: Option<u64>| before.map(|before| now.saturating_sub(before) as f64 / seconds);
+    let damaged = now.wire.skipped + now.wire_v2.checksum + now.wire_v2.short + now.wire_v2.foreign;
+    let message = json!({
+        "type": "counters",
+        "at_ns": now_ns(),
+        "seconds": now.seconds,
+        "board_us": now.board_us,
+        "events": now.events,
+        "events_per_s": rate(now.events, before.map(|b| b.events)),
+        "bytes_per_s": rate(now.capture.bytes, before.map(|b| b.capture.bytes)),
+        "datagrams_per_s": rate(now.capture.datagrams, before.map(|b| b.capture.datagrams)),
+        "frames_per_s": 1e6 / frame_us,
+        "lost": {
+            "kernel": now.capture.dropped_by_kernel,
+            "queue": now.capture.dropped_by_queue,
+            "wire": now.wire_v2.missing,
+            "damaged": damaged,
+            "outside": now.wire.outside + now.wire_v2.outside,
+            "readout": now.events_dropped,
+            "panel": live.missing(),
+        },
+        "queue": now.capture.waiting,
+        "latency": { "decode": now.decode_latency, "said": now.said_latency },
+        "wire_version": now.wire_version,
+        "marked_start": now.marked_start,
+        "taring": now.taring,
+        "detections": now.detections,
+        "reach_us": live.index.range(),
+        "reach_bytes": live.index.bytes(),
+        "viewers": clients,
+        "ended": live.handle.is_over(),
+    });
+    match message {
+        Value::Object(message) => message,
+        _ => Map::new(),
+    }
+}

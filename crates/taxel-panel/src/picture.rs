@@ -1,0 +1,206 @@
+//! A picture in the bytes that clients receive: docs/panel-protocol.md, *Pictures*.
+
+use taxel_live::recording::now_ns;
+
+use super::array_state::ArrayState;
+use super::encoded_spikes::EncodedSpikes;
+use super::player::Player;
+use super::taxel_history::TaxelHistory;
+use super::time_columns::{COLUMN_US, Curve, SPAN, TimeColumns, column_of};
+
+/// Bytes of the header.
+const HEADER: usize = 128;
+
+/// Where the table of sections begins, and how many there are.
+const SECTIONS: usize = 64;
+const SECTION_COUNT: usize = 8;
+
+/// The flags of the header.
+pub(super) const LIVE: u16 = 1;
+pub(super) const MOVES: u16 = 2;
+pub(super) const RESTART: u16 = 4;
+pub(super) const RECORDS: u16 = 8;
+pub(super) const FOLLOWS: u16 = 16;
+
+/// What a picture contains beside the state of the array.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct About {
+    pub(super) flags: u16,
+    pub(super) number: u32,
+    /// The first column of time that the client lacks.
+    pub(super) from: i64,
+    pub(super) with_rest: bool,
+    pub(super) watched: Option<u32>,
+    /// Width of a column of time, us.
+    pub(super) column_us: i64,
+}
+
+/// Raster and curves in the width that a picture shows, from narrower columns and from up to two stores.
+struct ShownColumns<'a> {
+    own: &'a TimeColumns,
+    /// First column of `own`; earlier ones come from `whole`.
+    first_own: i64,
+    whole: Option<&'a TimeColumns>,
+    /// Last stored column.
+    last: i64,
+    /// Stored columns in one shown column.
+    factor: i64,
+}
+
+impl<'a> ShownColumns<'a> {
+    fn new(
+        own: &'a TimeColumns,
+        first_own: i64,
+        whole: Option<&'a TimeColumns>,
+        latest: Option<i64>,
+        column_us: i64,
+    ) -> Self {
+        let stored_us = column_us.min(COLUMN_US);
+        let last = latest.map_or(i64::MIN, |t| column_of(t, stored_us));
+        // A view that has played for long has dropped the beginning of its own columns.
+        let first_own = first_own.max(own.reach().map_or(i64::MAX, |(first, _)| first));
+        Self { own, first_own, whole, last, factor: column_us / stored_us }
+    }
+
+    /// The first known column.
+    fn first(&self) -> i64 {
+        let first =
+            self.whole.and_then(TimeColumns::reach).map_or(self.first_own, |(first, _)| first.min(self.first_own));
+        first.div_euclid(self.factor)
+    }
+
+    fn store(&self, column: i64) -> &TimeColumns {
+        match self.whole {
+            Some(whole) if column < self.first_own => whole,
+            _ => self.own,
+        }
+    }
+
+    fn raster(&self, column: i64, out: &mut Vec<u8>) {
+        if self.factor == 1 {
+            return self.store(column).raster(column, out);
+        }
+        let (begin, mut one) = (out.len(), vec![]);
+        out.resize(begin + self.own.rows(), 0);
+        for part in column * self.factor..((column + 1) * self.factor).min(self.last + 1) {
+            if self.store(part).is_silent(part) {
+                continue;
+            }
+            one.clear();
+            self.store(part).raster(part, &mut one);
+            for (sum, cell) in out[begin..].iter_mut().zip(&one).filter(|(_, cell)| **cell > 0) {
+                let (ups, downs) = ((*sum & 15) + (cell & 15), (*sum >> 4) + (cell >> 4));
+                *sum = ups.min(15) | downs.min(15) << 4;
+            }
+        }
+    }
+
+    fn curve(&self, column: i64) -> Curve {
+        let end = ((column + 1) * self.factor - 1).min(self.last);
+        self.store(end).curve(end)
+    }
+}
+
+/// Picture of the newest state, and its last column. `narrow` has the columns where they are narrower than the state's.
+pub(super) fn of_state(
+    state: &mut ArrayState,
+    narrow: Option<&mut Player>,
+    columns: u16,
+    history: Option<&TaxelHistory>,
+    spikes: Option<&EncodedSpikes>,
+    about: About,
+) -> (Vec<u8>, i64) {
+    state.update_curve();
+    let state = &*state;
+    let (own, first_own) = match narrow {
+        Some(narrow) => {
+            narrow.state_mut().update_curve();
+            let (own, first_own, _) = narrow.time_columns();
+            (own, first_own)
+        }
+        // The state's columns are too wide, so none is known.
+        None if about.column_us < COLUMN_US => (state.time_columns(), i64::MAX),
+        None => (state.time_columns(), i64::MIN),
+    };
+    let shown = ShownColumns::new(own, first_own, None, state.latest(), about.column_us);
+    write(state, columns, &shown, history, spikes, about)
+}
+
+/// Picture of a source at the time of playback, and its last column.
+pub(super) fn of_player(player: &mut Player, about: About) -> (Vec<u8>, i64) {
+    player.state_mut().update_curve();
+    let player = &*player;
+    let (own, first_own, whole) = player.time_columns();
+    let shown = ShownColumns::new(own, first_own, whole, player.state().latest(), about.column_us);
+    write(player.state(), player.index().array().columns, &shown, player.history(), player.spikes(), about)
+}
+
+fn write(
+    state: &ArrayState,
+    columns: u16,
+    shown: &ShownColumns<'_>,
+    history: Option<&TaxelHistory>,
+    spikes: Option<&EncodedSpikes>,
+    about: About,
+) -> (Vec<u8>, i64) {
+    let taxels = state.held().len();
+    let rows = taxels / usize::from(columns.max(1));
+    let last = state.latest().map_or(i64::MIN, |t| column_of(t, about.column_us));
+    let first = about.from.max(shown.first()).max(last.saturating_add(1 - SPAN));
+    let range = if first <= last { first..last + 1 } else { 0..0 };
+    let count = usize::try_from(range.end - range.start).unwrap_or(0);
+    let mut out = Vec::with_capacity(HEADER + taxels * 5 + count * (2 * rows + 22) + 64);
+    out.resize(HEADER, 0);
+    let mut places = [(0_usize, 0_usize); SECTION_COUNT];
+    let mut section = |out: &mut Vec<u8>, number: usize, write: &dyn Fn(&mut Vec<u8>)| {
+        out.resize(out.len().next_multiple_of(8), 0);
+        let begin = out.len();
+        write(out);
+        places[number] = (begin, out.len() - begin);
+    };
+    let values =
+        |values: &[u16], out: &mut Vec<u8>| values.iter().for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
+    section(&mut out, 0, &|out| values(state.held(), out));
+    section(&mut out, 1, &|out| out.extend(state.change().iter().map(|&change| change.to_le_bytes()[0])));
+    section(&mut out, 2, &|out| range.clone().for_each(|column| shown.raster(column, out)));
+    section(&mut out, 3, &|out| {
+        for curve in range.clone().map(|column| shown.curve(column)) {
+            out.extend_from_slice(&curve.sum.to_le_bytes());
+            out.extend_from_slice(&curve.area.to_le_bytes());
+            out.extend_from_slice(&curve.x.to_le_bytes());
+            out.extend_from_slice(&curve.y.to_le_bytes());
+        }
+    });
+    if let Some(history) = history {
+        section(&mut out, 4, &|out| history.write(range.clone(), out));
+    }
+    if about.with_rest {
+        section(&mut out, 5, &|out| values(state.rest(), out));
+    }
+    if let Some(spikes) = spikes {
+        section(&mut out, 6, &|out| spikes.write(range.clone(), out));
+    }
+    let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
+    put(0, b"TXP1");
+    // The protocol's fields are as wide as the largest array and section need.
+    #[allow(clippy::cast_possible_truncation)]
+    {
+        put(4, &(HEADER as u16).to_le_bytes());
+        put(12, &(rows as u16).to_le_bytes());
+        put(44, &(about.column_us as u32).to_le_bytes());
+        put(56, &(count as u32).to_le_bytes());
+        for (number, (begin, length)) in places.iter().enumerate().filter(|(_, (_, length))| *length > 0) {
+            put(SECTIONS + 8 * number, &(*begin as u32).to_le_bytes());
+            put(SECTIONS + 8 * number + 4, &(*length as u32).to_le_bytes());
+        }
+    }
+    put(6, &about.flags.to_le_bytes());
+    put(8, &about.number.to_le_bytes());
+    put(14, &columns.to_le_bytes());
+    put(16, &state.latest().unwrap_or(i64::MIN).to_le_bytes());
+    put(24, &now_ns().to_le_bytes());
+    put(32, &state.events().to_le_bytes());
+    put(40, &about.watched.unwrap_or(u32::MAX).to_le_bytes());
+    put(48, &range.start.to_le_bytes());
+    (out, last)
+}

@@ -1,0 +1,246 @@
+//! Playback: the state of a source at a time that moves forward, back, and from time stamp to time stamp.
+
+use std::sync::Arc;
+
+use taxel_core::encode::Encoder;
+use taxel_core::problem;
+
+use super::array_state::{ArrayState, FORGET};
+use super::encoded_spikes::EncodedSpikes;
+use super::keyframe_index::{ChangeReader, KeyframeIndex, Read};
+use super::taxel_history::TaxelHistory;
+use super::time_columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
+use taxel_live::Result;
+use taxel_live::pipeline::{Change, UNKNOWN};
+
+/// Maximum number of changes that are decoded only for the history of a taxel and the spikes of an encoder.
+const HISTORY_CHANGES: u64 = 2_000_000;
+
+/// What a view shows of a source.
+#[derive(Debug, Clone)]
+pub struct ViewOptions {
+    /// Width of a column of time, us ([`is_column`](super::time_columns::is_column)).
+    pub column_us: i64,
+    /// The taxel whose history is shown.
+    pub watched: Option<u32>,
+    /// The encoder whose spikes are shown.
+    pub encoder: Option<Encoder>,
+    /// Raster and curves of the whole source, where its keyframe index does not store them.
+    pub whole: Option<Arc<TimeColumns>>,
+}
+
+impl ViewOptions {
+    /// Columns of `column_us` without history and spikes.
+    #[must_use]
+    pub fn plain(column_us: i64) -> Self {
+        Self { column_us, watched: None, encoder: None, whole: None }
+    }
+
+    /// Whether the columns are narrower than those that keyframe indices store.
+    #[must_use]
+    pub fn is_narrow(&self) -> bool {
+        self.column_us < COLUMN_US
+    }
+}
+
+/// A source at a time.
+pub struct Player {
+    index: Arc<dyn KeyframeIndex>,
+    reader: Box<dyn ChangeReader>,
+    state: ArrayState,
+    /// First column that the state has itself; earlier ones come from the whole source.
+    first_own: i64,
+    /// Changes that were read, and how many of them were applied.
+    pending: Vec<Change>,
+    applied: usize,
+    t: i64,
+    history: Option<TaxelHistory>,
+    spikes: Option<EncodedSpikes>,
+    options: ViewOptions,
+}
+
+impl Player {
+    /// Opens a source at `t` (us), limited to the range of the source.
+    ///
+    /// # Errors
+    ///
+    /// As [`KeyframeIndex::open`] and [`ChangeReader::read`]; `Core(Problem)` where the encoder does not fit the array.
+    pub fn open(index: Arc<dyn KeyframeIndex>, t: i64, options: ViewOptions) -> Result<Self> {
+        let (first, last) = index.range().ok_or_else(|| problem!("nothing to show: it holds no events"))?;
+        let t = t.clamp(first, last);
+        let span = SPAN * options.column_us;
+        let stored = !options.is_narrow() && (index.time_columns().is_some() || options.whole.is_some());
+        let needs_changes = options.watched.is_some() || options.encoder.is_some();
+        let dense = index.events_before(t).saturating_sub(index.events_before(t - span)) > HISTORY_CHANGES;
+        let before = if stored && (!needs_changes || dense) { 0 } else { span };
+        let (frame, reader) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
+        let columns = index.array().columns;
+        let unit_us = options.column_us.min(COLUMN_US);
+        let bytes = TimeColumns::bytes_for(index.array().rows.into(), span / unit_us);
+        let state = ArrayState::new(columns, index.noise_floor(), &frame, unit_us, bytes);
+        let first_own = frame.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
+        let history = options.watched.map(|taxel| {
+            let held = frame.held.get(taxel as usize).copied().unwrap_or(UNKNOWN);
+            TaxelHistory::new(taxel, held, frame.latest, options.column_us)
+        });
+        let encoder = options.encoder.as_ref();
+        let spikes =
+            encoder.map(|e| EncodedSpikes::new(e, index.array(), options.column_us, &frame.held, frame.latest));
+        let spikes = spikes.transpose()?;
+        let mut player =
+            Self { index, reader, state, first_own, pending: vec![], applied: 0, t, history, spikes, options };
+        player.advance(t)?;
+        Ok(player)
+    }
+
+    /// Moves to a later time, at most to the end; returns whether the end is still ahead.
+    ///
+    /// # Errors
+    ///
+    /// As [`ChangeReader::read`].
+    pub fn advance(&mut self, t: i64) -> Result<bool> {
+        let last = self.index.range().map_or(t, |(_, last)| last);
+        self.follow(t.min(last))?;
+        if let Some(spikes) = self.spikes.as_mut().filter(|_| t >= last) {
+            // All events of the last time stamp have been applied too.
+            spikes.advance(last + 1);
+        }
+        Ok(t < last)
+    }
+
+    /// Moves to a later time, also beyond the last event.
+    ///
+    /// # Errors
+    ///
+    /// As [`ChangeReader::read`].
+    pub fn follow(&mut self, t: i64) -> Result<()> {
+        loop {
+            let ahead = &self.pending[self.applied..];
+            let now = ahead.iter().position(|change| change.t > t).unwrap_or(ahead.len());
+            let (now, later) = ahead.split_at(now);
+            self.state.apply(now);
+            if let Some(history) = &mut self.history {
+                now.iter().for_each(|change| history.apply(change));
+            }
+            if let Some(spikes) = &mut self.spikes {
+                spikes.push(now);
+            }
+            self.applied += now.len();
+            if !later.is_empty() {
+                break;
+            }
+            self.pending.clear();
+            self.applied = 0;
+            match self.reader.read(&mut self.pending)? {
+                Read::Changes => {}
+                Read::Held(held, events) => self.state.set_held(&held, events),
+                Read::End => break,
+            }
+        }
+        self.state.advance(t);
+        if let Some(spikes) = &mut self.spikes {
+            spikes.advance(t);
+        }
+        self.t = self.t.max(t);
+        Ok(())
+    }
+
+    /// The next time stamp that has events, us.
+    ///
+    /// # Errors
+    ///
+    /// As [`ChangeReader::read`].
+    pub fn next_stamp(&mut self) -> Result<Option<i64>> {
+        loop {
+            if let Some(change) = self.pending.get(self.applied) {
+                return Ok(Some(change.t.max(self.t)));
+            }
+            self.pending.clear();
+            self.applied = 0;
+            match self.reader.read(&mut self.pending)? {
+                Read::Changes => {}
+                Read::Held(held, events) => self.state.set_held(&held, events),
+                Read::End => return Ok(None),
+            }
+        }
+    }
+
+    /// The last time stamp before this one that has events, us.
+    ///
+    /// # Errors
+    ///
+    /// As [`KeyframeIndex::open`] and [`ChangeReader::read`].
+    pub fn last_stamp(&self) -> Result<Option<i64>> {
+        let mut from = self.t;
+        loop {
+            let (_, mut reader) = self.index.open(from.saturating_sub(1))?;
+            let (mut changes, mut found) = (vec![], None);
+            'reading: loop {
+                changes.clear();
+                match reader.read(&mut changes)? {
+                    Read::Changes => {}
+                    Read::Held(..) => continue,
+                    Read::End => break,
+                }
+                for change in &changes {
+                    if change.t >= self.t {
+                        break 'reading;
+                    }
+                    found = found.max(Some(change.t));
+                }
+            }
+            if found.is_some() {
+                return Ok(found);
+            }
+            match self.index.keyframe_before(from.saturating_sub(1)) {
+                Some(earlier) => from = earlier,
+                None => return Ok(None),
+            }
+        }
+    }
+
+    /// The time shown, us.
+    #[must_use]
+    pub fn t(&self) -> i64 {
+        self.t
+    }
+
+    /// The state at this time.
+    #[must_use]
+    pub fn state(&self) -> &ArrayState {
+        &self.state
+    }
+
+    /// The keyframe index of the source.
+    #[must_use]
+    pub fn index(&self) -> &Arc<dyn KeyframeIndex> {
+        &self.index
+    }
+
+    /// The state at this time, to change its rest or to update its curve.
+    pub fn state_mut(&mut self) -> &mut ArrayState {
+        &mut self.state
+    }
+
+    /// History of the watched taxel.
+    #[must_use]
+    pub fn history(&self) -> Option<&TaxelHistory> {
+        self.history.as_ref()
+    }
+
+    pub(super) fn spikes(&self) -> Option<&EncodedSpikes> {
+        self.spikes.as_ref()
+    }
+
+    pub(super) fn spikes_mut(&mut self) -> Option<&mut EncodedSpikes> {
+        self.spikes.as_mut()
+    }
+
+    /// Raster and curves of the state, the first column that they hold, and those of the whole source for earlier columns.
+    #[must_use]
+    pub fn time_columns(&self) -> (&TimeColumns, i64, Option<&TimeColumns>) {
+        let whole =
+            if self.options.is_narrow() { None } else { self.options.whole.as_deref().or(self.index.time_columns()) };
+        (self.state.time_columns(), self.first_own, whole)
+    }
+}

@@ -1,0 +1,141 @@
+//! State of the recorder: what is recorded, and how far it is.
+
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use taxel_live::locked::lock;
+use taxel_live::recording::numbered;
+use tokio::sync::Notify;
+
+/// What is to be recorded.
+#[derive(Debug, Clone)]
+pub(super) struct RecordingPlan {
+    pub(super) name: String,
+    /// Number of the next recording, appended to the name.
+    pub(super) index: Option<u32>,
+    /// Ending of the file, "mcap" or "lsa".
+    pub(super) ending: &'static str,
+    pub(super) countdown: Duration,
+    pub(super) length: Option<Duration>,
+    /// Whether the next recording begins by itself.
+    pub(super) advance: bool,
+    pub(super) label: Option<String>,
+}
+
+impl RecordingPlan {
+    /// Name of the next file.
+    pub(super) fn file(&self) -> String {
+        let plain = format!("{}.{}", self.name, self.ending);
+        match self.index {
+            Some(index) => numbered(plain.as_ref(), index).to_string_lossy().into_owned(),
+            None => plain,
+        }
+    }
+}
+
+/// What the recorder does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Phase {
+    #[default]
+    Idle,
+    /// The recording begins at this time.
+    Countdown(Instant),
+    /// The recording began at this time.
+    Recording(Instant),
+    Finishing,
+}
+
+#[derive(Debug, Default)]
+pub(super) struct RecorderState {
+    pub(super) phase: Phase,
+    pub(super) plan: Option<RecordingPlan>,
+    /// File and verdict of the last recording.
+    pub(super) last: Option<(String, String)>,
+    /// Why the last recording ended early or did not begin.
+    pub(super) error: Option<String>,
+}
+
+/// See the module.
+#[derive(Debug, Default)]
+pub(super) struct Recorder {
+    pub(super) state: Mutex<RecorderState>,
+    pub(super) stop: Notify,
+}
+
+impl Recorder {
+    /// The file that is being recorded.
+    pub(super) fn file(&self) -> Option<String> {
+        let state = lock(&self.state);
+        let records = matches!(state.phase, Phase::Recording(_) | Phase::Finishing);
+        state.plan.as_ref().filter(|_| records).map(RecordingPlan::file)
+    }
+
+    pub(super) fn is_busy(&self) -> bool {
+        lock(&self.state).phase != Phase::Idle
+    }
+
+    /// The `recorder` message.
+    pub(super) fn message(&self) -> Value {
+        let state = lock(&self.state);
+        let plan = state.plan.as_ref();
+        let length = plan.and_then(|plan| plan.length);
+        let (name, left, seconds) = match state.phase {
+            Phase::Idle => ("idle", None, None),
+            Phase::Countdown(until) => ("countdown", Some(until.saturating_duration_since(Instant::now())), None),
+            Phase::Recording(since) => {
+                let passed = since.elapsed();
+                ("recording", length.map(|length| length.saturating_sub(passed)), Some(passed.as_secs_f64()))
+            }
+            Phase::Finishing => ("finishing", None, None),
+        };
+        json!({
+            "type": "recorder",
+            "state": name,
+            "name": plan.map(|plan| &plan.name),
+            "index": plan.and_then(|plan| plan.index),
+            "file": plan.filter(|_| state.phase != Phase::Idle).map(RecordingPlan::file),
+            "label": plan.and_then(|plan| plan.label.as_ref()),
+            "advance": plan.is_some_and(|plan| plan.advance),
+            "left_s": left.map(|left| left.as_secs_f64()),
+            "seconds": seconds,
+            "length_s": length.map(|length| length.as_secs_f64()),
+            "last": state.last.as_ref().map(|(file, verdict)| json!({ "file": file, "verdict": verdict })),
+            "error": state.error,
+        })
+    }
+
+    /// Begins the countdown of a recording.
+    ///
+    /// # Errors
+    ///
+    /// Refused while the recorder is busy.
+    pub(super) fn plan(&self, plan: RecordingPlan) -> Result<(), String> {
+        let mut state = lock(&self.state);
+        if state.phase != Phase::Idle {
+            return Err("a recording runs already: stop it first".to_owned());
+        }
+        state.phase = Phase::Countdown(Instant::now() + plan.countdown);
+        state.plan = Some(plan);
+        state.error = None;
+        Ok(())
+    }
+
+    /// Ends the recording or its countdown, and a series of recordings.
+    ///
+    /// # Errors
+    ///
+    /// Refused while the recorder is idle.
+    pub(super) fn end(&self) -> Result<(), String> {
+        let mut state = lock(&self.state);
+        if state.phase == Phase::Idle {
+            return Err("nothing is recorded".to_owned());
+        }
+        if let Some(plan) = &mut state.plan {
+            plan.advance = false;
+        }
+        drop(state);
+        self.stop.notify_one();
+        Ok(())
+    }
+}

@@ -1,0 +1,243 @@
+//! The requests that do not concern the client's own view, and may take long: docs/panel-protocol.md, *From the client*.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use taxel_live::locked::lock;
+use taxel_live::pipeline::UNKNOWN;
+use taxel_live::ports::ports;
+
+use super::clients::Broadcast;
+use super::handler::{Cut, LabelRow, UnhealthyTaxels};
+use super::hub::Hub;
+use super::labels::{Label, file_of};
+use super::live_source::LiveSource;
+use super::recorder::RecordingPlan;
+use super::request::{Answer, Refusal, Request};
+use super::{recording_session, registers};
+
+/// Carries out a request; `shown` is the recording that the client shows. Returns the message for that client alone.
+///
+/// # Errors
+///
+/// The refusal, after which nothing has changed.
+pub(super) async fn carry_out(
+    hub: Arc<Hub>,
+    what: &str,
+    shown: Option<&str>,
+    request: Request<'_>,
+) -> Answer<Option<Value>> {
+    match what {
+        "set" => registers::set(&hub, &request).await?,
+        "read" => registers::read(&hub).await?,
+        "send_all" => registers::send_all(&hub).await?,
+        "preset_apply" => registers::apply_preset(&hub, request.text("name", 60)?).await?,
+        "preset_save" => registers::save_preset(&hub, request.text("name", 60)?).await?,
+        "preset_delete" => registers::delete_preset(&hub, request.text("name", 60)?).await?,
+        "record" => record(&hub, &request)?,
+        "stop" => hub.recorder.end()?,
+        "note" => board(&hub)?.handle.note(request.text("text", 200)?)?,
+        "mark" | "rename" | "move" | "delete" => label(&hub, what, shown, &request).await?,
+        "health" => return health(&hub, shown).await.map(Some),
+        "cut" => return cut(&hub, shown, &request).await.map(Some),
+        "recordings" => return Ok(Some(hub.recordings_message())),
+        "rest" => rest(&hub, &request)?,
+        "zero" => zero(&hub, &request).await?,
+        "places" => return places(&hub).await.map(Some),
+        "delta_intensity" => {
+            check_restart(&hub)?;
+            let on = request.flag("on")?;
+            hub.ask(move |handler| handler.set_differences(on)).await?;
+        }
+        "listen" => {
+            check_restart(&hub)?;
+            let (host, port) = (request.text("host", 255)?.to_owned(), request.whole("port", 0, 65_535)?);
+            let port = u16::try_from(port).unwrap_or(u16::MAX);
+            hub.ask(move |handler| handler.listen(&host, port)).await?;
+        }
+        "control" => control(&hub, &request).await?,
+        _ => return Err(format!("type {what:?} is none of the protocol's").into()),
+    }
+    Ok(None)
+}
+
+fn board(hub: &Hub) -> Answer<Arc<LiveSource>> {
+    hub.live().ok_or_else(|| "no board is listened to".into())
+}
+
+/// Whether the live source may begin anew: on another address, or with another meaning of intensities.
+fn check_restart(hub: &Hub) -> Answer {
+    if hub.recorder.is_busy() {
+        return Err("a recording runs: stop it first".into());
+    }
+    if hub.live().is_none() {
+        return Err("this panel shows recordings only: begin it with taxel live --panel".into());
+    }
+    Ok(())
+}
+
+/// Connects the board's serial line, or disconnects it.
+async fn control(hub: &Hub, request: &Request<'_>) -> Answer {
+    let place = request.optional_text("place", 255)?.map(str::to_owned);
+    let connected = {
+        let place = place.clone();
+        hub.ask(move |handler| handler.connect(place.as_deref())).await
+    };
+    let connects = place.is_some();
+    {
+        let mut board = hub.board();
+        board.control = place.filter(|_| connected.is_ok());
+        board.known = false;
+    }
+    hub.clients.send(Broadcast::Hello);
+    connected?;
+    if connects { registers::read(hub).await } else { Ok(()) }
+}
+
+async fn places(hub: &Hub) -> Answer<Value> {
+    let serial = tokio::task::spawn_blocking(ports).await.map_err(|_| Refusal::bug("places:"))??;
+    let addresses = hub.ask(|handler| handler.addresses()).await?;
+    let addresses: Vec<_> = addresses.into_iter().map(|(host, name)| json!({ "host": host, "name": name })).collect();
+    Ok(json!({ "type": "places", "serial": serial, "addresses": addresses }))
+}
+
+fn rest(hub: &Hub, request: &Request<'_>) -> Answer {
+    let live = board(hub)?;
+    let mut state = lock(&live.state);
+    match request.get("how").and_then(Value::as_str) {
+        Some("now") if state.held().iter().all(|&held| held == UNKNOWN) => Err("no events have arrived yet".into()),
+        Some("now") => {
+            state.rest_now();
+            Ok(())
+        }
+        Some("lowest") => {
+            state.rest_lowest();
+            Ok(())
+        }
+        _ => Err(Refusal::of("how", "must be now or lowest")),
+    }
+}
+
+async fn zero(hub: &Hub, request: &Request<'_>) -> Answer {
+    let (live, taxels) = (board(hub)?, request.taxels("taxels")?);
+    // The recording keeps the zeroing, and a disk may be slow.
+    let zeroed = tokio::task::spawn_blocking(move || live.handle.zero(&taxels)).await;
+    zeroed.map_err(|_| Refusal::bug("zero:"))??;
+    Ok(())
+}
+
+fn record(hub: &Arc<Hub>, request: &Request<'_>) -> Answer {
+    let name = request.text("name", 100)?;
+    let index = if request.has("index") { Some(request.whole("index", 0, 999_999)?) } else { None };
+    let length = if request.has("length_s") { Some(request.number("length_s", 0.01, 86_400.0)?) } else { None };
+    let countdown = if request.has("countdown_s") { request.number("countdown_s", 0.0, 60.0)? } else { 0.0 };
+    let ending = match request.get("format").and_then(Value::as_str) {
+        None | Some("mcap") => "mcap",
+        Some("lsa") => "lsa",
+        Some(_) => return Err(Refusal::of("format", "must be mcap or lsa")),
+    };
+    let advance = request.optional_flag("advance")?;
+    if advance && (index.is_none() || length.is_none()) {
+        return Err(Refusal::of("advance", "needs an index and a length"));
+    }
+    if hub.live().is_none() {
+        return Err("no board is listened to: nothing to record".into());
+    }
+    let plan = RecordingPlan {
+        name: name.to_owned(),
+        index: index.and_then(|index| u32::try_from(index).ok()),
+        ending,
+        countdown: Duration::from_secs_f64(countdown),
+        length: length.map(Duration::from_secs_f64),
+        advance,
+        label: request.optional_text("label", 200)?.map(str::to_owned),
+    };
+    recording_session::start(hub, plan).map_err(|reason| Refusal { reason, field: Some("name".to_owned()) })
+}
+
+// ---------------------------------------------------------------------------------------------- labels
+
+/// Reads the labels of a recording from their file.
+pub(super) async fn read_labels(hub: &Hub, recording: &str) -> Answer {
+    let table = hub.folder.file(&file_of(recording))?;
+    if !table.exists() {
+        hub.labels.remove(recording);
+        return Ok(());
+    }
+    let name = recording.to_owned();
+    let rows = hub.ask(move |handler| handler.read_labels(&table, &name)).await?;
+    hub.labels.replace(recording, rows);
+    Ok(())
+}
+
+/// Changes a label of the recording that is shown or being recorded, and writes the table.
+async fn label(hub: &Hub, what: &str, shown: Option<&str>, request: &Request<'_>) -> Answer {
+    let recorded = hub.recorder.file();
+    let name = shown.or(recorded.as_deref()).ok_or("a label belongs to a recording: open one, or record")?;
+    let wanted = if what == "mark" { 0 } else { request.whole("label_id", 1, i64::MAX)?.unsigned_abs() };
+    let text = if matches!(what, "mark" | "rename") { request.text("label", 200)?.to_owned() } else { String::new() };
+    let t_us = if matches!(what, "mark" | "move") { request.time("t_us")? } else { 0 };
+    let table = hub.folder.file(&file_of(name))?;
+    let (before, rows) = hub.labels.change(name, |labels, next_id| {
+        if what == "mark" {
+            labels.push(Label { id: next_id, row: LabelRow { label: text, t_us } });
+            return Ok(());
+        }
+        let place = labels.iter().position(|label| label.id == wanted).ok_or_else(|| {
+            Refusal::from(format!("label_id: there is no label {wanted}; it was deleted, perhaps by somebody else"))
+        })?;
+        match what {
+            "rename" => labels[place].row.label = text,
+            "move" => labels[place].row.t_us = t_us,
+            _ => drop(labels.remove(place)),
+        }
+        Ok::<_, Refusal>(())
+    })?;
+    if let Err(reason) = hub.ask(move |handler| handler.write_labels(&table, &rows)).await {
+        hub.labels.restore(name, before);
+        return Err(reason.into());
+    }
+    hub.clients.send(Broadcast::Labels(name.to_owned()));
+    Ok(())
+}
+
+// ---------------------------------------------------------------------------------------------- health, cutting
+
+async fn health(hub: &Hub, name: Option<&str>) -> Answer<Value> {
+    let (array, activity) = match name {
+        Some(name) => {
+            let index = hub.folder.index(name).await?;
+            (index.header().array.clone(), index.activity.clone())
+        }
+        None => {
+            let live = hub.live().ok_or("nothing is shown")?;
+            let activity = lock(&live.activity).clone();
+            (live.array().clone(), activity)
+        }
+    };
+    let taxels = array.exists.as_ref().map_or(array.len(), |exists| exists.iter().filter(|&&one| one).count());
+    let with_events = activity.events.iter().filter(|&&n| n > 0).count();
+    let UnhealthyTaxels { dead, stuck, noisy } = hub.ask(move |handler| handler.health(&array, &activity)).await?;
+    Ok(json!({
+        "type": "health", "source": name, "taxels": taxels, "heard": with_events, "dead": dead, "stuck": stuck,
+        "noisy": noisy,
+    }))
+}
+
+async fn cut(hub: &Hub, shown: Option<&str>, request: &Request<'_>) -> Answer<Value> {
+    let name = shown.ok_or("cut: open a recording first")?;
+    let (start_us, stop_us) = (request.time("start_us")?, request.time("stop_us")?);
+    if start_us >= stop_us {
+        return Err(Refusal::of("stop_us", "must lie after start_us"));
+    }
+    let to = request.text("name", 100)?;
+    let path = hub.folder.file(name)?;
+    let out = hub.folder.file(to).map_err(|error| Refusal::of("name", error))?;
+    if out.exists() {
+        return Err(Refusal::of("name", format!("{to} exists already; name another")));
+    }
+    let lost = hub.ask(move |handler| handler.cut(&Cut { path: &path, out: &out, start_us, stop_us })).await?;
+    hub.clients.send_json(&hub.recordings_message());
+    Ok(json!({ "type": "cut", "name": to, "lost": lost }))
+}

@@ -1,0 +1,270 @@
+//! The session of a connected client: what it asks, what it is sent, and when it is disconnected.
+
+mod connection;
+mod delivered;
+mod flow;
+mod following;
+mod pending;
+mod playback;
+mod viewport;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use axum::extract::ws::WebSocket;
+use serde_json::{Map, Value, json};
+use tokio::sync::{broadcast, mpsc, watch};
+
+use super::clients::{Broadcast, ClientSlot};
+use super::hub::Hub;
+use super::limits::{MOST_BYTES, MOST_CREDITS};
+use super::messages::warning;
+use super::picture::RECORDS;
+use super::registers::prepare;
+use super::request::{Answer, Refusal, Request};
+use connection::{Closing, Connection, GOING_AWAY, Incoming, POLICY, TOO_BIG};
+use flow::{FRAME, FlowControl};
+use pending::PendingRequests;
+use viewport::Viewport;
+
+/// A client with more refused requests than this within [`REFUSALS_WITHIN`] is disconnected.
+const MOST_REFUSALS: usize = 100;
+const REFUSALS_WITHIN: Duration = Duration::from_secs(10);
+
+/// How often a session without other work checks whether its client is alive.
+const IDLE: Duration = Duration::from_secs(1);
+
+struct Session {
+    hub: Arc<Hub>,
+    connection: Connection,
+    flow: FlowControl,
+    viewport: Viewport,
+    pending: PendingRequests,
+    /// Times of the last refusals.
+    refusals: VecDeque<Instant>,
+    spikes_sent: Instant,
+}
+
+/// Serves a client until it leaves or is disconnected.
+pub(super) async fn run(socket: WebSocket, hub: Arc<Hub>, end: watch::Receiver<bool>, slot: ClientSlot) {
+    let (pending, answers) = PendingRequests::new();
+    let session = Session {
+        viewport: Viewport::new(hub.live()),
+        hub,
+        connection: Connection::new(socket),
+        flow: FlowControl::new(),
+        pending,
+        refusals: VecDeque::new(),
+        spikes_sent: Instant::now(),
+    };
+    session.serve(end, answers).await;
+    drop(slot);
+}
+
+impl Session {
+    async fn serve(mut self, end: watch::Receiver<bool>, answers: mpsc::Receiver<Value>) {
+        if let Err(closing) = self.run(end, answers).await {
+            self.connection.close(closing).await;
+        }
+    }
+
+    async fn run(&mut self, mut end: watch::Receiver<bool>, mut answers: mpsc::Receiver<Value>) -> Result<(), Closing> {
+        let (mut messages, mut pictures) = self.hub.clients.subscribe();
+        let hub = Arc::clone(&self.hub);
+        prepare(&hub).await;
+        for message in [
+            hub.hello_message(),
+            hub.registers_message(),
+            hub.presets_message(),
+            hub.recorder.message(),
+            hub.recordings_message(),
+            hub.zeroed_message(),
+        ] {
+            self.connection.send_json(&message).await?;
+        }
+        loop {
+            // A picture that became due less than a frame after the last one is sent with the next frame.
+            let due = self.viewport.is_playing() || self.viewport.is_dirty() && self.flow.has_credit();
+            let tick = tokio::time::sleep(if due { FRAME } else { IDLE });
+            tokio::select! {
+                biased;
+                () = async { drop(end.wait_for(|ended| *ended).await) } => {
+                    return Err(Closing::With(GOING_AWAY, "the server ends"));
+                }
+                incoming = self.connection.receive() => match incoming? {
+                    Incoming::Text(text) if text.len() > MOST_BYTES => {
+                        return Err(Closing::With(TOO_BIG, "a message of more than 65536 bytes"));
+                    }
+                    Incoming::Text(text) => self.handle(&text).await?,
+                    Incoming::SignOfLife => {}
+                },
+                message = messages.recv() => match message {
+                    Ok(message) => self.forward(message).await?,
+                    // The client does not read its messages.
+                    Err(broadcast::error::RecvError::Lagged(_)) => return Err(Closing::Silently),
+                    Err(broadcast::error::RecvError::Closed) => {
+                        return Err(Closing::With(GOING_AWAY, "the server ends"));
+                    }
+                },
+                Some(answer) = answers.recv() => self.connection.send_json(&answer).await?,
+                _ = pictures.changed() => self.viewport.mark_dirty(),
+                () = tick => {}
+            }
+            self.connection.keep_alive().await?;
+            self.send_picture().await?;
+            self.send_spikes().await?;
+            for text in self.viewport.take_warnings() {
+                self.connection.send_json(&warning(text)).await?;
+            }
+        }
+    }
+
+    /// Sends a message that is meant for all clients.
+    async fn forward(&mut self, message: Broadcast) -> Result<(), Closing> {
+        match message {
+            Broadcast::Text(text) => self.connection.send_text(&text).await,
+            Broadcast::Counters(counters) => {
+                let mut message = Map::clone(&counters);
+                message.insert("pictures_per_s".to_owned(), json!(self.flow.pictures_per_s()));
+                self.connection.send_json(&Value::Object(message)).await
+            }
+            Broadcast::Labels(name) => {
+                let shows = match self.viewport.recording_name() {
+                    Some(shown) => *shown == *name,
+                    None => self.hub.recorder.file().as_ref() == Some(&name),
+                };
+                if shows { self.connection.send_json(&self.hub.labels.message(&name)).await } else { Ok(()) }
+            }
+            Broadcast::Hello => {
+                self.viewport.set_live(self.hub.live());
+                self.connection.send_json(&self.hub.hello_message()).await?;
+                self.connection.send_json(&self.hub.registers_message()).await
+            }
+        }
+    }
+
+    /// Sends a picture where there is a credit, something new, and a frame has passed since the last one.
+    async fn send_picture(&mut self) -> Result<(), Closing> {
+        if !self.flow.is_due() {
+            return Ok(());
+        }
+        if self.viewport.play_on().await {
+            self.connection.send_json(&self.viewport.transport_message()).await?;
+        }
+        if !self.viewport.take_dirty() {
+            return Ok(());
+        }
+        self.viewport.update_narrow().await;
+        let records = self.hub.recorder.file().is_some() || self.hub.board().registers.record;
+        let flags = if records { RECORDS } else { 0 };
+        let Some(picture) = self.viewport.picture(flags, self.flow.number()) else { return Ok(()) };
+        self.flow.count_picture();
+        self.connection.send_bytes(picture).await
+    }
+
+    async fn send_spikes(&mut self) -> Result<(), Closing> {
+        if self.spikes_sent.elapsed() < FRAME {
+            return Ok(());
+        }
+        self.spikes_sent = Instant::now();
+        match self.viewport.spikes_message() {
+            Some(message) => self.connection.send_json(&message).await,
+            None => Ok(()),
+        }
+    }
+
+    // ------------------------------------------------------------------------------------------ requests
+
+    async fn handle(&mut self, text: &str) -> Result<(), Closing> {
+        let message: Option<Map<String, Value>> = serde_json::from_str(text).ok();
+        let Some(message) = message else {
+            return self.refuse(&Value::Null, "", "no JSON object".into()).await;
+        };
+        let id = message.get("id").cloned().unwrap_or(Value::Null);
+        let is_id = match &id {
+            Value::Null => true,
+            Value::Number(number) => number.is_i64() || number.is_u64(),
+            Value::String(text) => text.chars().count() <= 64,
+            _ => false,
+        };
+        if !is_id {
+            let refusal = Refusal::of("id", "must be a whole number or a text of 64 characters");
+            return self.refuse(&Value::Null, "", refusal).await;
+        }
+        let Some(what) = message.get("type").and_then(Value::as_str).map(str::to_owned) else {
+            return self.refuse(&id, "", Refusal::of("type", "is missing")).await;
+        };
+        match self.handle_own(&what, &Request(&message)).await {
+            Some(Ok(messages)) => {
+                for message in messages {
+                    self.connection.send_json(&message).await?;
+                }
+                if id.is_null() {
+                    return Ok(());
+                }
+                self.connection.send_json(&json!({ "type": "done", "id": id })).await
+            }
+            Some(Err(refusal)) => self.refuse(&id, &what, refusal).await,
+            None => {
+                let shown = self.viewport.recording_name().map(str::to_owned);
+                if let Some(busy) = self.pending.begin(&self.hub, id, what, message, shown) {
+                    self.count_refusal();
+                    self.connection.send_json(&busy).await?;
+                }
+                self.check_refusals()
+            }
+        }
+    }
+
+    /// Carries out a request that concerns this client's flow or view alone; `None` for others. Returns the messages before `done`.
+    async fn handle_own(&mut self, what: &str, request: &Request<'_>) -> Option<Answer<Vec<Value>>> {
+        let done = match what {
+            "credit" => self.grant(request),
+            "watch" => self.viewport.watch(request).await,
+            "encode" => self.viewport.encode(request).await,
+            "zoom" => self.viewport.zoom(request).await,
+            "open" => return Some(self.viewport.open(&self.hub, request).await),
+            "overview" => return Some(self.viewport.overview_message().map(|message| vec![message])),
+            "seek" | "play" | "pause" | "step" | "live" => {
+                let moved = match what {
+                    "seek" => self.viewport.seek_request(request).await,
+                    "play" => self.viewport.play(request).await,
+                    "pause" => self.viewport.pause().await,
+                    "step" => self.viewport.step(request).await,
+                    _ => self.viewport.follow_request(),
+                };
+                return Some(moved.map(|()| vec![self.viewport.transport_message()]));
+            }
+            _ => return None,
+        };
+        Some(done.map(|()| vec![]))
+    }
+
+    fn grant(&mut self, request: &Request<'_>) -> Answer {
+        let credits = request.whole("n", 1, MOST_CREDITS.into())?;
+        self.flow.grant(u32::try_from(credits).unwrap_or(0));
+        Ok(())
+    }
+
+    async fn refuse(&mut self, id: &Value, what: &str, refusal: Refusal) -> Result<(), Closing> {
+        self.count_refusal();
+        self.connection.send_json(&refusal.message(id, what)).await?;
+        self.check_refusals()
+    }
+
+    fn count_refusal(&mut self) {
+        self.refusals.push_back(Instant::now());
+    }
+
+    /// Disconnects a client whose requests are refused over and over.
+    fn check_refusals(&mut self) -> Result<(), Closing> {
+        while self.refusals.front().is_some_and(|at| at.elapsed() > REFUSALS_WITHIN) {
+            self.refusals.pop_front();
+        }
+        if self.refusals.len() > MOST_REFUSALS {
+            return Err(Closing::With(POLICY, "too many refused messages"));
+        }
+        Ok(())
+    }
+}

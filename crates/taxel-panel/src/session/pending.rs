@@ -1,0 +1,65 @@
+//! Requests of a client that take long: they are carried out beside the pictures, a bounded number at a time.
+
+use std::sync::Arc;
+
+use serde_json::{Map, Value, json};
+use tokio::sync::{Semaphore, mpsc};
+
+use crate::hub::Hub;
+use crate::request::{Refusal, Request};
+use crate::requests::carry_out;
+
+/// Maximum number of pending requests.
+const MOST_PENDING: usize = 8;
+
+/// Answers that may wait to be sent.
+const MOST_ANSWERS: usize = 64;
+
+/// See the module.
+pub(super) struct PendingRequests {
+    answers: mpsc::Sender<Value>,
+    permits: Arc<Semaphore>,
+}
+
+impl PendingRequests {
+    /// Also returns where the answers arrive.
+    pub(super) fn new() -> (Self, mpsc::Receiver<Value>) {
+        let (answers, receiver) = mpsc::channel(MOST_ANSWERS);
+        (Self { answers, permits: Arc::new(Semaphore::new(MOST_PENDING)) }, receiver)
+    }
+
+    /// Begins to carry out a request; `shown` is the recording that the client shows. Where too many are pending it is refused, with
+    /// the message that is returned.
+    pub(super) fn begin(
+        &self,
+        hub: &Arc<Hub>,
+        id: Value,
+        what: String,
+        message: Map<String, Value>,
+        shown: Option<String>,
+    ) -> Option<Value> {
+        let Ok(permit) = Arc::clone(&self.permits).try_acquire_owned() else {
+            let refusal = Refusal::from("too many requests at a time: wait for their answers");
+            return Some(refusal.message(&id, &what));
+        };
+        let (hub, answers) = (Arc::clone(hub), self.answers.clone());
+        tokio::spawn(async move {
+            let last = match carry_out(hub, &what, shown.as_deref(), Request(&message)).await {
+                Ok(answer) => {
+                    if let Some(answer) = answer {
+                        // The client may have left in the meantime, here and below.
+                        let _ = answers.send(answer).await;
+                    }
+                    if id.is_null() {
+                        return;
+                    }
+                    json!({ "type": "done", "id": id })
+                }
+                Err(refusal) => refusal.message(&id, &what),
+            };
+            let _ = answers.send(last).await;
+            drop(permit);
+        });
+        None
+    }
+}

@@ -1,0 +1,473 @@
+//! A client's view: which source it shows, at which time, and how.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+use taxel_core::encode::Encoder;
+use taxel_live::locked::lock;
+
+use super::delivered::Delivered;
+use super::following::Following;
+use super::playback::Playback;
+use crate::hub::Hub;
+use crate::keyframe_index::KeyframeIndex;
+use crate::keyframe_index::recording::RecordingIndex;
+use crate::live_source::LiveSource;
+use crate::messages;
+use crate::picture::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
+use crate::player::{Player, ViewOptions};
+use crate::request::{Answer, Refusal, Request, taxel};
+use crate::requests::read_labels;
+use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
+
+/// Maximum number of detections of a recording in a message.
+const MOST_DETECTIONS: usize = 10_000;
+
+/// Maximum number of time stamps in a `step`.
+const MOST_STEPS: i64 = 1000;
+
+/// Where in its source a view is.
+enum Position {
+    /// At the newest state of the live source.
+    Following,
+    /// At a time of a recording or of the live source; empty while the player works in another thread.
+    At(Option<Box<Player>>),
+}
+
+/// See the module.
+pub(super) struct Viewport {
+    live: Option<Arc<LiveSource>>,
+    /// The recording that is shown, in place of the live source.
+    recording: Option<(String, Arc<RecordingIndex>)>,
+    position: Position,
+    playback: Playback,
+    options: ViewOptions,
+    following: Following,
+    delivered: Delivered,
+    /// A new picture can be shown.
+    dirty: bool,
+    /// Texts for the user that no message has had yet.
+    warnings: Vec<String>,
+}
+
+impl Viewport {
+    pub(super) fn new(live: Option<Arc<LiveSource>>) -> Self {
+        Self {
+            live,
+            recording: None,
+            position: Position::Following,
+            playback: Playback::paused(),
+            options: ViewOptions::plain(COLUMN_US),
+            following: Following::default(),
+            delivered: Delivered::nothing(),
+            dirty: true,
+            warnings: vec![],
+        }
+    }
+
+    pub(super) fn recording_name(&self) -> Option<&str> {
+        self.recording.as_ref().map(|(name, _)| name.as_str())
+    }
+
+    pub(super) fn is_playing(&self) -> bool {
+        self.playback.is_playing()
+    }
+
+    pub(super) fn is_dirty(&self) -> bool {
+        self.dirty
+    }
+
+    pub(super) fn mark_dirty(&mut self) {
+        self.dirty = true;
+    }
+
+    pub(super) fn take_dirty(&mut self) -> bool {
+        std::mem::take(&mut self.dirty)
+    }
+
+    pub(super) fn take_warnings(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.warnings)
+    }
+
+    /// Replaces the live source, which is then followed unless a recording is shown.
+    pub(super) fn set_live(&mut self, live: Option<Arc<LiveSource>>) {
+        self.live = live;
+        if self.recording.is_none() {
+            self.follow();
+        }
+    }
+
+    /// The `transport` message.
+    pub(super) fn transport_message(&self) -> Value {
+        let state = match (&self.position, self.playback.is_playing()) {
+            (Position::Following, _) => "following",
+            (Position::At(_), true) => "playing",
+            (Position::At(_), false) => "paused",
+        };
+        json!({
+            "type": "transport", "source": self.recording_name(), "state": state, "speed": self.playback.speed(),
+            "t_us": self.t(),
+        })
+    }
+
+    /// The `overview` message.
+    pub(super) fn overview_message(&self) -> Answer<Value> {
+        let (source, (start, step, events)) = match (&self.recording, &self.live) {
+            (Some((name, index)), _) => (Some(name), index.event_rate.clone()),
+            (None, Some(live)) => (None, live.index.event_rate()),
+            (None, None) => return Err("nothing is shown".into()),
+        };
+        Ok(json!({ "type": "overview", "source": source, "start_us": start, "step_us": step, "events": events }))
+    }
+
+    /// Board time of the view, us.
+    fn t(&self) -> Option<i64> {
+        match &self.position {
+            Position::At(Some(player)) => Some(player.t()),
+            Position::At(None) => None,
+            Position::Following => self.live.as_ref().and_then(|live| lock(&live.state).latest()),
+        }
+    }
+
+    fn index(&self) -> Answer<Arc<dyn KeyframeIndex>> {
+        match (&self.recording, &self.live) {
+            (Some((_, index)), _) => Ok(Arc::new(Arc::clone(index))),
+            (None, Some(live)) => Ok(Arc::new(live.index.clone())),
+            (None, None) => Err("nothing is shown: open a recording first".into()),
+        }
+    }
+
+    // ------------------------------------------------------------------------------------------ pictures
+
+    /// Moves a playing view on; returns whether it has come to the end of its recording.
+    pub(super) async fn play_on(&mut self) -> bool {
+        let Some(t) = self.playback.now() else { return false };
+        match self.with_player(move |player| player.advance(t)).await {
+            Ok(more) => {
+                self.dirty = true;
+                if more || self.recording.is_none() {
+                    return false;
+                }
+                self.playback.pause();
+                true
+            }
+            Err(refusal) => {
+                self.playback.pause();
+                self.warnings.push(refusal.reason);
+                false
+            }
+        }
+    }
+
+    /// Decodes columns narrower than those of the live state, where such are shown.
+    pub(super) async fn update_narrow(&mut self) {
+        let follows = matches!(self.position, Position::Following);
+        let live = self.live.as_ref().filter(|_| follows);
+        if let Err(refusal) = self.following.update_narrow(live, self.options.column_us).await {
+            self.warnings.push(refusal.reason);
+        }
+    }
+
+    /// The next picture; `None` where there is nothing to show.
+    pub(super) fn picture(&mut self, flags: u16, number: u32) -> Option<Vec<u8>> {
+        if let (Position::Following, Some(live)) = (&self.position, &self.live) {
+            self.delivered.note_source_restarts(lock(&live.state).restarts());
+        }
+        let restart = if self.delivered.is_restart() { RESTART } else { 0 };
+        let live = if self.recording.is_none() { LIVE } else { 0 };
+        let moves = match self.position {
+            Position::Following => MOVES | FOLLOWS,
+            Position::At(_) if self.playback.is_playing() => MOVES,
+            Position::At(_) => 0,
+        };
+        let about = About {
+            flags: flags | restart | live | moves,
+            number,
+            from: self.delivered.from(),
+            with_rest: false,
+            watched: self.options.watched,
+            column_us: self.options.column_us,
+        };
+        let needs_rest = |rests: u64| self.delivered.needs_rest(rests);
+        let (bytes, last, rests) = match &mut self.position {
+            Position::Following => self.following.picture(self.live.as_ref()?, about, needs_rest),
+            Position::At(player) => {
+                let player = player.as_mut()?;
+                let rests = Some(player.state().rests()).filter(|rests| needs_rest(*rests));
+                let (bytes, last) = picture::of_player(player, About { with_rest: rests.is_some(), ..about });
+                (bytes, last, rests)
+            }
+        };
+        self.delivered.picture(last, self.options.column_us, rests);
+        Some(bytes)
+    }
+
+    /// The `spikes` message, where the encoder has made any since the last call.
+    pub(super) fn spikes_message(&mut self) -> Option<Value> {
+        self.options.encoder.as_ref()?;
+        let spikes = match &mut self.position {
+            Position::Following => self.following.encode(self.live.as_ref()?),
+            Position::At(player) => player.as_mut().and_then(|player| player.spikes_mut()),
+        }?;
+        let (message, failed) = (spikes.message(), spikes.failed().map(str::to_owned));
+        if let Some(reason) = failed {
+            self.options.encoder = None;
+            self.following.stop_encoding();
+            self.warnings.push(reason);
+        }
+        message
+    }
+
+    // ------------------------------------------------------------------------------------------ moving
+
+    /// Works on the player in another thread: a disk may be slow.
+    async fn with_player<T: Send + 'static>(
+        &mut self,
+        work: impl FnOnce(&mut Player) -> taxel_live::Result<T> + Send + 'static,
+    ) -> Answer<T> {
+        let Position::At(place) = &mut self.position else { return Err("the view follows the newest".into()) };
+        let Some(mut player) = place.take() else { return Err("the view is gone: open it again".into()) };
+        let worked = tokio::task::spawn_blocking(move || {
+            let outcome = work(&mut player);
+            (player, outcome)
+        });
+        match worked.await {
+            Ok((player, outcome)) => {
+                self.position = Position::At(Some(player));
+                Ok(outcome?)
+            }
+            Err(_) => {
+                self.position = Position::Following;
+                Err(Refusal::bug("the view"))
+            }
+        }
+    }
+
+    /// Moves the view to a time.
+    async fn seek(&mut self, t: i64) -> Answer {
+        let index = self.index()?;
+        if let Some(Err(error)) = self.options.encoder.as_ref().map(|encoder| encoder.stream(index.array())) {
+            self.options.encoder = None;
+            self.warnings.push(error.to_string());
+        }
+        // For the past of a live source at wide columns, the shared state has them all.
+        let live = self.live.as_ref().filter(|_| self.recording.is_none() && self.options.column_us > COLUMN_US);
+        let whole = live.map(|live| {
+            let mut state = lock(&live.state);
+            state.update_curve();
+            Arc::new(state.time_columns().clone())
+        });
+        let options = ViewOptions { whole, ..self.options.clone() };
+        let opened = tokio::task::spawn_blocking(move || Player::open(index, t, options)).await;
+        let player = opened.map_err(|_| Refusal::bug("the view"))??;
+        self.position = Position::At(Some(Box::new(player)));
+        self.restart();
+        self.following.stop_encoding();
+        Ok(())
+    }
+
+    /// The next picture shows everything anew.
+    fn restart(&mut self) {
+        self.dirty = true;
+        self.delivered.invalidate();
+        self.following.restart();
+    }
+
+    /// Shows the newest state of the live source from now on.
+    fn follow(&mut self) {
+        (self.position, self.recording) = (Position::Following, None);
+        self.playback.pause();
+        self.restart();
+        self.start_encoding();
+    }
+
+    /// While following: begins the encoder anew.
+    fn start_encoding(&mut self) {
+        self.following.stop_encoding();
+        let (Position::Following, Some(encoder), Some(live)) = (&self.position, &self.options.encoder, &self.live)
+        else {
+            return;
+        };
+        if let Err(error) = self.following.start_encoding(live, encoder, self.options.column_us) {
+            self.options.encoder = None;
+            self.warnings.push(error.to_string());
+        }
+    }
+
+    /// Shows the same time with other options.
+    async fn reopen(&mut self) -> Answer {
+        self.restart();
+        match self.t() {
+            Some(t) if matches!(self.position, Position::At(_)) => {
+                self.seek(t).await?;
+                self.playback.continue_from(t);
+            }
+            _ => self.start_encoding(),
+        }
+        Ok(())
+    }
+
+    // ------------------------------------------------------------------------------------------ requests
+
+    pub(super) async fn watch(&mut self, request: &Request<'_>) -> Answer {
+        let index = self.index()?;
+        let array = index.array();
+        self.options.watched = match request.get("taxel").filter(|value| !value.is_null()) {
+            None => None,
+            Some(value) => {
+                let inside = taxel(value).filter(|&(x, y)| x < array.columns && y < array.rows);
+                let Some((x, y)) = inside else {
+                    let (rows, columns) = (array.rows, array.columns);
+                    let reason = format!("must be [x, y] on {rows} rows x {columns} columns, or null");
+                    return Err(Refusal::of("taxel", reason));
+                };
+                u32::try_from(array.index(x, y)).ok()
+            }
+        };
+        if !matches!(self.position, Position::Following) {
+            return self.reopen().await;
+        }
+        self.dirty = true;
+        self.delivered.invalidate();
+        self.following.restart_history();
+        Ok(())
+    }
+
+    pub(super) async fn encode(&mut self, request: &Request<'_>) -> Answer {
+        self.options.encoder = None;
+        if let Some(wanted) = request.get("encoder").filter(|value| !value.is_null()) {
+            let refused =
+                |error: taxel_core::Error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) };
+            let encoder = Encoder::from_json(&wanted.to_string()).map_err(refused)?;
+            encoder.stream(self.index()?.array()).map_err(refused)?;
+            self.options.encoder = Some(encoder);
+        }
+        self.reopen().await
+    }
+
+    pub(super) async fn zoom(&mut self, request: &Request<'_>) -> Answer {
+        let (least, most) = COLUMNS_US;
+        let column_us = request.whole("column_us", least, most)?;
+        if !is_column(column_us) {
+            return Err(Refusal::of("column_us", format!("must be {least} times a power of two, up to {most}")));
+        }
+        self.options.column_us = column_us;
+        self.reopen().await
+    }
+
+    pub(super) async fn seek_request(&mut self, request: &Request<'_>) -> Answer {
+        let t = request.time("t_us")?;
+        self.playback.pause();
+        self.seek(t).await
+    }
+
+    pub(super) async fn play(&mut self, request: &Request<'_>) -> Answer {
+        let speed = if request.has("speed") { request.number("speed", 0.001, 100.0)? } else { self.playback.speed() };
+        let t = self.t().ok_or("nothing is shown yet")?;
+        if matches!(self.position, Position::Following) {
+            // Playing the live source from now on would be a delay of zero, which is following.
+            return Err("the view follows the newest already; seek first".into());
+        }
+        let (first, last) = self.index()?.range().unwrap_or((t, t));
+        let at_end = t >= last && self.recording.is_some();
+        if at_end {
+            self.seek(first).await?;
+        }
+        self.playback.start(speed, if at_end { first } else { t });
+        Ok(())
+    }
+
+    pub(super) async fn pause(&mut self) -> Answer {
+        self.playback.pause();
+        if matches!(self.position, Position::Following) {
+            let t = self.t().ok_or("no events have arrived yet")?;
+            self.seek(t).await?;
+        }
+        self.dirty = true;
+        Ok(())
+    }
+
+    pub(super) async fn step(&mut self, request: &Request<'_>) -> Answer {
+        let steps = request.whole("frames", -MOST_STEPS, MOST_STEPS)?;
+        self.pause().await?;
+        for _ in 0..steps.unsigned_abs() {
+            let moved = if steps > 0 {
+                self.with_player(|player| {
+                    let next = player.next_stamp()?;
+                    next.map_or(Ok(None), |t| player.advance(t).map(|_| Some(t)))
+                })
+                .await?
+            } else {
+                let before = self.with_player(|player| player.last_stamp()).await?;
+                if let Some(t) = before {
+                    self.seek(t).await?;
+                }
+                before
+            };
+            if moved.is_none() {
+                break;
+            }
+        }
+        self.dirty = true;
+        Ok(())
+    }
+
+    pub(super) fn follow_request(&mut self) -> Answer {
+        if self.live.is_none() {
+            return Err("this panel shows recordings only: begin it with taxel live --panel".into());
+        }
+        self.follow();
+        Ok(())
+    }
+
+    /// Opens a recording at its beginning; returns the messages about it.
+    pub(super) async fn open(&mut self, hub: &Hub, request: &Request<'_>) -> Answer<Vec<Value>> {
+        let name = request.text("name", 110)?.to_owned();
+        let begun = Instant::now();
+        let index = hub.folder.index(&name).await.map_err(|error| Refusal::of("name", error))?;
+        let labels = read_labels(hub, &name).await;
+        let mut answer = vec![opened_message(&name, &index, begun)];
+        let taxels = index.header().array.len();
+        self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < taxels);
+        let range = index.range();
+        self.recording = Some((name.clone(), index));
+        self.playback.pause();
+        match range {
+            Some((first, _)) => self.seek(first).await?,
+            None => self.position = Position::At(None),
+        }
+        answer.push(hub.labels.message(&name));
+        answer.push(self.transport_message());
+        if let Err(refusal) = labels {
+            answer.push(messages::warning(refusal.reason));
+        }
+        Ok(answer)
+    }
+}
+
+/// The `opened` message.
+fn opened_message(name: &str, index: &Arc<RecordingIndex>, begun: Instant) -> Value {
+    let (header, remarks, range) = (index.header(), &index.remarks, index.range());
+    let notes = remarks.notes.iter().map(|n| json!({ "t_us": n.t_us, "text": n.text }));
+    let markers = remarks.markers.iter().map(|m| json!({ "t_us": m.t, "start": m.start }));
+    let detections = remarks.detections.iter().take(MOST_DETECTIONS);
+    let detections = detections.map(|(_, d)| json!({ "label": d.label, "t_us": d.t, "known_us": d.known }));
+    json!({
+        "type": "opened",
+        "name": name,
+        "array": messages::array(&header.array),
+        "start_us": range.map(|(first, _)| first),
+        "stop_us": range.map(|(_, last)| last),
+        "events": index.events,
+        "bytes": index.bytes,
+        "verdict": index.verdict,
+        "unfinished": index.unfinished,
+        "registers": header.registers,
+        "markers": markers.collect::<Vec<_>>(),
+        "notes": notes.collect::<Vec<_>>(),
+        "zeroed": remarks.zeroings.iter().map(|(_, one)| messages::zeroing(one)).collect::<Vec<_>>(),
+        "detections": detections.collect::<Vec<_>>(),
+        "index_ms": begun.elapsed().as_secs_f64() * 1e3,
+    })
+}

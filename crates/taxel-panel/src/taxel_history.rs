@@ -1,0 +1,102 @@
+//! The values of one taxel over time: its least, greatest and last value in each column of time.
+
+use std::collections::VecDeque;
+
+use super::time_columns::{SPAN, column_of};
+use taxel_live::pipeline::{Change, UNKNOWN};
+
+/// Least, greatest and last value of one taxel in each column of time.
+#[derive(Debug, Clone)]
+pub struct TaxelHistory {
+    /// Index of the taxel.
+    pub taxel: u32,
+    column_us: i64,
+    /// Column in which the history begins and the value held then; nothing is known before.
+    first: (i64, u16),
+    last: u16,
+    columns: VecDeque<(i64, [u16; 3])>,
+}
+
+impl TaxelHistory {
+    /// Begins the history of a taxel that holds `held` at time `since` (us; `None`: before the first event).
+    #[must_use]
+    pub fn new(taxel: u32, held: u16, since: Option<i64>, column_us: i64) -> Self {
+        let first = since.map_or(i64::MIN, |t| column_of(t, column_us));
+        Self { taxel, column_us, first: (first, held), last: held, columns: VecDeque::new() }
+    }
+
+    /// Applies a change; those of other taxels are ignored.
+    pub fn apply(&mut self, change: &Change) {
+        if change.taxel != self.taxel || change.ticks == UNKNOWN {
+            return;
+        }
+        let column = column_of(change.t, self.column_us);
+        let before = self.last;
+        self.last = change.ticks;
+        match self.columns.back_mut() {
+            Some((there, [least, greatest, last])) if *there >= column => {
+                (*least, *greatest, *last) = ((*least).min(change.ticks), (*greatest).max(change.ticks), change.ticks);
+            }
+            _ => {
+                let (least, greatest) = if before == UNKNOWN {
+                    (change.ticks, change.ticks)
+                } else {
+                    (before.min(change.ticks), before.max(change.ticks))
+                };
+                self.columns.push_back((column, [least, greatest, change.ticks]));
+            }
+        }
+        while self.columns.len() > 1 && self.columns[1].0 <= column - SPAN {
+            if let Some((gone, [_, _, last])) = self.columns.pop_front() {
+                self.first = (gone, last);
+            }
+        }
+    }
+
+    /// Appends least, greatest and last value of these columns; [`UNKNOWN`] before the history begins.
+    pub fn write(&self, columns: std::ops::Range<i64>, out: &mut Vec<u8>) {
+        let mut place = self.columns.partition_point(|(column, _)| *column < columns.start);
+        let (since, held) = self.first;
+        let mut last = if place == 0 { held } else { self.columns[place - 1].1[2] };
+        for column in columns {
+            if column < since {
+                out.extend_from_slice(&[0xFF; 6]);
+                continue;
+            }
+            let three = match self.columns.get(place) {
+                Some((there, three)) if *there == column => {
+                    place += 1;
+                    *three
+                }
+                _ => [last; 3],
+            };
+            last = three[2];
+            three.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::time_columns::COLUMN_US;
+    use super::*;
+
+    fn change(t: i64, taxel: u32, ticks: u16) -> Change {
+        Change { t, taxel, ticks, up: true, repaired: false }
+    }
+
+    #[test]
+    fn a_history_has_every_extreme_and_goes_on_through_silence() {
+        let mut history = TaxelHistory::new(1, 40, Some(-4000), COLUMN_US);
+        for (t, ticks) in [(0, 50), (1000, 20), (2000, 45), (12_000, 60)] {
+            history.apply(&change(t, 1, ticks));
+            history.apply(&change(t, 0, 999));
+        }
+        let mut bytes = vec![];
+        history.write(-2..5, &mut bytes);
+        let values: Vec<u16> = bytes.chunks(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+        let expected =
+            [[UNKNOWN; 3], [40, 40, 40], [20, 50, 45], [45, 45, 45], [45, 45, 45], [45, 60, 60], [60, 60, 60]];
+        assert_eq!(values, expected.concat());
+    }
+}

@@ -1,0 +1,208 @@
+//! Raster and contact curves over the last seconds, by columns of time of equal width.
+
+use std::collections::VecDeque;
+
+/// Width of a column of time unless a client asks for another, us.
+pub const COLUMN_US: i64 = 4000;
+
+/// The narrowest and the widest column of time, us; allowed widths double from one to the next.
+pub const COLUMNS_US: (i64, i64) = (125, 256_000);
+
+/// Columns of time in a picture: 5 s at the default width, 0.16 s at the narrowest, 320 s at the widest.
+pub const SPAN: i64 = 1250;
+
+/// A change that arrives at most this late still enters the raster and the curves, us.
+pub const LATE_US: i64 = 120_000;
+
+/// Columns of time in a block of a [`TimeColumns`].
+const BLOCK: i64 = 250;
+
+/// The contact as a whole at the end of a column of time.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Curve {
+    /// Sum of ticks above rest.
+    pub sum: u32,
+    /// Number of taxels above rest.
+    pub area: u32,
+    /// Column of the centre of pressure; NaN where nothing is pressed.
+    pub x: f32,
+    /// Row of the centre of pressure; NaN where nothing is pressed.
+    pub y: f32,
+}
+
+/// Number of the column of time that holds `t` (us), of columns `column_us` wide.
+#[must_use]
+pub fn column_of(t: i64, column_us: i64) -> i64 {
+    t.div_euclid(column_us)
+}
+
+/// Whether `us` is an allowed width of a column of time.
+#[must_use]
+pub fn is_column(us: i64) -> bool {
+    let (least, most) = COLUMNS_US;
+    (least..=most).contains(&us) && us % least == 0 && (us / least).count_ones() == 1
+}
+
+#[derive(Debug, Clone)]
+struct Block {
+    raster: Vec<u8>,
+    curves: Vec<Curve>,
+}
+
+/// Raster and curves by column of time, stored in blocks; a stretch without events takes no memory.
+#[derive(Debug, Clone)]
+pub struct TimeColumns {
+    rows: usize,
+    /// Ascending by number. Nearly every access is to the newest block.
+    blocks: VecDeque<(i64, Block)>,
+    /// First and last known column.
+    reach: Option<(i64, i64)>,
+    /// Maximum number of blocks.
+    max_blocks: usize,
+}
+
+impl TimeColumns {
+    /// Columns of an array of `rows` rows that take at most about `bytes` bytes: the oldest blocks are dropped.
+    #[must_use]
+    pub fn new(rows: usize, bytes: usize) -> Self {
+        let block = Self::block_bytes(rows);
+        Self {
+            rows,
+            blocks: VecDeque::new(),
+            reach: None,
+            max_blocks: (bytes / block).max(SPAN.unsigned_abs() as usize / BLOCK.unsigned_abs() as usize + 2),
+        }
+    }
+
+    /// Bytes that `columns` columns of an array of `rows` rows take.
+    #[must_use]
+    pub fn bytes_for(rows: usize, columns: i64) -> usize {
+        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * Self::block_bytes(rows)
+    }
+
+    /// Rows of the array.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Whether the block that holds a column has no events.
+    #[must_use]
+    pub fn is_silent(&self, column: i64) -> bool {
+        self.place(column.div_euclid(BLOCK)).is_err()
+    }
+
+    fn block_bytes(rows: usize) -> usize {
+        BLOCK.unsigned_abs() as usize * (rows + std::mem::size_of::<Curve>())
+    }
+
+    /// First and last known column.
+    #[must_use]
+    pub fn reach(&self) -> Option<(i64, i64)> {
+        self.reach
+    }
+
+    /// Index of a block, or where it would be inserted.
+    fn place(&self, key: i64) -> Result<usize, usize> {
+        match self.blocks.back() {
+            Some(&(last, _)) if last == key => Ok(self.blocks.len() - 1),
+            _ => self.blocks.binary_search_by_key(&key, |&(key, _)| key),
+        }
+    }
+
+    fn block(&mut self, column: i64) -> (&mut Block, usize) {
+        let (key, rows) = (column.div_euclid(BLOCK), self.rows);
+        let place = match self.place(key) {
+            Ok(place) => place,
+            Err(mut place) => {
+                if self.blocks.len() >= self.max_blocks
+                    && let Some((oldest, _)) = self.blocks.pop_front()
+                {
+                    place = place.saturating_sub(1);
+                    if let Some(reach) = &mut self.reach {
+                        reach.0 = reach.0.max((oldest + 1) * BLOCK);
+                    }
+                }
+                let n = BLOCK.unsigned_abs() as usize;
+                let held = place.checked_sub(1).map_or(NOTHING, |before| self.blocks[before].1.curves[n - 1]);
+                self.blocks.insert(place, (key, Block { raster: vec![0; n * rows], curves: vec![held; n] }));
+                place
+            }
+        };
+        (&mut self.blocks[place].1, column.rem_euclid(BLOCK).unsigned_abs() as usize)
+    }
+
+    /// Extends the known columns up to this one.
+    pub(super) fn extend_to(&mut self, column: i64) {
+        match &mut self.reach {
+            None => self.reach = Some((column, column)),
+            Some(reach) => reach.1 = reach.1.max(column),
+        }
+    }
+
+    /// Removes everything after a column.
+    pub(super) fn truncate_after(&mut self, column: i64) {
+        let Some(reach) = self.reach.filter(|reach| reach.1 > column) else { return };
+        self.reach = Some((reach.0.min(column), column));
+        let key = column.div_euclid(BLOCK);
+        self.blocks.truncate(self.blocks.partition_point(|&(there, _)| there <= key));
+        if let Ok(place) = self.place(key) {
+            let block = &mut self.blocks[place].1;
+            let k = usize::try_from(column.rem_euclid(BLOCK)).unwrap_or(0);
+            block.raster[(k + 1) * self.rows..].fill(0);
+            let curve = block.curves[k];
+            block.curves[k + 1..].fill(curve);
+        }
+    }
+
+    /// Counts changes in a column, each given by its row and whether it rose.
+    pub(super) fn count(&mut self, column: i64, changes: impl Iterator<Item = (u16, bool)>) {
+        if self.reach.is_some_and(|(first, _)| column < first) {
+            return;
+        }
+        let rows = self.rows;
+        let (block, k) = self.block(column);
+        let cells = &mut block.raster[k * rows..(k + 1) * rows];
+        for (row, up) in changes {
+            let cell = &mut cells[usize::from(row)];
+            let (ups, downs) = ((*cell & 15) + u8::from(up), (*cell >> 4) + u8::from(!up));
+            *cell = ups.min(15) | downs.min(15) << 4;
+        }
+    }
+
+    /// Sets the curve from this column to the end of its block.
+    pub(super) fn set_curve(&mut self, column: i64, curve: Curve) {
+        let before = self.curve(column);
+        let same = before.sum == curve.sum
+            && before.x.to_bits() == curve.x.to_bits()
+            && before.y.to_bits() == curve.y.to_bits();
+        // A stretch without events repeats the curve before it, so it needs no block.
+        if !same {
+            let (block, k) = self.block(column);
+            block.curves[k..].fill(curve);
+        }
+    }
+
+    /// The curves at the end of a column.
+    #[must_use]
+    pub fn curve(&self, column: i64) -> Curve {
+        let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
+        match self.place(key) {
+            Ok(place) => self.blocks[place].1.curves[k],
+            Err(0) => NOTHING,
+            Err(place) => self.blocks[place - 1].1.curves.last().copied().unwrap_or(NOTHING),
+        }
+    }
+
+    /// Appends the raster of a column, one byte per row.
+    pub fn raster(&self, column: i64, out: &mut Vec<u8>) {
+        let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
+        match self.place(key).map(|place| &self.blocks[place].1) {
+            Ok(block) => out.extend_from_slice(&block.raster[k * self.rows..(k + 1) * self.rows]),
+            Err(_) => out.resize(out.len() + self.rows, 0),
+        }
+    }
+}
+
+/// The curve while nothing is pressed.
+pub const NOTHING: Curve = Curve { sum: 0, area: 0, x: f32::NAN, y: f32::NAN };

@@ -1,0 +1,128 @@
+// What keys and buttons do.
+
+import { part } from "./dom.js";
+import { savePicture } from "./image.js";
+import { bindKeys } from "./keys.js";
+import { failed, notify } from "./notice.js";
+import { showTab } from "./tabs.js";
+
+/**
+ * The parts of the page that actions concern.
+ * @typedef {object} Parts
+ * @property {import("./server.js").Server} server
+ * @property {import("./player.js").Player} player
+ * @property {import("./settings.js").Settings} settings
+ * @property {import("./recorder.js").Recorder} recorder
+ * @property {import("./labels.js").Labels} labels
+ * @property {import("./view.js").View} view
+ * @property {import("./maps.js").Maps} maps
+ * @property {import("./zoom.js").Zoom} zoom
+ */
+
+/** @typedef {import("./timeline.js").Timeline} Timeline */
+
+/** What the raster lacks of the width of the lanes on either side, CSS pixels. */
+const RASTER_INSET = 44;
+
+/**
+ * Binds keys and buttons to their actions.
+ * @param {Parts} parts
+ * @param {() => Timeline | null} timeline
+ */
+export function bindActions({ server, player, settings, recorder, labels, view, maps, zoom }, timeline) {
+  const help = part("help", HTMLDialogElement);
+  const here = () => timeline()?.cursor_us ?? player.t_us;
+  const step = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
+  const moveBy = (/** @type {number} */ us) => {
+    if (player.goal !== null) player.seek(player.goal + us);
+  };
+  const health = () => {
+    showTab("view");
+    view.look();
+  };
+  const theme = () => {
+    const order = ["system", "dark", "light"];
+    const next = order[(order.indexOf(settings.values.theme) + 1) % order.length];
+    settings.set("theme", next);
+    notify(`theme: ${next === "system" ? "as the system has it" : next}`);
+  };
+  const picture = () => savePicture(pictureOf(player, settings, maps)).then(() => notify("picture saved"), failed);
+  /** Sets the rest of the watched taxel to its held value, for the readout too. */
+  const zero = () => {
+    const { taxel } = maps;
+    if (!taxel) return notify("point at a taxel first: click a map, or use its arrow keys", true);
+    server.request({ type: "zero", taxels: [taxel] }).then(() => notify(`zeroed row ${taxel[1]}, column ${taxel[0]}`), failed);
+  };
+  view.cutHere = (/** @type {0 | 1} */ end) => view.setCut(end, here());
+  bindKeys(
+    {
+      record: () => recorder.toggle(),
+      play: () => player.toggle(),
+      stepOn: () => player.step(1),
+      stepBack: () => player.step(-1),
+      on: (event) => moveBy(step(event)),
+      back: (event) => moveBy(-step(event)),
+      first: () => player.reach && player.seek(player.reach[0]),
+      last: () => (player.transport.source === null ? player.follow() : player.reach && player.seek(player.reach[1])),
+      faster: () => player.faster(1),
+      slower: () => player.faster(-1),
+      zoomIn: () => zoom.by(1),
+      zoomOut: () => zoom.by(-1),
+      live: () => player.follow(),
+      mark: () => labels.markHere(),
+      nextLabel: () => labels.go(1),
+      labelBefore: () => labels.go(-1),
+      deleteLabel: () => labels.removeChosen(),
+      cutFrom: () => view.setCut(0, here()),
+      cutTo: () => view.setCut(1, here()),
+      open: () => part("files", HTMLSelectElement).focus(),
+      crosshair: () => part("pressure-frame", HTMLElement).focus(),
+      rest: () => view.rest("now"),
+      health,
+      picture,
+      tabBoard: () => showTab("board"),
+      tabRecord: () => showTab("record"),
+      tabLabels: () => showTab("labels"),
+      tabView: () => showTab("view"),
+      theme,
+      help: () => help.showModal(),
+    },
+    () => settings.values.letters,
+  );
+  const onClick = (/** @type {string} */ id, /** @type {() => void} */ action) => {
+    part(id, HTMLButtonElement).onclick = action;
+  };
+  onClick("theme-button", theme);
+  onClick("help-button", () => help.showModal());
+  onClick("help-close", () => help.close());
+  onClick("picture", picture);
+  onClick("health", health);
+  onClick("zero", zero);
+  onClick("zoom-in", () => zoom.by(1));
+  onClick("zoom-out", () => zoom.by(-1));
+  // Browsers allow sound only after the user has done something.
+  for (const kind of ["pointerdown", "keydown"]) document.addEventListener(kind, () => recorder.tones.wake(), { capture: true });
+}
+
+/**
+ * What a saved picture contains.
+ * @param {Parts["player"]} player
+ * @param {Parts["settings"]} settings
+ * @param {Parts["maps"]} maps
+ */
+function pictureOf(player, { values }, maps) {
+  /** @type {{ title: string, canvas: HTMLCanvasElement, inset: number }[]} */
+  const lanes = [];
+  if (values.showRaster) lanes.push({ title: values.raster === "spikes" ? "Spikes by row" : "Changes by row", canvas: part("raster", HTMLCanvasElement), inset: RASTER_INSET });
+  for (const [id, on, title] of /** @type {const} */ ([
+    ["taxel-lane", values.showTaxel, `Taxel ${maps.named()}`],
+    ["force-lane", values.showForce, "Force and area"],
+    ["centre-lane", values.showCentre, "Centre"],
+  ])) {
+    const canvas = part(id, HTMLElement).querySelector("canvas");
+    if (on && canvas) lanes.push({ title, canvas, inset: 0 });
+  }
+  const source = player.transport.source ?? "live";
+  const at = ((player.t_us ?? 0) / 1e6).toFixed(3);
+  return { title: `${source}, ${at} s`, file: `${source.replace(/\.[^.]+$/, "")}-${at}s.png`, lanes };
+}

@@ -1,0 +1,170 @@
+// The connection to the board: its control line and the address of its events, chosen or typed; the lines that it sends.
+
+import { make, part, write } from "./dom.js";
+
+/** @typedef {import("./protocol.js").Hello} Hello */
+/** @typedef {import("./protocol.js").Places} Places */
+/** @typedef {import("./protocol.js").Port} Port */
+/** @typedef {import("./server.js").Server} Server */
+/** @typedef {import("./settings.js").Settings} Settings */
+/** @typedef {{ label: string, places: { place: string, text: string }[] }} Group */
+
+/** Places of a kind that the browser remembers. */
+const REMEMBERED = 8;
+const LINES_KEPT = 200;
+
+/** A place to choose from a list, or to type, and to connect to. */
+class PlaceForm {
+  /**
+   * @param {"control" | "udp"} name of its parts in the page
+   * @param {"lines" | "addresses"} setting the setting that remembers earlier places
+   * @param {Settings} settings
+   * @param {(place: string) => Promise<void>} connect
+   */
+  constructor(name, setting, settings, connect) {
+    this.setting = setting;
+    this.settings = settings;
+    this.input = part(name, HTMLInputElement);
+    this.choice = part(`${name}-choice`, HTMLSelectElement);
+    this.why = part(`${name}-why`, HTMLElement);
+    /** @type {Group[]} */
+    this.groups = [];
+    this.none = "";
+    this.choice.onchange = () => {
+      if (this.choice.value) this.input.value = this.choice.value;
+      this.refuse(null);
+    };
+    part(`${name}-form`, HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      const place = this.input.value.trim();
+      connect(place).then(() => {
+        this.refuse(null);
+        this.remember(place);
+      }, (error) => this.refuse(error.message));
+    };
+  }
+
+  /** @param {string | null} reason */
+  refuse(reason) {
+    this.why.hidden = reason === null;
+    this.input.setAttribute("aria-invalid", String(reason !== null));
+    write(this.why, reason ?? "");
+  }
+
+  /** @param {string} place */
+  remember(place) {
+    const before = this.before.filter((other) => other !== place);
+    this.settings.set(this.setting, [place, ...before].slice(0, REMEMBERED).join("\n"));
+    this.show();
+  }
+
+  /** @returns {string[]} where it was before, the last first */
+  get before() {
+    return this.settings.values[this.setting].split("\n").filter(Boolean);
+  }
+
+  /** @param {Group[]} groups @param {string} none the text where there are none */
+  offer(groups, none) {
+    [this.groups, this.none] = [groups, none];
+    this.show();
+  }
+
+  show() {
+    const found = this.groups.flatMap(({ places }) => places.map(({ place }) => place));
+    const before = this.before.filter((place) => !found.includes(place));
+    const groups = [...this.groups, { label: "Used before", places: before.map((place) => ({ place, text: place })) }];
+    const options = groups
+      .filter(({ places }) => places.length)
+      .map(({ label, places }) => make("optgroup", { label }, ...places.map(({ place, text }) => make("option", { value: place }, text))));
+    const first = options.length ? "choose or type" : this.none;
+    this.choice.replaceChildren(make("option", { value: "" }, first), ...options);
+    this.choice.value = [...this.choice.options].some(({ value }) => value === this.input.value) ? this.input.value : "";
+  }
+
+  /** @param {string | null} place where it is now */
+  at(place) {
+    // What a person is typing stays, and what was refused.
+    if (document.activeElement !== this.input && (place !== null || this.why.hidden)) this.input.value = place ?? "";
+    this.show();
+  }
+}
+
+/** The part of the board's tab that chooses and connects. */
+export class Connection {
+  /**
+   * @param {Server} server
+   * @param {Settings} settings
+   * @param {(error: unknown) => void} failed
+   */
+  constructor(server, settings, failed) {
+    this.server = server;
+    this.udp = "";
+    this.line = new PlaceForm("control", "lines", settings, (place) => server.request({ type: "control", place: place || null }));
+    this.events = new PlaceForm("udp", "addresses", settings, (place) => {
+      const [host, port] = address(place);
+      return server.request({ type: "listen", host, port });
+    });
+    const drop = part("control-drop", HTMLButtonElement);
+    drop.onclick = () => server.request({ type: "control", place: null }).then(() => this.line.refuse(null), failed);
+    part("places-again", HTMLButtonElement).onclick = () => this.look();
+    const where = part("where", HTMLDetailsElement);
+    where.ontoggle = () => where.open && this.look();
+    const delta = part("delta-intensity", HTMLInputElement);
+    delta.onchange = () =>
+      server.request({ type: "delta_intensity", on: delta.checked }).catch((error) => {
+        delta.checked = !delta.checked;
+        failed(error);
+      });
+  }
+
+  /** Asks which ports and addresses there are. */
+  look() {
+    this.server.send({ type: "places" });
+  }
+
+  /** @param {Hello} hello */
+  greet({ live, udp, control, delta_intensity }) {
+    const where = part("where", HTMLDetailsElement);
+    where.hidden = !live;
+    // Without a line there is something to choose.
+    if (live && control === null) where.open = true;
+    if (live && where.open) this.look();
+    this.udp = udp ?? "";
+    this.line.at(control);
+    this.events.at(udp);
+    part("control-drop", HTMLButtonElement).disabled = control === null;
+    part("delta-intensity", HTMLInputElement).checked = delta_intensity ?? false;
+    write(part("where-info", HTMLElement), control ?? "no control line");
+  }
+
+  /** @param {Places} places */
+  offer({ serial, addresses }) {
+    const ports = serial.map((port) => ({ place: port.place, text: [port.place, described(port)].filter(Boolean).join(" · ") }));
+    this.line.offer([{ label: "Serial ports", places: ports }], "no serial port found: type a place below");
+    const port = address(this.udp)[1] || 5208;
+    const own = addresses.map(({ host, name }) => ({ place: `${host}:${port}`, text: `${host}:${port} · ${name}` }));
+    const every = { place: `0.0.0.0:${port}`, text: `0.0.0.0:${port} · every address` };
+    this.events.offer([{ label: "This machine", places: [every, ...own] }], "type an address below");
+  }
+
+  /** @param {string} text a line from the board */
+  log(text) {
+    const lines = part("board-lines", HTMLElement);
+    lines.append(make("li", {}, text));
+    while (lines.children.length > LINES_KEPT) lines.firstElementChild?.remove();
+    lines.scrollTop = lines.scrollHeight;
+    part("no-lines", HTMLElement).hidden = true;
+  }
+}
+
+/** @param {Port} port @returns {string} description of a port */
+function described({ kind, product, maker, serial }) {
+  return [product, maker, serial].filter(Boolean).join(", ") || (kind === "other" ? "" : kind);
+}
+
+/** @param {string} text @returns {[string, number]} host and port; an address in brackets may hold colons */
+function address(text) {
+  const at = text.trim().lastIndexOf(":");
+  const host = at < 0 ? "" : text.trim().slice(0, at).replace(/^\[|\]$/g, "");
+  return [host || "127.0.0.1", Number(text.trim().slice(at + 1))];
+}

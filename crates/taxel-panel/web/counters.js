@@ -1,0 +1,54 @@
+// The counters in the header, and the losses by place.
+
+import { make, part, write } from "./dom.js";
+import { whole } from "./words.js";
+
+/** @typedef {import("./protocol.js").Counters} Told */
+
+/** @type {Record<string, string>} where data can be lost */
+const LOSSES = {
+  kernel: "messages that the socket's buffer had no room for",
+  queue: "datagrams that found no room before the decoder",
+  wire: "datagrams that never arrived whole",
+  damaged: "bytes that were no words",
+  outside: "taxels outside the array",
+  readout: "events that found no room before the readout",
+  panel: "events that only this panel's curves and its view of the past lack",
+};
+
+/**
+ * Writes the counters.
+ * @param {Told | null} counters of the live source
+ * @param {boolean} assumed whether the frame rate follows from registers that were not read from the board
+ * @param {number} drawn pictures a second
+ */
+export function writeCounters(counters, assumed, drawn) {
+  const number = (/** @type {number | null | undefined} */ value, /** @type {(value: number) => string} */ how) => (value === null || value === undefined ? "–" : how(value));
+  const put = (/** @type {string} */ id, /** @type {string} */ text) => write(part(id, HTMLElement), text);
+  put("drawn", String(drawn));
+  if (!counters) return;
+  const { lost, latency } = counters;
+  put("events", number(counters.events_per_s, whole));
+  put("data", number(counters.bytes_per_s, (bytes) => (bytes / 1e6).toFixed(2)));
+  put("frames", number(counters.frames_per_s, whole) + (assumed ? "?" : ""));
+  part("frames", HTMLElement).title = assumed ? "assumed: the board's registers have not been read yet" : "";
+  // What only the panel lacks is in every recording, and no detection needs it.
+  const all = Object.entries(lost).reduce((sum, [place, count]) => sum + (place === "panel" ? 0 : count), 0);
+  put("lost", whole(all));
+  part("lost-block", HTMLElement).classList.toggle("bad", all > 0);
+  put("queue", number(counters.queue, whole));
+  // The latency of detections, where there are any; else that of decoding.
+  const shown = latency.said?.count ? latency.said : latency.decode;
+  put("latency", shown && shown.p50_us !== null && shown.p99_us !== null ? `${whole(shown.p50_us)} / ${whole(shown.p99_us)}` : "–");
+  const places = part("loss-list", HTMLElement);
+  for (const [place, count] of Object.entries(lost)) {
+    let row = places.querySelector(`[data-place="${CSS.escape(place)}"]`);
+    if (!row) {
+      row = make("tr", { "data-place": place }, make("th", { scope: "row", title: LOSSES[place] ?? "" }, place), make("td"));
+      places.append(row);
+    }
+    write(/** @type {Element} */ (row.lastElementChild), whole(count));
+  }
+  put("reach", counters.reach_us ? `the last ${((counters.reach_us[1] - counters.reach_us[0]) / 1e6).toFixed(0)} s can be viewed` : "");
+  put("wire", counters.wire_version ? `wire version ${counters.wire_version}` : "");
+}

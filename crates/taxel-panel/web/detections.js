@@ -1,0 +1,85 @@
+// Detections: the list beside the views, and the marks over the lanes.
+
+import { make, part, write } from "./dom.js";
+import { seconds, short, whole } from "./words.js";
+
+/** @typedef {{ label: string, t_us: number, latency_us: number | null }} Detection */
+/** @typedef {import("./timeline.js").Timeline} Timeline */
+
+/** Detections of the live source that are kept, and how many of them are listed and marked. */
+const KEPT = 300;
+const LISTED = 100;
+const MARKED = 200;
+
+/** Shapes that tell labels apart. */
+const SHAPES = 4;
+
+export class Detections {
+  /** @param {(t_us: number) => void} seek */
+  constructor(seek) {
+    this.seek = seek;
+    /** Those that are shown, newest first. @type {Detection[]} */
+    this.shown = [];
+    /** Those of the live source, newest first. @type {Detection[]} */
+    this.live = [];
+    /** Labels in the order in which they first occurred: the order gives shape and colour. @type {string[]} */
+    this.labels = [];
+    this.listed = -1;
+  }
+
+  /** @param {Detection} detection */
+  add(detection) {
+    this.live.unshift(detection);
+    this.live.length = Math.min(this.live.length, KEPT);
+  }
+
+  /** @param {Detection[]} detections newest first @param {string} none the text where there are none */
+  show(detections, none) {
+    this.shown = detections;
+    write(part("detection-count", HTMLElement), detections.length ? whole(detections.length) : "");
+    const empty = part("detections-none", HTMLElement);
+    empty.hidden = detections.length > 0;
+    write(empty, none);
+    this.listed = -1;
+  }
+
+  /** @param {string} label @returns {string} its class */
+  shape(label) {
+    if (!this.labels.includes(label)) this.labels.push(label);
+    return `shape shape-${this.labels.indexOf(label) % SHAPES}`;
+  }
+
+  /** Writes the list, if it has changed. */
+  list() {
+    if (this.listed === this.shown.length && this.listed < KEPT) return;
+    this.listed = this.shown.length;
+    const rows = this.shown.slice(0, LISTED).map(({ label, t_us, latency_us }) => {
+      const late = latency_us === null ? "" : short(latency_us);
+      const button = make(
+        "button",
+        { type: "button", class: "link row", "aria-label": `${label} at ${seconds(t_us)}${late && `, reported ${late} later`}` },
+        make("span", { class: this.shape(label) }),
+        make("span", { class: "what" }, label),
+        make("span", { class: "when" }, seconds(t_us)),
+        make("span", { class: "late" }, late),
+      );
+      button.onclick = () => this.seek(t_us);
+      return make("li", {}, button);
+    });
+    part("detection-list", HTMLElement).replaceChildren(...rows);
+  }
+
+  /** Puts the marks over the lanes. @param {Timeline | null} timeline */
+  mark(timeline) {
+    const marks = part("detection-marks", HTMLElement);
+    const inside = timeline ? this.shown.filter(({ t_us }) => timeline.share(t_us) !== null).slice(0, MARKED) : [];
+    while (marks.children.length > inside.length) marks.lastElementChild?.remove();
+    while (marks.children.length < inside.length) marks.append(make("span"));
+    inside.forEach(({ label, t_us }, i) => {
+      const mark = /** @type {HTMLElement} */ (marks.children[i]);
+      mark.className = this.shape(label);
+      if (mark.title !== label) mark.title = label;
+      mark.style.left = `${(100 * (timeline?.share(t_us) ?? 0)).toFixed(3)}%`;
+    });
+  }
+}

@@ -1,0 +1,74 @@
+// Every key of the page, in one table, from which the help is made; a test compares the documentation with it.
+
+import { make, part } from "./dom.js";
+
+/** @typedef {{ keys: string[], shown: string, text: string, action: string }} Key */
+
+/** @type {readonly Key[]} */
+export const KEYS = [
+  { keys: ["r"], shown: "R", text: "record, or stop; during the countdown: cancel", action: "record" },
+  { keys: [" "], shown: "Space", text: "play or pause", action: "play" },
+  { keys: ["."], shown: ".", text: "step on to the next stamp with events", action: "stepOn" },
+  { keys: [","], shown: ",", text: "step back", action: "stepBack" },
+  { keys: ["ArrowRight"], shown: "→", text: "a tenth of a second on; with Shift a second", action: "on" },
+  { keys: ["ArrowLeft"], shown: "←", text: "a tenth of a second back; with Shift a second", action: "back" },
+  { keys: ["Home"], shown: "Home", text: "to the beginning", action: "first" },
+  { keys: ["End"], shown: "End", text: "to the end", action: "last" },
+  { keys: ["+", "="], shown: "+", text: "faster", action: "faster" },
+  { keys: ["-"], shown: "-", text: "slower", action: "slower" },
+  { keys: ["z"], shown: "Z", text: "lanes: half the stretch of time, around the cursor", action: "zoomIn" },
+  { keys: ["x"], shown: "X", text: "lanes: twice the stretch of time", action: "zoomOut" },
+  { keys: ["l"], shown: "L", text: "follow the board live", action: "live" },
+  { keys: ["m"], shown: "M", text: "mark a label at the cursor, else at the picture's time", action: "mark" },
+  { keys: ["n"], shown: "N", text: "to the next label", action: "nextLabel" },
+  { keys: ["p"], shown: "P", text: "to the label before", action: "labelBefore" },
+  { keys: ["Delete"], shown: "Delete", text: "delete the chosen label", action: "deleteLabel" },
+  { keys: ["["], shown: "[", text: "the stretch to cut begins here", action: "cutFrom" },
+  { keys: ["]"], shown: "]", text: "the stretch to cut ends here", action: "cutTo" },
+  { keys: ["o"], shown: "O", text: "choose a recording to open", action: "open" },
+  { keys: ["c"], shown: "C", text: "to the map of pressure: arrow keys move the crosshair, Escape takes it away", action: "crosshair" },
+  { keys: ["0"], shown: "0", text: "reset intensity: what is held now is rest", action: "rest" },
+  { keys: ["d"], shown: "D", text: "look for dead, stuck and noisy taxels", action: "health" },
+  { keys: ["s"], shown: "S", text: "save the picture (PNG)", action: "picture" },
+  { keys: ["1"], shown: "1", text: "tab Board", action: "tabBoard" },
+  { keys: ["2"], shown: "2", text: "tab Record", action: "tabRecord" },
+  { keys: ["3"], shown: "3", text: "tab Labels", action: "tabLabels" },
+  { keys: ["4"], shown: "4", text: "tab View", action: "tabView" },
+  { keys: ["t"], shown: "T", text: "dark, light, or as the system has it", action: "theme" },
+  { keys: ["?"], shown: "?", text: "this list", action: "help" },
+];
+
+/**
+ * Calls the action of a key, unless the user types text or the focused element uses the key itself.
+ * @param {Record<string, (event: KeyboardEvent) => void>} actions by name
+ * @param {() => boolean} letters whether single characters count
+ */
+export function bindKeys(actions, letters) {
+  /** @type {Map<string, string>} */
+  const byKey = new Map(KEYS.flatMap(({ keys, action }) => keys.map((key) => [key, action])));
+  for (const action of byKey.values()) if (!actions[action]) throw new Error(`no action for key ${action}`);
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.defaultPrevented) return;
+    const { target } = event;
+    if (!(target instanceof Element)) return;
+    const types = target instanceof HTMLInputElement && !["checkbox", "range"].includes(target.type);
+    if (types || target instanceof HTMLTextAreaElement || document.querySelector("dialog[open]")) return;
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const action = byKey.get(key);
+    if (!action || (event.repeat && ["record", "play", "mark", "theme", "picture"].includes(action))) return;
+    if (key.length === 1 && key !== " " && !letters()) return;
+    // Elements with keys of their own: lists and sliders use arrows and letters, buttons and boxes the space bar.
+    const moves = key.startsWith("Arrow") || key === "Home" || key === "End";
+    if (target instanceof HTMLSelectElement || (moves && target.matches("input, [role=tab]"))) return;
+    if (key === " " && target.matches("button, input, summary, a")) return;
+    event.preventDefault();
+    actions[action](event);
+  });
+}
+
+/** Writes the table into the help. */
+export function showKeys() {
+  part("key-list", HTMLElement).replaceChildren(
+    ...KEYS.map(({ shown, text }) => make("tr", {}, make("th", { scope: "row" }, make("kbd", {}, shown)), make("td", {}, text))),
+  );
+}

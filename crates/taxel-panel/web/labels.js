@@ -1,0 +1,272 @@
+// Labels by click: mark, name, move and delete events on the time line.
+
+import { make, part, write } from "./dom.js";
+import { counted, seconds } from "./words.js";
+
+/** @typedef {import("./protocol.js").Label} Label */
+/** @typedef {import("./protocol.js").Labels} LabelsTold */
+/** @typedef {import("./server.js").Server} Server */
+/** @typedef {import("./settings.js").Settings} Settings */
+/** @typedef {import("./timeline.js").Timeline} Timeline */
+/** @typedef {import("./player.js").Player} Player */
+
+/** How far an arrow key moves a label, us. */
+const STEP_US = 1000;
+/** From here on a press is a drag, CSS pixels. */
+const DRAG = 3;
+
+/** The lane of flags above the raster, and the tab with all of them. */
+export class Labels {
+  /**
+   * @param {Server} server
+   * @param {Settings} settings
+   * @param {Player} player
+   * @param {() => Timeline | null} timeline
+   * @param {(error: unknown) => void} failed
+   * @param {() => void} shown called to bring the tab to the front
+   */
+  constructor(server, settings, player, timeline, failed, shown) {
+    this.server = server;
+    this.settings = settings;
+    this.player = player;
+    this.timeline = timeline;
+    this.failed = failed;
+    this.shown = shown;
+    /** @type {Map<string, LabelsTold>} by recording */
+    this.files = new Map();
+    /** The recording whose labels are shown. @type {string | null} */
+    this.file = null;
+    /** @type {Map<number, HTMLButtonElement>} */
+    this.flags = new Map();
+    /** @type {number | null} */
+    this.chosen = null;
+    /** The one being dragged, and where to. @type {{ label_id: number, t_us: number } | null} */
+    this.dragged = null;
+    this.name = part("label-name", HTMLInputElement);
+    this.name.value = settings.values.label;
+    this.name.oninput = () => settings.set("label", this.name.value);
+    this.lane = part("label-lane", HTMLElement);
+    this.lane.addEventListener("click", (event) => {
+      if (event.target === this.lane) this.mark(this.timeAt(event.clientX));
+    });
+    part("mark", HTMLButtonElement).onclick = () => this.markHere();
+    part("label-form", HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      this.markHere();
+    };
+  }
+
+  /** @returns {Label[]} of the recording shown, by time */
+  get labels() {
+    return (this.file && this.files.get(this.file)?.labels) || [];
+  }
+
+  /** @param {LabelsTold} message */
+  take(message) {
+    this.files.set(message.name, { ...message, labels: [...message.labels].sort((a, b) => a.t_us - b.t_us) });
+    if (message.name === this.file) this.show();
+  }
+
+  /** @param {string | null} file */
+  choose(file) {
+    if (this.file === file) return;
+    this.file = file;
+    this.chosen = null;
+    this.show();
+  }
+
+  /** @param {string[]} names to offer: the readout's, and those used */
+  offer(names) {
+    const known = new Set([...names, ...this.labels.map(({ label }) => label)]);
+    part("label-names", HTMLElement).replaceChildren(...[...known].sort().map((value) => make("option", { value })));
+  }
+
+  /** @param {number} clientX @returns {number | null} */
+  timeAt(clientX) {
+    const box = this.lane.getBoundingClientRect();
+    return this.timeline()?.time(Math.max(0, Math.min(1, (clientX - box.left) / box.width))) ?? null;
+  }
+
+  /** Marks at the cursor, or at the picture. */
+  markHere() {
+    const timeline = this.timeline();
+    this.mark(timeline?.cursor_us ?? timeline?.t_us ?? null);
+  }
+
+  /** @param {number | null} t_us */
+  mark(t_us) {
+    const label = this.name.value.trim();
+    if (!label) {
+      this.shown();
+      this.name.focus();
+      return;
+    }
+    if (t_us !== null) this.server.request({ type: "mark", label, t_us }).catch(this.failed);
+  }
+
+  /** @param {number} label_id @param {number} t_us */
+  move(label_id, t_us) {
+    this.server.request({ type: "move", label_id, t_us: Math.max(0, Math.round(t_us)) }).catch((error) => {
+      this.failed(error);
+      this.show();
+    });
+  }
+
+  /** @param {number} label_id */
+  remove(label_id) {
+    this.server.request({ type: "delete", label_id }).catch(this.failed);
+  }
+
+  /** @param {number} by 1: the next label after the picture's time, -1: the one before */
+  go(by) {
+    const now = this.player.t_us ?? 0;
+    const others = this.labels.filter(({ t_us }) => (by > 0 ? t_us > now : t_us < now));
+    const next = by > 0 ? others[0] : others[others.length - 1];
+    if (!next) return;
+    this.chosen = next.label_id;
+    this.player.seek(next.t_us);
+    this.show();
+  }
+
+  /** Deletes the label that was chosen last. */
+  removeChosen() {
+    if (this.chosen !== null) this.remove(this.chosen);
+  }
+
+  /** Writes the list and puts up the flags. */
+  show() {
+    const { labels } = this;
+    const table = this.file ? this.files.get(this.file) : undefined;
+    write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
+    this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";
+    const place = table ? `Saved in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
+    write(part("label-place", HTMLElement), place);
+    part("train-line", HTMLElement).hidden = !labels.length;
+    if (this.file) write(part("train-command", HTMLElement), `taxel train ${this.file} --labels notes --search -o readout.json`);
+    const list = part("label-list", HTMLElement);
+    // A row in which a person types stays what it is.
+    const typing = list.contains(document.activeElement) ? document.activeElement?.closest("li")?.dataset.id : undefined;
+    const edited = typing === undefined ? null : list.querySelector(`li[data-id="${CSS.escape(typing)}"]`);
+    const rows = labels.map((label) => (edited instanceof HTMLElement && edited.dataset.id === String(label.label_id) ? edited : this.row(label)));
+    if (rows.length !== list.children.length || rows.some((row, i) => row !== list.children[i])) {
+      const focused = document.activeElement;
+      list.replaceChildren(...rows);
+      if (edited && focused instanceof HTMLElement) focused.focus();
+    }
+    for (const row of rows) row.classList.toggle("chosen", row.dataset.id === String(this.chosen));
+    this.place();
+  }
+
+  /** @param {Label} label @returns {HTMLElement} */
+  row({ label_id, label, t_us }) {
+    const name = make("input", { type: "text", value: label, "aria-label": `name of the label at ${seconds(t_us)}`, maxlength: 200, list: "label-names" });
+    const time = make("input", { type: "text", inputmode: "decimal", value: (t_us / 1e6).toFixed(6).replace(/0{1,3}$/, ""), "aria-label": `time of ${label}, seconds` });
+    const go = make("button", { type: "button", class: "small", "aria-label": `go to ${label}, ${seconds(t_us)}` }, "Go");
+    const away = make("button", { type: "button", class: "small", "aria-label": `delete ${label}, ${seconds(t_us)}` }, "×");
+    name.onchange = () => this.server.request({ type: "rename", label_id, label: name.value.trim() }).catch((error) => this.refused(name, label, error));
+    time.onchange = () => {
+      const wanted = Math.round(Number(time.value.replace(",", ".")) * 1e6);
+      if (Number.isFinite(wanted)) this.server.request({ type: "move", label_id, t_us: wanted }).catch((error) => this.refused(time, (t_us / 1e6).toFixed(3), error));
+      else this.refused(time, (t_us / 1e6).toFixed(3), new Error(`${time.value} is no number of seconds`));
+    };
+    go.onclick = () => {
+      this.chosen = label_id;
+      this.player.seek(t_us);
+      this.show();
+    };
+    away.onclick = () => this.remove(label_id);
+    const row = make("li", {}, name, time, make("span", { class: "unit" }, "s"), go, away);
+    row.dataset.id = String(label_id);
+    return row;
+  }
+
+  /** @param {HTMLInputElement} input @param {string} old @param {Error} error */
+  refused(input, old, error) {
+    this.failed(error);
+    input.setAttribute("aria-invalid", "true");
+    input.onkeydown = (event) => {
+      if (event.key !== "Escape") return;
+      input.value = old;
+      input.removeAttribute("aria-invalid");
+      event.stopPropagation();
+    };
+  }
+
+  /** Puts each flag in the window where its time is. */
+  place() {
+    const timeline = this.timeline();
+    const seen = new Set();
+    for (const label of this.labels) {
+      const t_us = this.dragged?.label_id === label.label_id ? this.dragged.t_us : label.t_us;
+      const share = timeline?.share(t_us) ?? null;
+      if (share === null) continue;
+      seen.add(label.label_id);
+      let flag = this.flags.get(label.label_id);
+      if (!flag) {
+        flag = this.flag(label.label_id);
+        this.flags.set(label.label_id, flag);
+        this.lane.append(flag);
+      }
+      flag.style.left = `${(100 * share).toFixed(3)}%`;
+      write(/** @type {HTMLElement} */ (flag.firstElementChild), label.label);
+      const name = `label ${label.label} at ${seconds(t_us)}`;
+      if (flag.getAttribute("aria-label") !== name) flag.setAttribute("aria-label", name);
+      flag.classList.toggle("chosen", label.label_id === this.chosen);
+    }
+    for (const [id, flag] of this.flags) {
+      if (seen.has(id)) continue;
+      flag.remove();
+      this.flags.delete(id);
+    }
+  }
+
+  /** @param {number} label_id @returns {HTMLButtonElement} */
+  flag(label_id) {
+    const flag = make("button", { type: "button", class: "flag" }, make("span"));
+    const mine = () => this.labels.find((label) => label.label_id === label_id);
+    let from = 0;
+    flag.addEventListener("pointerdown", (event) => {
+      from = event.clientX;
+      flag.setPointerCapture(event.pointerId);
+    });
+    flag.addEventListener("pointermove", (event) => {
+      if (!flag.hasPointerCapture(event.pointerId)) return;
+      if (!this.dragged && Math.abs(event.clientX - from) < DRAG) return;
+      const t_us = this.timeAt(event.clientX);
+      if (t_us === null) return;
+      this.dragged = { label_id, t_us };
+      this.place();
+    });
+    flag.addEventListener("pointerup", () => {
+      const { dragged } = this;
+      this.dragged = null;
+      this.chosen = label_id;
+      if (dragged) this.move(label_id, dragged.t_us);
+      else this.shown();
+      this.show();
+    });
+    flag.addEventListener("pointercancel", () => {
+      this.dragged = null;
+    });
+    flag.addEventListener("focus", () => {
+      this.chosen = label_id;
+      this.show();
+    });
+    flag.addEventListener("keydown", (event) => {
+      const label = mine();
+      if (!label || event.ctrlKey || event.altKey || event.metaKey) return;
+      const far = event.shiftKey ? 100 * STEP_US : STEP_US;
+      if (event.key === "ArrowLeft") this.move(label_id, label.t_us - far);
+      else if (event.key === "ArrowRight") this.move(label_id, label.t_us + far);
+      else if (event.key === "Delete" || event.key === "Backspace") this.remove(label_id);
+      else if (event.key === "Enter") {
+        this.shown();
+        const input = part("label-list", HTMLElement).querySelector(`li[data-id="${label_id}"] input`);
+        if (input instanceof HTMLElement) input.focus();
+      } else return;
+      event.preventDefault();
+      event.stopPropagation();
+    });
+    return flag;
+  }
+}

@@ -1,0 +1,142 @@
+// Curves under the raster: the watched taxel, force and area, the centre. All share one time.
+
+import uPlot from "./vendor/uPlot.js";
+import { part, themed } from "./dom.js";
+import { UNKNOWN_VALUE } from "./protocol.js";
+import { SPAN } from "./timeline.js";
+
+/** @typedef {import("./timeline.js").Timeline} Timeline */
+/** @typedef {(number | null)[]} Curve */
+/** @typedef {"taxel" | "force" | "centre"} Name */
+
+/** Room for the numbers on either side, CSS pixels; the raster has the same. */
+const SIDE = 44;
+/** @type {readonly Name[]} */
+const NAMES = ["taxel", "force", "centre"];
+
+/** Curves of the last five seconds, drawn by uPlot. */
+export class Lanes {
+  constructor() {
+    /** @type {Map<Name, uPlot>} */
+    this.plots = new Map();
+    this.limits = { rows: 64, columns: 64 };
+    const x = Array.from({ length: SPAN }, (_, i) => i - SPAN + 1);
+    const curve = () => /** @type {Curve} */ (new Array(SPAN).fill(null));
+    /** @type {Record<Name, [number[], ...Curve[]]>} */
+    this.data = { taxel: [x, curve(), curve(), curve()], force: [x, curve(), curve()], centre: [x, curve(), curve()] };
+    this.observer = new ResizeObserver(() => this.fit());
+    for (const name of NAMES) this.observer.observe(part(`${name}-lane`, HTMLElement));
+    this.make();
+  }
+
+  /** Makes the plots, and again after the theme has changed. */
+  make() {
+    const [text, grid, one, two, band] = ["dim", "grid", "more", "less", "band"].map(themed);
+    /**
+     * @param {string} scale
+     * @param {number} side
+     * @param {string} stroke
+     * @returns {uPlot.Axis}
+     */
+    const axis = (scale, side, stroke) => ({
+      scale,
+      side,
+      stroke,
+      size: SIDE,
+      gap: 4,
+      space: 24,
+      font: "11px system-ui, sans-serif",
+      grid: { show: side === 3, stroke: grid, width: 1 },
+      ticks: { show: false },
+      values: (_, marks) => marks.map((mark) => (mark >= 10_000 ? `${mark / 1000}k` : String(mark))),
+    });
+    /** @type {uPlot.Axis} */
+    const time = { show: true, size: 0, values: () => [], grid: { stroke: grid, width: 1 }, ticks: { show: false }, splits: () => [-1000, -750, -500, -250] };
+    /** @param {string} stroke @param {string} scale @param {number[]} [dash] @returns {uPlot.Series} */
+    const line = (stroke, scale, dash) => ({ stroke, scale, width: 1.25, points: { show: false }, ...(dash ? { dash } : {}) });
+    /** @type {uPlot.Series} the edge of a band */
+    const bound = { scale: "value", points: { show: false } };
+    /** @type {uPlot.Scale.Range} */
+    const fromZero = (_, __, most) => [0, Math.max(8, (most ?? 0) * 1.1)];
+    const { rows, columns } = this.limits;
+    const extent = Math.max(rows, columns);
+    /** @type {Record<Name, { scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }>} */
+    const plans = {
+      taxel: {
+        scales: { value: { range: (_, least, most) => (least === null ? [0, 10] : [Math.floor(least) - 2, Math.ceil(most) + 2]) } },
+        series: [{}, bound, bound, line(one, "value")],
+        bands: [{ series: [2, 1], fill: band }],
+        axes: [time, axis("value", 3, text)],
+      },
+      force: {
+        scales: { force: { range: fromZero }, area: { range: fromZero } },
+        series: [{}, line(one, "force"), line(two, "area", [5, 3])],
+        axes: [time, axis("force", 3, one), axis("area", 1, two)],
+      },
+      centre: {
+        scales: { place: { range: [0, extent] } },
+        series: [{}, line(one, "place"), line(two, "place", [5, 3])],
+        axes: [time, { ...axis("place", 3, text), splits: () => [0, extent / 2, extent] }],
+      },
+    };
+    for (const name of NAMES) {
+      this.plots.get(name)?.destroy();
+      const place = part(`${name}-lane`, HTMLElement);
+      const { scales, ...plan } = plans[name];
+      const right = name === "force" ? 0 : SIDE;
+      const plot = new uPlot(
+        {
+          ...plan,
+          width: Math.max(100, place.clientWidth),
+          height: Math.max(40, place.clientHeight),
+          // Half of the uppermost number's height.
+          padding: [7, right, 4, 0],
+          legend: { show: false },
+          cursor: { show: false },
+          scales: { x: { time: false, range: [-SPAN, 0] }, ...scales },
+        },
+        this.data[name],
+        place,
+      );
+      this.plots.set(name, plot);
+    }
+  }
+
+  /** @param {number} rows @param {number} columns */
+  size(rows, columns) {
+    if (this.limits.rows === rows && this.limits.columns === columns) return;
+    this.limits = { rows, columns };
+    this.make();
+  }
+
+  /** Fits the plots to their places. */
+  fit() {
+    for (const [name, plot] of this.plots) {
+      const { clientWidth: width, clientHeight: height } = part(`${name}-lane`, HTMLElement);
+      if (width > 0 && height > 0 && (plot.width !== width || plot.height !== height)) plot.setSize({ width, height });
+    }
+  }
+
+  /** @param {Timeline} timeline */
+  draw(timeline) {
+    const { end, history, sum, area, x, y } = timeline;
+    const [, least, greatest, last] = this.data.taxel;
+    const [, force, touched] = this.data.force;
+    const [, column, row] = this.data.centre;
+    for (let i = 0; i < SPAN; i++) {
+      const place = end === null ? -1 : timeline.known(end - SPAN + 1 + i);
+      const known = place >= 0 && history[3 * place + 2] !== UNKNOWN_VALUE;
+      least[i] = known ? history[3 * place] : null;
+      greatest[i] = known ? history[3 * place + 1] : null;
+      last[i] = known ? history[3 * place + 2] : null;
+      force[i] = place >= 0 ? sum[place] : null;
+      touched[i] = place >= 0 ? area[place] : null;
+      const pressed = place >= 0 && !Number.isNaN(x[place]);
+      column[i] = pressed ? x[place] : null;
+      row[i] = pressed ? y[place] : null;
+    }
+    for (const [name, plot] of this.plots) {
+      if (!part(`${name}-block`, HTMLElement).hidden) plot.setData(this.data[name]);
+    }
+  }
+}

@@ -1,0 +1,31 @@
+// The notice at the foot of the page: results and errors for the user.
+
+import { part, write } from "./dom.js";
+
+/** How long a notice is shown, ms. */
+const SHOWN_MS = 8000;
+
+/** @type {number | undefined} */
+let timer;
+
+/** @param {string} text @param {boolean} [bad] */
+export function notify(text, bad = false) {
+  const place = part("notice", HTMLElement);
+  place.hidden = false;
+  place.classList.toggle("bad", bad);
+  write(part("notice-text", HTMLElement), text);
+  clearTimeout(timer);
+  timer = setTimeout(() => {
+    place.hidden = true;
+    write(part("notice-text", HTMLElement), "");
+  }, SHOWN_MS);
+}
+
+/** @param {unknown} error shown to the user whose request failed */
+export function failed(error) {
+  notify(error instanceof Error ? error.message : String(error), true);
+}
+
+part("notice-close", HTMLButtonElement).onclick = () => {
+  part("notice", HTMLElement).hidden = true;
+};

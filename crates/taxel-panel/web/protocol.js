@@ -1,0 +1,125 @@
+// The messages between server and page: docs/panel-protocol.md, version 1.
+
+export const VERSION = 1;
+
+/** The value of a taxel without any event so far. */
+export const UNKNOWN_VALUE = 65535;
+
+/**
+ * @typedef {{ rows: number, columns: number, pitch_mm: number, name: string, exists: string | null }} ArrayTold
+ * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayTold | null, udp: string | null, control: string | null,
+ *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, columns_us: [number, number], time_columns: number,
+ *   delta_intensity: boolean | null }} Hello
+ * @typedef {{ type: "registers", known: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
+ *   warnings: string[] }} RegistersTold
+ * @typedef {{ type: "presets", built_in: string[], own: Record<string, Record<string, number>>, path: string }} Presets
+ * @typedef {{ count: number, p50_us: number | null, p99_us: number | null, max_us: number | null }} Latency
+ * @typedef {{ type: "counters", board_us: number | null, events: number, events_per_s: number | null, bytes_per_s: number | null,
+ *   frames_per_s: number | null, lost: Record<string, number>, queue: number | null, latency: Record<string, Latency>, detections: number,
+ *   wire_version: number | null, taring: boolean, reach_us: [number, number] | null, reach_bytes: number, viewers: number }} Counters
+ * @typedef {{ type: "detection", label: string, t_us: number, known_us: number, latency_us: number | null }} Detection
+ * @typedef {{ type: "spikes", encoder: string, trains: number, signed: boolean, t_ms: number[], train: number[], value: number[] | null,
+ *   left_out: number, latency_ms: number }} Spikes
+ * @typedef {{ type: "recorder", state: "idle" | "countdown" | "recording" | "finishing", name: string | null, index: number | null,
+ *   file: string | null, label: string | null, advance: boolean, left_s: number | null, seconds: number | null, length_s: number | null,
+ *   last: { file: string, verdict: string } | null, error: string | null }} Recorder
+ * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileTold
+ * @typedef {{ type: "recordings", folder: string, files: FileTold[] }} Recordings
+ * @typedef {{ type: "opened", name: string, array: ArrayTold, start_us: number | null, stop_us: number | null, events: number, bytes: number,
+ *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null, markers: { t_us: number, start: boolean }[],
+ *   notes: { t_us: number | null, text: string }[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
+ * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[] }} Overview
+ * @typedef {{ type: "transport", source: string | null, state: "following" | "playing" | "paused", speed: number, t_us: number | null }} Transport
+ * @typedef {{ label_id: number, label: string, t_us: number }} Label
+ * @typedef {{ type: "labels", name: string, path: string, labels: Label[] }} Labels
+ * @typedef {[number, number]} Taxel column and row
+ * @typedef {{ type: "health", source: string | null, taxels: number, heard: number, dead: Taxel[], stuck: Taxel[], noisy: Taxel[] }} Health
+ * @typedef {{ taxel: Taxel, t_us: number, rest: number, before: number | null }} Zeroing
+ * @typedef {{ type: "zeroed", taxels: Zeroing[] }} Zeroed
+ * @typedef {{ type: "board_line", at_ns: number, text: string }} BoardLine
+ * @typedef {{ type: "cut", name: string, lost: string[] }} Cut
+ * @typedef {{ place: string, kind: string, product: string | null, maker: string | null, serial: string | null }} Port
+ * @typedef {{ type: "places", serial: Port[], addresses: { host: string, name: string }[] }} Places
+ * @typedef {{ type: "done", id: number }} Done
+ * @typedef {{ type: "refused", id?: number, what: string | null, reason: string, field: string | null }} Refused
+ * @typedef {{ type: "warning", text: string }} Warning
+ * @typedef {Hello | RegistersTold | Presets | Counters | Detection | Spikes | Recorder | Recordings | Opened | Overview | Transport | Labels |
+ *   Health | Zeroed | BoardLine | Cut | Places | Done | Refused | Warning} Message
+ */
+
+/**
+ * A picture, its sections as views of its bytes (little-endian, as every machine that runs browsers); null: not there.
+ * @typedef {object} Picture
+ * @property {boolean} live
+ * @property {boolean} moves
+ * @property {boolean} restart
+ * @property {boolean} recording
+ * @property {boolean} following
+ * @property {number} rows
+ * @property {number} columns
+ * @property {number | null} t_us
+ * @property {number} events
+ * @property {number | null} watched
+ * @property {number} column_us
+ * @property {number} first number of the first column of time
+ * @property {number} count
+ * @property {Uint16Array | null} pressure
+ * @property {Int8Array | null} change
+ * @property {Uint8Array | null} raster
+ * @property {Uint32Array | null} sums four words a column: ticks, taxels, and the centre that `centres` reads
+ * @property {Float32Array | null} centres the same words as floats: x at 2, y at 3
+ * @property {Uint16Array | null} history least, greatest, last
+ * @property {Uint16Array | null} rest
+ * @property {Uint8Array | null} spikes of the encoder, as the raster
+ */
+
+/**
+ * Reads a picture.
+ * @param {ArrayBuffer} buffer
+ * @returns {Picture}
+ */
+export function readPicture(buffer) {
+  const view = new DataView(buffer);
+  if (view.getUint32(0) !== 0x54585031) throw new Error("a picture that does not begin with TXP1");
+  const flags = view.getUint16(6, true);
+  const t = view.getBigInt64(16, true);
+  const watched = view.getUint32(40, true);
+  /** @param {number} number @returns {[number, number] | null} */
+  const section = (number) => {
+    const [start, bytes] = [view.getUint32(64 + 8 * number, true), view.getUint32(68 + 8 * number, true)];
+    return bytes ? [start, bytes] : null;
+  };
+  /**
+   * @template T
+   * @param {number} number
+   * @param {{ new (buffer: ArrayBuffer, start: number, length: number): T, BYTES_PER_ELEMENT: number }} kind
+   * @returns {T | null}
+   */
+  const words = (number, kind) => {
+    const place = section(number);
+    return place && new kind(buffer, place[0], place[1] / kind.BYTES_PER_ELEMENT);
+  };
+  return {
+    live: (flags & 1) !== 0,
+    moves: (flags & 2) !== 0,
+    restart: (flags & 4) !== 0,
+    recording: (flags & 8) !== 0,
+    following: (flags & 16) !== 0,
+    rows: view.getUint16(12, true),
+    columns: view.getUint16(14, true),
+    t_us: t === -(2n ** 63n) ? null : Number(t),
+    events: Number(view.getBigUint64(32, true)),
+    watched: watched === 0xffffffff ? null : watched,
+    column_us: view.getUint32(44, true),
+    first: Number(view.getBigInt64(48, true)),
+    count: view.getUint32(56, true),
+    pressure: words(0, Uint16Array),
+    change: words(1, Int8Array),
+    raster: words(2, Uint8Array),
+    sums: words(3, Uint32Array),
+    centres: words(3, Float32Array),
+    history: words(4, Uint16Array),
+    rest: words(5, Uint16Array),
+    spikes: words(6, Uint8Array),
+  };
+}

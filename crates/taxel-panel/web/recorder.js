@@ -1,0 +1,166 @@
+// Recording: names with an index, countdown with tones, length, advance, label of the trial.
+
+import { make, part, write } from "./dom.js";
+import { size } from "./words.js";
+import { Tones } from "./tones.js";
+
+/** @typedef {import("./protocol.js").Recorder} Told */
+/** @typedef {import("./protocol.js").Recordings} Recordings */
+/** @typedef {import("./server.js").Server} Server */
+
+/** The tab of recordings, and the button at the foot of the page. */
+export class Recorder {
+  /**
+   * @param {Server} server
+   * @param {(error: unknown) => void} failed
+   * @param {() => void} shown called to bring the tab to the front
+   */
+  constructor(server, failed, shown) {
+    this.server = server;
+    this.failed = failed;
+    this.shown = shown;
+    this.tones = new Tones();
+    this.able = false;
+    /** @type {Told | null} */
+    this.status = null;
+    /** Seconds of the countdown that were sounded. @type {number | null} */
+    this.sounded = null;
+    this.button = part("record", HTMLButtonElement);
+    this.button.onclick = () => this.toggle();
+    part("record-form", HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      this.toggle();
+    };
+    part("note-form", HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      const text = part("note", HTMLInputElement);
+      server.request({ type: "note", text: text.value.trim() }).then(() => {
+        text.value = "";
+      }, failed);
+    };
+    for (const id of ["record-name", "record-index", "record-format"]) part(id, HTMLElement).addEventListener("input", () => this.preview());
+    this.preview();
+  }
+
+  /** @returns {number | null} */
+  number(/** @type {string} */ id) {
+    const text = part(id, HTMLInputElement).value.trim().replace(",", ".");
+    return text === "" ? null : Number(text);
+  }
+
+  preview() {
+    const name = part("record-name", HTMLInputElement).value.trim();
+    const index = part("record-index", HTMLInputElement).value.trim();
+    write(part("record-file", HTMLElement), name ? `${name}${index}.${part("record-format", HTMLSelectElement).value}` : "");
+  }
+
+  get busy() {
+    return this.status !== null && this.status.state !== "idle";
+  }
+
+  /** Starts, or ends what runs. */
+  toggle() {
+    if (!this.able) return;
+    this.tones.wake();
+    if (this.busy) {
+      this.server.request({ type: "stop" }).catch(this.failed);
+      return;
+    }
+    part("record-reason", HTMLElement).hidden = true;
+    for (const [id, what] of /** @type {const} */ ([["record-index", "index"], ["record-countdown", "countdown"], ["record-length", "length"]])) {
+      if (Number.isNaN(this.number(id))) return this.refuse(`${what}: ${part(id, HTMLInputElement).value.trim()} is no number`);
+    }
+    const label = part("record-label", HTMLInputElement).value.trim();
+    const format = part("record-format", HTMLSelectElement).value;
+    const message = {
+      type: "record",
+      name: part("record-name", HTMLInputElement).value.trim(),
+      index: this.number("record-index"),
+      countdown_s: this.number("record-countdown") ?? 0,
+      length_s: this.number("record-length"),
+      advance: part("record-advance", HTMLInputElement).checked,
+      label: label || null,
+      format,
+    };
+    this.server.request(message).catch((error) => this.refuse(error.message));
+  }
+
+  /** @param {string} reason why nothing is recorded */
+  refuse(reason) {
+    this.shown();
+    const place = part("record-reason", HTMLElement);
+    place.hidden = false;
+    write(place, reason);
+  }
+
+  /** @param {Told} status */
+  take(status) {
+    const before = this.status;
+    this.status = status;
+    const { state, left_s, advance, error } = status;
+    if (state === "countdown" && left_s !== null) {
+      const left = Math.ceil(left_s - 0.05);
+      if (left > 0 && left !== this.sounded) this.tones.second();
+      this.sounded = left;
+    } else this.sounded = null;
+    if (state === "recording" && before?.state !== "recording") this.tones.start();
+    if (before?.state === "recording" && state !== "recording") this.tones.stop();
+    // The index moves on by itself; a number that a person is typing stays.
+    const index = part("record-index", HTMLInputElement);
+    if (before && before.index !== status.index && status.index !== null && document.activeElement !== index) {
+      index.value = String(status.index);
+      this.preview();
+    }
+    this.button.classList.toggle("on", this.busy);
+    write(part("record-word", HTMLElement), { idle: "Record", countdown: "Cancel", recording: "Stop", finishing: "Saving" }[state]);
+    write(part("record-start", HTMLButtonElement), this.busy ? (state === "countdown" ? "Cancel (R)" : "Stop (R)") : "Record (R)");
+    const reason = part("record-reason", HTMLElement);
+    if (error || this.busy) {
+      reason.hidden = !error;
+      write(reason, error ?? "");
+    }
+    for (const id of ["note-form"]) part(id, HTMLElement).hidden = state !== "recording";
+    const last = part("record-last", HTMLElement);
+    last.hidden = !status.last;
+    if (status.last) {
+      write(part("record-last-file", HTMLElement), status.last.file);
+      write(part("record-last-verdict", HTMLElement), status.last.verdict);
+    }
+    this.write();
+    const info = part("recorder-info", HTMLElement);
+    if (state === "countdown" && left_s !== null) write(info, `${Math.ceil(left_s)}`);
+    else if (before?.state !== state) write(info, state === "recording" ? `recording ${status.file ?? ""}` : state === "idle" && before ? `stopped${advance ? "" : ", saved"}` : "");
+  }
+
+  /** Writes what runs. */
+  write() {
+    const { status } = this;
+    const big = part("record-state", HTMLElement);
+    const more = part("record-more", HTMLElement);
+    const bar = part("record-bar", HTMLProgressElement);
+    if (!status || status.state === "idle") {
+      write(big, "Ready");
+      write(more, "");
+      bar.hidden = true;
+      return;
+    }
+    const { state, left_s, seconds, length_s, file } = status;
+    if (state === "countdown") write(big, `${Math.ceil(left_s ?? 0)}`);
+    else write(big, state === "recording" ? `${(seconds ?? 0).toFixed(0)} s` : "Saving");
+    write(more, `${state === "countdown" ? "then" : ""} ${file ?? ""}`.trim() + (status.label ? ` · ${status.label}` : ""));
+    bar.hidden = !(state === "recording" && length_s);
+    if (length_s && seconds !== null) bar.value = Math.min(1, seconds / length_s);
+  }
+
+  /** @param {Recordings} message @param {string | null} open */
+  list(message, open) {
+    const select = part("files", HTMLSelectElement);
+    const files = [...message.files].sort((a, b) => b.modified_ns - a.modified_ns);
+    const option = (/** @type {typeof files[0]} */ { name, bytes, labels }) =>
+      make("option", { value: name }, `${name} (${size(bytes)}${labels ? `, ${labels} labelled` : ""})`);
+    const first = make("option", { value: "" }, files.length ? "Open a recording…" : "No recordings yet");
+    select.replaceChildren(first, ...files.map(option));
+    select.value = open ?? "";
+    write(part("folder", HTMLElement), message.folder);
+  }
+}

@@ -1,0 +1,98 @@
+// The connection to the server: requests with their answers, credits for pictures, and reconnecting after a break.
+
+import { VERSION } from "./protocol.js";
+
+/** @typedef {import("./protocol.js").Message} Message */
+/** @typedef {import("./protocol.js").Refused} Refused */
+
+/** Time until the next attempt to connect, ms. */
+const RECONNECT_MS = 2000;
+
+/** The reason why a request was refused. */
+export class RefusedError extends Error {
+  /** @param {Refused} message */
+  constructor(message) {
+    super(message.reason);
+    this.field = message.field;
+  }
+}
+
+/** One WebSocket, opened again after it has closed. */
+export class Server {
+  /**
+   * @param {string} token
+   * @param {(message: Message) => void} onMessage
+   * @param {(picture: ArrayBuffer) => void} onPicture
+   * @param {(state: "open" | "lost", why: string) => void} onState
+   */
+  constructor(token, onMessage, onPicture, onState) {
+    this.token = token;
+    this.onMessage = onMessage;
+    this.onPicture = onPicture;
+    this.onState = onState;
+    /** @type {WebSocket | null} */
+    this.socket = null;
+    this.next = 0;
+    /** @type {Map<number, { done: () => void, refused: (error: Error) => void }>} */
+    this.pending = new Map();
+  }
+
+  /** Connects, and again whenever the connection has closed. */
+  open() {
+    const socket = new WebSocket(`ws://${location.host}/socket`, [`taxel.panel.${VERSION}`, `token.${this.token}`]);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onopen = () => {
+      this.onState("open", "");
+      this.send({ type: "credit", n: 2 });
+    };
+    socket.onmessage = ({ data }) => {
+      if (data instanceof ArrayBuffer) {
+        // A credit for each picture received, not drawn: two may arrive between two frames of the screen.
+        this.send({ type: "credit", n: 1 });
+        this.onPicture(data);
+      } else {
+        this.receive(JSON.parse(data));
+      }
+    };
+    socket.onclose = ({ code, reason }) => {
+      for (const { refused } of this.pending.values()) refused(new Error("the connection broke"));
+      this.pending.clear();
+      const why = code === 1001 ? "the server has ended" : reason || "no connection to the server";
+      this.onState("lost", why);
+      setTimeout(() => this.open(), RECONNECT_MS);
+    };
+  }
+
+  /** @param {Message} message */
+  receive(message) {
+    const request = (message.type === "done" || message.type === "refused") && message.id !== undefined ? this.pending.get(message.id) : undefined;
+    if (!request) return this.onMessage(message);
+    const { id } = /** @type {{ id: number }} */ (message);
+    this.pending.delete(id);
+    if (message.type === "refused") request.refused(new RefusedError(message));
+    else request.done();
+  }
+
+  /**
+   * Sends a message that needs no answer.
+   * @param {{ type: string } & Record<string, unknown>} message
+   */
+  send(message) {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+
+  /**
+   * Makes a request: fulfilled when it is done, rejected with the reason when it is refused.
+   * @param {{ type: string } & Record<string, unknown>} message
+   * @returns {Promise<void>}
+   */
+  request(message) {
+    if (this.socket?.readyState !== WebSocket.OPEN) return Promise.reject(new Error("no connection to the server"));
+    const id = this.next++;
+    return new Promise((done, refused) => {
+      this.pending.set(id, { done, refused });
+      this.send({ ...message, id });
+    });
+  }
+}

@@ -1,0 +1,126 @@
+// The whole recording, or the past of the live source as far as it can be viewed: event rate and marks; click or drag to move there.
+
+import { fitted, ground, part, themed } from "./dom.js";
+import { seconds } from "./words.js";
+
+/** @typedef {import("./protocol.js").Overview} Overview */
+/** @typedef {import("./player.js").Player} Player */
+/** @typedef {import("./timeline.js").Timeline} Timeline */
+/** @typedef {{ labels: { t_us: number }[], detections: { t_us: number }[], notes: { t_us: number }[], cut: [number | null, number | null] }} Marks */
+
+/** The strip at the foot of the page. */
+export class Strip {
+  /**
+   * @param {Player} player
+   * @param {() => Timeline | null} timeline
+   * @param {() => Marks} marks
+   */
+  constructor(player, timeline, marks) {
+    this.player = player;
+    this.timeline = timeline;
+    this.marks = marks;
+    this.canvas = part("strip", HTMLCanvasElement);
+    this.context = ground(this.canvas);
+    /** @type {Overview | null} */
+    this.overview = null;
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.canvas.setPointerCapture(event.pointerId);
+      this.go(event);
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons & 1) this.go(event);
+      this.hover = event.offsetX;
+    });
+    this.canvas.addEventListener("pointerleave", () => {
+      this.hover = undefined;
+    });
+    this.canvas.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  /** @param {PointerEvent} event */
+  go(event) {
+    const { reach } = this.player;
+    if (reach) this.player.seek(reach[0] + (event.offsetX / this.canvas.clientWidth) * (reach[1] - reach[0]));
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const { reach, goal: t_us } = this.player;
+    if (!reach || t_us === null || event.ctrlKey || event.altKey || event.metaKey) return;
+    const [from, to] = reach;
+    /** @type {Record<string, number>} */
+    const places = {
+      ArrowLeft: t_us - (event.shiftKey ? 1e6 : 1e5),
+      ArrowRight: t_us + (event.shiftKey ? 1e6 : 1e5),
+      PageDown: t_us - (to - from) / 10,
+      PageUp: t_us + (to - from) / 10,
+      Home: from,
+      End: to,
+    };
+    const place = places[event.key];
+    if (place === undefined) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.player.seek(place);
+  }
+
+  draw() {
+    const { width, height, ratio } = fitted(this.canvas);
+    const { context, overview } = this;
+    const { reach, t_us } = this.player;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    if (!reach || reach[1] <= reach[0]) return;
+    const x = (/** @type {number} */ t) => ((t - reach[0]) / (reach[1] - reach[0])) * width;
+    const timeline = this.timeline();
+    if (timeline && timeline.end_us !== null) {
+      context.fillStyle = themed("shade");
+      const left = Math.max(0, x(timeline.end_us - timeline.span_us));
+      context.fillRect(left, 0, Math.min(width, x(timeline.end_us)) - left, height);
+    }
+    const { labels, detections, notes, cut } = this.marks();
+    const [begin, end] = cut;
+    if (begin !== null || end !== null) {
+      context.fillStyle = themed("cut");
+      const [left, right] = [begin === null ? 0 : x(begin), end === null ? width : x(end)];
+      context.fillRect(left, 0, right - left, height);
+    }
+    if (overview) {
+      const most = overview.events.reduce((a, b) => Math.max(a, b), 1);
+      context.fillStyle = themed("rate");
+      const wide = Math.max(1, (overview.step_us / (reach[1] - reach[0])) * width);
+      overview.events.forEach((events, i) => {
+        if (!events) return;
+        // The root of the share: an impact has thousands of times the events of a hand at rest.
+        const high = Math.max(1, Math.sqrt(events / most) * (height - 10));
+        context.fillRect(x(overview.start_us + i * overview.step_us), height - high, wide, high);
+      });
+    }
+    /** @param {{ t_us: number }[]} marked @param {string} colour @param {number} from @param {number} to @param {number} wide */
+    const ticks = (marked, colour, from, to, wide) => {
+      context.fillStyle = themed(colour);
+      for (const { t_us: t } of marked) context.fillRect(x(t) - wide / 2, from, wide, to - from);
+    };
+    ticks(notes, "dim", 0, 5, 1.5);
+    ticks(detections, "less", 0, 5, 2);
+    ticks(labels, "label", 0, height, 2);
+    if (this.hover !== undefined) {
+      context.fillStyle = themed("dim");
+      context.fillRect(this.hover, 0, 1, height);
+    }
+    if (t_us !== null) {
+      context.fillStyle = themed("text");
+      context.fillRect(Math.min(width - 2, Math.max(0, x(t_us) - 1)), 0, 2, height);
+    }
+  }
+
+  /** Describes the position of the view to screen readers. */
+  write() {
+    const { reach, t_us } = this.player;
+    const { canvas } = this;
+    canvas.setAttribute("aria-valuemin", ((reach?.[0] ?? 0) / 1e6).toFixed(3));
+    canvas.setAttribute("aria-valuemax", ((reach?.[1] ?? 0) / 1e6).toFixed(3));
+    canvas.setAttribute("aria-valuenow", ((t_us ?? 0) / 1e6).toFixed(3));
+    canvas.setAttribute("aria-valuetext", reach ? `${seconds(t_us)} of ${seconds(reach[0])} to ${seconds(reach[1])}` : "nothing yet");
+  }
+}

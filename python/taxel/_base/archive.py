@@ -1,0 +1,118 @@
+"""Arrays of a .npz, from strangers and damaged disks too: nothing is unpacked before it has said how large it is."""
+
+from __future__ import annotations
+
+import math
+import os
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.limits import DESCRIPTION, UNPACKED, unpacked
+from taxel._core import FormatError
+
+__all__ = ["read_arrays", "stored_names"]
+
+
+def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Return the names of the arrays of a .npz; none where the file is no archive or cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "two.npz"
+    >>> np.savez(place, t=[1, 2], x=[3, 4])
+    >>> stored_names(place)
+    ('t', 'x')
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return tuple(name.removesuffix(".npy") for name in archive.namelist())
+    # What zipfile raises on damage is no closed list; reading the arrays says what is wrong.
+    except Exception:
+        return ()
+
+
+def read_arrays(
+    path: str | os.PathLike[str], wanted: Iterable[str], *, texts: Iterable[str] = ()
+) -> dict[str, NDArray[Any]]:
+    """Read arrays of a .npz by name, those of the wanted ones that it has.
+
+    Parameters
+    ----------
+    path : path
+    wanted : names of arrays; others are not looked at
+    texts : names of those that hold one text: at most 64 Mi characters each
+
+    Returns
+    -------
+    dict from name to array
+
+    Raises
+    ------
+    FormatError : no archive, damage, Python objects, or more bytes than a file may hold (names the array)
+    OSError : the file is not there, or cannot be read
+    MemoryError : within the limits, but not within the memory that there is
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "two.npz"
+    >>> np.savez(place, t=[1, 2], x=[3, 4])
+    >>> read_arrays(place, ["t", "y"])
+    {'t': array([1, 2])}
+    """
+    with open(path, "rb") as file:
+        try:
+            return _arrays(Path(path), file, tuple(wanted), frozenset(texts))
+        except (FormatError, MemoryError):
+            raise
+        # What numpy and zipfile raise on damage is no closed list: zlib.error, NotImplementedError, TokenError,
+        # struct.error, OSError where an archive says that it goes on before its beginning ...
+        except Exception as error:
+            said = str(error).split("\n", maxsplit=1)[0][:200] or type(error).__name__
+            raise FormatError(f"{path}: a .npz that cannot be unpacked ({said}); write it again") from None
+
+
+def _arrays(path: Path, file: IO[bytes], wanted: tuple[str, ...], texts: frozenset[str]) -> dict[str, NDArray[Any]]:
+    """Read the arrays once all have said how large they are."""
+    columns = {}
+    with zipfile.ZipFile(file) as archive:
+        members = {name.removesuffix(".npy"): name for name in archive.namelist()}
+        there = [name for name in wanted if name in members]
+        total = 0
+        for name in there:
+            with archive.open(members[name]) as array:
+                shape, dtype = _described(array)
+                begin = array.tell()
+            place = f"{path}, array {name}"
+            if dtype.hasobject:
+                raise FormatError(f"{place}: holds Python objects; must be numbers or text")
+            size = math.prod(shape) * dtype.itemsize
+            total += size
+            # Python keeps a character in 4 bytes.
+            unpacked(place, size, 4 * DESCRIPTION if name in texts else UNPACKED)
+            unpacked(place, total)
+            stored = archive.getinfo(members[name]).file_size - begin
+            if size != stored:
+                raise FormatError(f"{place}: says that it holds {size} bytes ({shape}, {dtype}); there are {stored}")
+        for name in there:
+            with archive.open(members[name]) as array:
+                columns[name] = np.lib.format.read_array(array, allow_pickle=False)
+    return columns
+
+
+def _described(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Read the shape and the kind that an array says it has."""
+    read = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}
+    version = np.lib.format.read_magic(file)
+    if version[0] not in read:
+        raise ValueError(f"version {version[0]} of the description; there are 1 and 2")
+    shape, _, dtype = read[version[0]](file)
+    if any(isinstance(n, bool) or n < 0 for n in shape):
+        raise ValueError(f"shape {shape}")
+    return shape, dtype

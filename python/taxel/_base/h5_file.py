@@ -1,0 +1,207 @@
+"""A .h5, read by a child process: a damaged one can keep the HDF5 library where no signal reaches it."""
+
+from __future__ import annotations
+
+import json
+import math
+import mmap
+import os
+import selectors
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.limits import DESCRIPTION, unpacked
+from taxel._core import FormatError
+
+__all__ = ["Entry", "H5File"]
+
+_CHILD = Path(__file__).with_name("h5_child.py")
+#: How long the child may be silent, s; and how long it may take to begin, which loads libraries.
+PATIENCE_S, BEGIN_S = 10.0, 120.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Describe an entry of the root.
+
+    Parameters
+    ----------
+    dtype : str
+        Its numbers, as NumPy writes them; "text", or "" of a group.
+    shape : tuple of int
+    """
+
+    dtype: str
+    shape: tuple[int, ...]
+
+    @property
+    def is_numbers(self) -> bool:
+        """Whether it holds numbers."""
+        return self.dtype[:1] in "<>|=" and self.dtype != ""
+
+
+class H5File:
+    """Open a .h5, as a context; a child process reads it and is ended with it.
+
+    Parameters
+    ----------
+    path : path
+
+    Attributes
+    ----------
+    attributes : dict from str to int or None
+        Those of the root; None of one that is no whole number.
+    entries : dict from str to Entry
+        Those of the root.
+
+    Raises
+    ------
+    FormatError : no whole HDF5 file, or one at which the library hangs or ends
+    OSError : the file is not there, or cannot be read
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        # Python's own errors for what cannot be opened.
+        with self.path.open("rb"):
+            pass
+        self._memory = os.memfd_create("h5") if hasattr(os, "memfd_create") else _unnamed()
+        try:
+            self._child = subprocess.Popen(
+                [sys.executable, "-P", str(_CHILD), str(self.path), str(self._memory)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                pass_fds=[self._memory],
+                # Ctrl-C is for this process, which ends the child.
+                start_new_session=True,
+            )
+        except BaseException:
+            os.close(self._memory)
+            raise
+        self._answers, self._rest = selectors.DefaultSelector(), b""
+        assert self._child.stdout is not None  # a pipe
+        self._answers.register(self._child.stdout, selectors.EVENT_READ)
+        try:
+            self._order(sys.path)
+            self._answer(BEGIN_S)
+            said = self._answer(PATIENCE_S)
+            self.attributes: dict[str, int | None] = said["attributes"]
+            self.entries = {name: Entry(dtype, tuple(shape)) for name, (dtype, shape) in said["entries"].items()}
+        except BaseException:
+            self.close()
+            raise
+
+    def text(self, name: str) -> str:
+        """Return a data set that is one text.
+
+        Raises
+        ------
+        FormatError : another one, or damage
+        """
+        if self.entries[name] != Entry("text", ()):
+            raise FormatError(f"{self._place(name)}: must be a text")
+        self._order({"name": name, "text": True})
+        text = str(self._done())
+        unpacked(self._place(name), len(text), DESCRIPTION)
+        return text
+
+    def numbers(self, name: str) -> NDArray[Any]:
+        """Return a data set of numbers.
+
+        Raises
+        ------
+        FormatError : no numbers, more bytes than a file may hold, or damage
+        MemoryError : within the limits, but not within the memory that there is
+        """
+        entry = self.entries[name]
+        if not entry.is_numbers:
+            what = f"holds {entry.dtype}; must hold numbers" if entry.dtype else "a group; must be a column"
+            raise FormatError(f"{self._place(name)}: {what}")
+        dtype = np.dtype(entry.dtype)
+        size = math.prod(entry.shape) * dtype.itemsize
+        unpacked(self._place(name), size)
+        try:
+            os.ftruncate(self._memory, max(1, size))
+            shared = mmap.mmap(self._memory, max(1, size))
+        except OSError as error:
+            raise MemoryError(str(error)) from None
+        self._order({"name": name, "text": False, "at": 0, "size": size})
+        self._done()
+        # The memory is used again for the next data set.
+        return np.frombuffer(shared, dtype, math.prod(entry.shape)).reshape(entry.shape).copy()
+
+    def _place(self, name: str) -> str:
+        return f"{self.path}, data set {name}"
+
+    def _order(self, what: Any) -> None:
+        assert self._child.stdin is not None  # a pipe
+        try:
+            self._child.stdin.write(json.dumps(what).encode() + b"\n")
+            self._child.stdin.flush()
+        except BrokenPipeError:
+            # Its last answer says why.
+            return
+
+    def _done(self) -> Any:
+        """Return the answer to an order, once it is done."""
+        while "done" not in (said := self._answer(PATIENCE_S)):
+            pass
+        return said["done"]
+
+    def _answer(self, patience_s: float) -> dict[str, Any]:
+        """Return the next line that the child says."""
+        assert self._child.stdout is not None  # a pipe
+        while b"\n" not in self._rest:
+            if not self._answers.select(patience_s):
+                raise FormatError(
+                    f"{self.path}: not a whole HDF5 file (the library has read nothing for {patience_s:g} s)"
+                )
+            more = os.read(self._child.stdout.fileno(), 1 << 16)
+            if not more:
+                raise FormatError(
+                    f"{self.path}: not a whole HDF5 file (reading it ended the library, status {self._child.wait()})"
+                )
+            self._rest += more
+        line, _, self._rest = self._rest.partition(b"\n")
+        said: dict[str, Any] = json.loads(line)
+        if said.get("kind") == "MemoryError":
+            raise MemoryError(said["error"])
+        if "error" in said:
+            raise FormatError(f"{self.path}: not a whole HDF5 file ({said['error']})")
+        return said
+
+    def close(self) -> None:
+        """End the child."""
+        self._child.kill()
+        for pipe in (self._child.stdin, self._child.stdout):
+            if pipe is not None:
+                try:
+                    pipe.close()
+                except BrokenPipeError:
+                    continue
+        self._child.wait()
+        self._answers.close()
+        os.close(self._memory)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _unnamed() -> int:
+    """Return a file without a name, where the system has no memory that is one."""
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())

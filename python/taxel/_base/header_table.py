@@ -1,0 +1,122 @@
+"""Tables of text: comma-separated cells below a line of column names, with the place of whatever is wrong."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from taxel._base.arguments import shown
+from taxel._core import FormatError
+
+__all__ = ["HeaderTable", "text_of"]
+
+#: What parts cells where it is not the comma, in words.
+_PARTED = {";": "semicolons", "\t": "tabs"}
+
+
+@dataclass(frozen=True)
+class HeaderTable:
+    """Hold a table of text.
+
+    Parameters
+    ----------
+    place : str
+        What errors call the file.
+    header : tuple of str
+        The names of its columns, without space around them; () of a table without a line.
+    rows : tuple of (int, tuple of str)
+        The line of each row, counted from 1, and its cells as they stand there; empty lines are no rows.
+    """
+
+    place: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[int, tuple[str, ...]], ...]
+
+    @classmethod
+    def read(cls, place: str | Path, lines: Iterable[str]) -> HeaderTable:
+        """Read a table.
+
+        Parameters
+        ----------
+        place : str or Path
+            What errors call the file.
+        lines : iterable of str
+
+        Raises
+        ------
+        FormatError : a column that stands there twice, a row of another length than the header, a quote that does not
+            close (names the line)
+
+        Examples
+        --------
+        >>> table = HeaderTable.read("a.csv", ["label, t_us", "", "heel,400"])
+        >>> table.header, list(table)
+        (('label', 't_us'), [(3, {'label': 'heel', 't_us': '400'})])
+        """
+        reader = csv.reader(lines, strict=True)
+        found: list[tuple[int, tuple[str, ...]]] = []
+        line = 1
+        try:
+            for cells in reader:
+                if any(cell.strip() for cell in cells):
+                    found.append((line, tuple(cells)))
+                line = reader.line_num + 1
+        except csv.Error as error:
+            said = "a quote opens and does not close" if "end of data" in str(error) else error
+            raise FormatError(f"{place}, line {line}: {said}") from None
+        header = tuple(name.strip() for name in found[0][1]) if found else ()
+        repeated = [name for name in header if name and header.count(name) > 1]
+        if repeated:
+            raise FormatError(f"{place}, line {found[0][0]}: column {shown(repeated[0])} stands there twice")
+        for line, row in found[1:]:
+            if len(row) != len(header):
+                raise FormatError(f"{place}, line {line}: {len(row)} cells, must have {len(header)}")
+        return cls(str(place), header, tuple(found[1:]))
+
+    def has(self, wanted: Sequence[str], others: Sequence[str] | None = None) -> None:
+        """Check the names of the columns.
+
+        Parameters
+        ----------
+        wanted : names that must be there
+        others : names that may be there; any other one where it is left out
+
+        Raises
+        ------
+        FormatError : one is missing, or stands there that may not (names it)
+        """
+        missing = [name for name in wanted if name not in self.header]
+        if missing:
+            first = self.header[0] if len(self.header) == 1 else ""
+            parted = next((said for mark, said in _PARTED.items() if mark in first), None)
+            if parted:
+                raise FormatError(f"{self.place}, line 1: its cells are parted by {parted}; must be commas")
+            there = f"there are {', '.join(map(shown, self.header))}" if self.header else "it is empty"
+            raise FormatError(
+                f"{self.place}, line 1: no column {missing[0]!r}; {there}; must be {','.join(wanted)} ..."
+            )
+        strange = [name for name in self.header if others is not None and name not in (*wanted, *others)]
+        if strange:
+            known = ",".join((*wanted, *(others or ())))
+            raise FormatError(f"{self.place}, line 1: column {shown(strange[0])}; must be {known} or some of them")
+
+    def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:
+        """Give the line of each row, and its cells by the names of their columns."""
+        for line, cells in self.rows:
+            yield line, dict(zip(self.header, cells, strict=True))
+
+
+def text_of(path: Path) -> list[str]:
+    """Read the lines of a text in UTF-8, with or without its mark.
+
+    Raises
+    ------
+    FormatError : no UTF-8 text
+    OSError : the file is not there, or cannot be read
+    """
+    try:
+        return path.read_bytes().decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{path}: not a table of text: {error}") from None

@@ -1,0 +1,97 @@
+"""Controls beside an answer: what else than the pattern of events may tell the labels."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.frames import Frames
+from taxel.information.answers import Control
+from taxel.information.estimate import Estimate, estimate
+from taxel.information.question import Question
+from taxel.information.rasters import features
+from taxel.information.sampling import (
+    spikes_of,
+)
+from taxel.spikes import to_ms
+
+__all__ = ["controls"]
+
+
+def controls(question: Question) -> tuple[Control, ...]:
+    """Return what the stretch before the contact, the length, the count of events and the first picture tell."""
+    question.tell("controls")
+    finest, window = question.periods[0], question.window_us
+    spikes = question.spikes(finest, 0)
+    count = spikes.counts(window).astype(np.float64)
+    found = [_before(question)]
+    last = np.zeros(len(question.trials))
+    np.maximum.at(last, spikes.trial, to_ms(spikes.first_us[spikes.trial] + spikes.bin * float(finest)))
+    if question.ended:
+        length = to_ms(spikes.length_us)
+        found.append(Control("length", _scalar(question, length), "from contact to the trial's end"))
+    else:
+        found.append(Control("length", _scalar(question, last), "from contact to the last event in the window"))
+    found.append(Control("event count", _scalar(question, count), "events to the whole window"))
+    if all(isinstance(one.source, Frames) for one in question.trials):
+        start = [
+            held.at(np.array([t.start_us - finest]))[0] for held, t in zip(question.held, question.trials, strict=True)
+        ]
+        first = np.array(start, np.float64)
+        if np.ptp(first, axis=0).any():
+            gram = [first @ first.T]
+            bits = question.estimate(question.nested(gram, [first.shape[1]]).responses)
+            found.append(Control("first picture", bits, "the pressure itself before the start, no change since"))
+    return tuple(found)
+
+
+def _scalar(question: Question, value: NDArray[np.float64]) -> Estimate | None:
+    value = np.nan_to_num(value)
+    if np.ptp(value) == 0:
+        return estimate(
+            question.labels, np.full(len(value), question.labels[0]), groups=question.groups, seed=question.seed
+        )
+    unit = ((value - value.mean()) / value.std())[:, None]
+    return question.estimate(question.nested([unit @ unit.T], [1]).responses)
+
+
+def _before(question: Question) -> Control:
+    """Ask the stretch before the contact: what it tells was there before the touch."""
+    assert question.encoder is not None  # set where it was left out
+    begin = np.array([float(one.source.t.min()) for one in question.trials])
+    for source in {id(one.source) for one in question.trials}:
+        mine = [k for k, one in enumerate(question.trials) if id(one.source) == source]
+        mine.sort(key=lambda k: question.trials[k].start_us)
+        for before, k in pairwise(mine):
+            one = question.trials[before]
+            end = question.contact[before] + question.window_us if one.stop_us is None else one.stop_us
+            begin[k] = max(begin[k], np.nan_to_num(end, nan=one.start_us))
+    room = np.nan_to_num(question.contact - begin, nan=0.0)
+    length = min(question.window_us, float(np.quantile(room, 0.1)))
+    if length < 5 * question.finest or (question.contact - begin >= length).sum() < len(question.trials) * 0.5:
+        question.notes.append(
+            "nothing is recorded before the contacts: what was there before the touch cannot be told apart"
+        )
+        return Control("before contact", None, "none recorded")
+    moved = [
+        replace(one, start_us=int(c - length) if r >= length else one.start_us, stop_us=int(c) if r >= length else None)
+        if not np.isnan(c)
+        else one
+        for one, c, r in zip(question.trials, question.contact, room, strict=True)
+    ]
+    at = np.where(room >= length, question.contact - length, np.nan)
+    period = max(question.periods[0], question.finest)
+    random = np.random.default_rng([question.seed, 0, period, 2])
+    spikes = spikes_of(
+        moved, question.held, question.encoder, period_us=period, contact_us=at, window_us=length, random=random
+    )
+    grams = question.grams(spikes, [length])[0]
+    found = question.estimate(question.nested(grams, [features(spikes, length)] * len(grams)).responses)
+    without = int((room < length).sum())
+    about = f"{to_ms(length):g} ms before it" + (
+        f", {without} of {len(room)} have less and count as silent" if without else ""
+    )
+    return Control("before contact", found, about)

@@ -1,0 +1,240 @@
+"""What is asked of labelled trials: their labels, contacts and windows, and the settings that are compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import number, several, shown, whole
+from taxel._core import ProblemError
+from taxel.encode import FA1, ChangeEvents, Encoder
+from taxel.frames import Frames
+from taxel.information.estimate import Estimate, estimate
+from taxel.information.nested import Nested, nested_predictions
+from taxel.information.rasters import event_grams
+from taxel.information.sampling import (
+    STEP_US,
+    HeldValues,
+    Spikes,
+    checked_periods,
+    contacts,
+    finest_us,
+    spikes_of,
+)
+from taxel.information.trials import LabelledTrial
+from taxel.spikes import to_ms, to_us
+
+__all__ = ["Question"]
+
+#: Smoothings that are tried, in windows; the longest first.
+SMOOTHINGS = (1.0, 0.3, 0.1, 0.03, 0.0)
+#: The steps of a default series of periods or windows.
+_STEPS = (1, 2, 5)
+
+
+@dataclass(eq=False)
+class Question:
+    """Labelled trials, and the settings at which they are asked for their information."""
+
+    trials: list[LabelledTrial]
+    encoder: Encoder | None
+    window_ms: float | None
+    draws: int
+    folds: int
+    seed: int
+    progress: Callable[[str, int, int], object] | None
+    notes: list[str] = field(default_factory=list)
+    done: int = 0
+    steps: int = 1
+
+    def __post_init__(self) -> None:
+        from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
+
+        if not self.trials:
+            raise ProblemError("trials is []: must hold one at least")
+        shape = self.trials[0].array.shape
+        other = next((one for one in self.trials if one.array.shape != shape), None)
+        if other is not None:
+            sizes = " x ".join(map(str, other.array.shape)), " x ".join(map(str, shape))
+            raise ProblemError(
+                f"{other.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be of one"
+            )
+        self.labels = np.array([one.label for one in self.trials])
+        groups = [one.group for one in self.trials]
+        self.groups = np.array(groups) if any(groups) else None
+        folds(self.labels, count=self.folds, groups=self.groups, seed=self.seed)
+        if self.encoder is None:
+            self.encoder = ChangeEvents(noise_floor=floor_of(self.trials))
+        if not isinstance(self.encoder, ChangeEvents | FA1):
+            raise ProblemError(f"encoder is {shown(self.encoder)}: must be ChangeEvents or FA1, one train a taxel")
+        sources = {id(one.source): one.source for one in self.trials}
+        held = {key: HeldValues(source) for key, source in sources.items()}
+        self.held = [held[id(one.source)] for one in self.trials]
+        self.finest = finest_us(list(sources.values()))
+        if self.window_ms is None:
+            endless = next((one for one in self.trials if one.stop_us is None), None)
+            if endless is not None:
+                raise ProblemError(f"{endless.name}: has no end; give window_ms, or every trial its stop_us")
+            reach = np.inf
+        else:
+            reach = to_us(number("window_ms", self.window_ms))
+            if not self.finest <= reach < 1e12:
+                raise ProblemError(
+                    f"window_ms is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least, and below 1e9"
+                )
+        self.contact = contacts(self.trials, self.held, self.encoder, self.finest, reach)
+        if np.isnan(self.contact).all():
+            lasts = max(int(np.ptp(one.source.t)) for one in self.trials if len(one.source))
+            if lasts < STEP_US:
+                raise ProblemError(
+                    f"{self.trials[0].name}: its pictures all lie within {lasts} us, so they have no times; "
+                    "give them some (taxel.Frames)"
+                )
+            raise ProblemError(f"trials: no event in any of them by {self.encoder!r}; a lower noise_floor may help")
+        ends = np.array([np.inf if one.stop_us is None else one.stop_us for one in self.trials])
+        self.ended = bool(np.isfinite(ends).all())
+        lengths = (ends - self.contact)[~np.isnan(self.contact)]
+        self.window_us = float(reach if np.isfinite(reach) else max(lengths.min(), self.finest))
+        if np.isfinite(reach) and (lengths < self.window_us).any():
+            short = int((lengths < self.window_us).sum())
+            self.notes.append(
+                f"{short} trials end before {to_ms(self.window_us):g} ms: what comes late may tell their length"
+            )
+
+    def set_out(
+        self,
+        periods_ms: Sequence[float] | None,
+        windows_ms: Sequence[float] | None,
+        taxels: Sequence[int] | None,
+        pools: Sequence[int] | None,
+        taxels_at_ms: float | None,
+        classifiers: int,
+        shuffles: int,
+    ) -> None:
+        """Choose the settings."""
+        window = self.window_us
+        if periods_ms is None:
+            least = max(self.finest, window / 500)
+            found = [p for p in _series(least, window / 5) if p >= least]
+            self.periods = checked_periods([*([self.finest] if self.finest >= least else []), *found], self.finest)
+            self.periods = self.periods[:7]
+        else:
+            given = [to_us(number("periods_ms", p)) for p in several("periods_ms", periods_ms)]
+            if any(not 0 < p <= window or abs(p - round(p)) > 1e-6 for p in given):
+                raise ProblemError(f"periods_ms is {shown(periods_ms)}: must be whole us, up to {to_ms(window):g} ms")
+            self.periods = checked_periods([round(p) for p in given], self.finest)
+        if windows_ms is None:
+            self.windows = [*[float(w) for w in _series(max(window / 40, self.finest), window * 0.99)], window]
+        else:
+            wanted = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
+            if any(not self.finest <= w <= window for w in wanted):
+                raise ProblemError(
+                    f"windows_ms is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
+                )
+            self.windows = sorted({*wanted, window})
+        self.taxels_at = self.periods[0]
+        if taxels_at_ms is not None:
+            at = to_us(number("taxels_at_ms", taxels_at_ms))
+            self.taxels_at = next((p for p in self.periods if p == at), 0)
+            if not self.taxels_at:
+                listed = ", ".join(f"{to_ms(p):g}" for p in self.periods)
+                raise ProblemError(f"taxels_at_ms is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
+        self.active = np.unique(self.spikes(self.taxels_at, 0).taxel)
+        there = len(self.active)
+        numbers = [whole("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
+        if taxels is not None and any(n > there for n in numbers):
+            raise ProblemError(f"taxels is {shown(taxels)}: {there} of the array's ever send an event")
+        self.random_taxels = [n for n in numbers if n < there]
+        sides = [whole("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
+        rows, columns = self.trials[0].array.shape
+        if pools is not None and any(n > max(rows, columns) for n in sides):
+            raise ProblemError(f"pools is {shown(pools)}: the array is {rows} x {columns}")
+        self.pools = [n for n in sides if n <= max(rows, columns)]
+        self.columns = self._asked_like_labels()
+        settings = len(self.random_taxels) + len(self.pools)
+        self.steps = self.draws * (len(self.periods) * (2 + len(self.columns)) + settings) + shuffles + classifiers + 8
+
+    def tell(self, what: str, steps: int = 1) -> None:
+        """Report what is done next, so many steps on."""
+        self.done += steps
+        if self.progress is not None:
+            self.progress(what, min(self.done, self.steps), self.steps)
+
+    def spikes(self, period: int, draw: int, pool: int = 1) -> Spikes:
+        """Return the spikes of all trials at a period (us), in one draw of the sampling phases."""
+        assert self.encoder is not None  # set where it was left out
+        return spikes_of(
+            self.trials,
+            self.held,
+            self.encoder,
+            period_us=period,
+            contact_us=self.contact,
+            window_us=self.window_us,
+            random=np.random.default_rng([self.seed, draw, period]),
+            pool=pool,
+        )
+
+    def nested(
+        self, grams: list[NDArray[np.float64]], sizes: list[int], y: Any = None, draw: int = 0, **ways: Any
+    ) -> Nested:
+        """Return what the trials are named in nested folds; `y` are other labels than the question's."""
+        labels = self.labels if y is None else y
+        return nested_predictions(
+            grams, sizes, labels, groups=self.groups, count=self.folds, seed=self.seed + draw, **ways
+        )
+
+    def estimate(self, responses: Any, labels: Any = None) -> Estimate:
+        """Return the information of responses (or draws of them) about the labels."""
+        truth = self.labels if labels is None else labels
+        return estimate(truth, responses, groups=self.groups, seed=self.seed)
+
+    def grams(self, spikes: Spikes, windows: Sequence[float]) -> list[list[NDArray[np.float64]]]:
+        """Return by window the matrices of all smoothings that a period can tell apart."""
+        taus = [to_ms(share * self.window_us) for share in SMOOTHINGS]
+        taus = [tau for tau in taus if tau == 0 or to_us(tau) > spikes.period_us / 2]
+        return [list(one) for one in zip(*(event_grams(spikes, windows, tau) for tau in taus), strict=True)]
+
+    def _asked_like_labels(self) -> dict[str, NDArray[np.generic]]:
+        """Return the columns that can be asked for like labels; the others are named in the notes."""
+        from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
+
+        found = {}
+        for name in self.trials[0].parameters:
+            column = np.array([one.parameters.get(name, "") for one in self.trials])
+            if (column == self.labels).all():
+                self.notes.append(f"parameter {name} is left out: it says what the label says")
+                continue
+            if (column == "").any():
+                self.notes.append(f"parameter {name} is left out: some trials have none")
+                continue
+            try:
+                folds(column, count=self.folds, groups=self.groups, seed=self.seed)
+            except ProblemError as error:
+                self.notes.append(f"parameter {name} is left out: {error}")
+                continue
+            found[name] = column
+        return found
+
+
+def floor_of(trials: Sequence[LabelledTrial]) -> float:
+    """Return the change that counts where nobody says: 3 ticks, a step, else a 40th of the largest value."""
+    first = trials[0].source
+    if not isinstance(first, Frames):
+        return 3.0 if first.intensity is not None else 0.5
+    if first.unit == "ticks":
+        return 3.0
+    sources = {id(one.source): one.source for one in trials}.values()
+    largest = max(float(np.abs(one.values).max(initial=0.0)) for one in sources if isinstance(one, Frames))
+    if largest == 0:
+        raise ProblemError("trials: every picture is 0")
+    return float(f"{largest / 40:.2g}")
+
+
+def _series(least: float, most: float) -> list[int]:
+    """Return whole us in steps of 1, 2, 5 within limits."""
+    found = [step * 10**power for power in range(10) for step in _STEPS]
+    return [one for one in found if least <= one <= most]

@@ -1,0 +1,209 @@
+"""The requests of the panel's server to this program: the board's serial line, health, cutting, labels, presets."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import socket
+import struct
+import threading
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.files import whole_file
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.device import Cable
+from taxel.labels import Labels, write_labels
+from taxel.recording import open_recording
+from taxel.recording.convert import convert
+from taxel.recording.cut import cut
+from taxel.recording.health import Told, judged
+from taxel.wire import Command
+
+__all__ = ["RequestHandler", "own_addresses", "presets_path"]
+
+#: SIOCGIFADDR of Linux (netdevice(7)).
+_ADDRESS_OF = 0x8915
+
+#: Taxels as (column, row).
+_Taxels = list[tuple[int, int]]
+
+
+def presets_path() -> Path:
+    """Return the file of the user's own presets: taxel/presets.toml in the folder of user settings."""
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "taxel" / "presets.toml"
+
+
+def own_addresses() -> list[tuple[str, str]]:
+    """Return the IPv4 addresses of this machine: name of the network interface and address."""
+    found = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
+        for _, name in socket.if_nameindex():
+            # An interface that is down has none. struct ifreq: the name, then the address from byte 20 on.
+            with contextlib.suppress(OSError):
+                answer = fcntl.ioctl(any_socket, _ADDRESS_OF, struct.pack("256s", name.encode()[:15]))
+                found.append((name, socket.inet_ntoa(answer[20:24])))
+    return found
+
+
+class Receiver(Protocol):
+    """What receives a board's datagrams, and can begin anew."""
+
+    def listen(self, host: str, port: int) -> None:
+        """Receive on another address."""
+
+    def delta_intensity(self, on: bool) -> None:
+        """Interpret intensities as differences, or as values."""
+
+
+@contextlib.contextmanager
+def _reasons() -> Iterator[None]:
+    """Turn errors of the operating system into reasons that a person can read."""
+    try:
+        yield
+    except (FileExistsError, FileNotFoundError, PermissionError) as error:
+        reasons = {FileExistsError: "exists already", FileNotFoundError: "no such file or device"}
+        raise ProblemError(f"{error.filename}: {reasons.get(type(error), 'permission denied')}") from None
+    except OSError as error:
+        where = "" if error.filename is None else f"{error.filename}: "
+        raise ProblemError(f"{where}{error.strerror or error}") from None
+
+
+class RequestHandler:
+    """Handle the requests of a panel's server, which calls from several threads at a time.
+
+    What a method raises is the reason that the client is told.
+
+    Parameters
+    ----------
+    receiver : Receiver
+        What receives the board's datagrams.
+    cable : Cable or None
+        The board's serial line. The handler closes it.
+    """
+
+    def __init__(self, receiver: Receiver, cable: Cable | None) -> None:
+        self._receiver, self._cable = receiver, cable
+        self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
+
+    def close(self) -> None:
+        """Close the serial line."""
+        with self._cable_lock:
+            if self._cable is not None:
+                self._cable.close()
+                self._cable = None
+
+    def _connected(self) -> Cable:
+        if self._cable is None:
+            raise ProblemError("the board's serial line is not connected")
+        return self._cable
+
+    def command(self, register: int, value: int) -> int:
+        """Write a register; return the value that the board reports."""
+        with _reasons(), self._cable_lock:
+            return self._connected().command(Command(register, value))
+
+    def channels(self) -> int:
+        """Return the number of converter channels in the board's greeting."""
+        with _reasons(), self._cable_lock:
+            return self._connected().greeting().channels
+
+    def board_lines(self) -> tuple[list[str], int]:
+        """Return the board's lines since the last call, and how often it was reset."""
+        with _reasons(), self._cable_lock:
+            return ([], 0) if self._cable is None else (self._cable.said(), self._cable.resets)
+
+    def connect(self, place: str | None) -> None:
+        """Connect the serial line to another place, or disconnect it."""
+        self.close()
+        if place is not None:
+            with _reasons():
+                cable = Cable(place)
+            with self._cable_lock:
+                self._cable = cable
+
+    def listen(self, host: str, port: int) -> None:
+        """Receive the board's datagrams on another address."""
+        with _reasons():
+            self._receiver.listen(host, port)
+
+    def set_differences(self, on: bool) -> None:
+        """Interpret intensities as differences, or as values."""
+        with _reasons():
+            self._receiver.delta_intensity(on)
+
+    def addresses(self) -> list[tuple[str, str]]:
+        """Return the IPv4 addresses of this machine, each with the name of its network interface."""
+        with _reasons():
+            return [(host, name) for name, host in own_addresses()]
+
+    def health(
+        self,
+        array: tuple[int, int, float, str, list[bool] | None],
+        events: NDArray[np.uint32],
+        moved: NDArray[np.uint32],
+        values: tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]] | None,
+    ) -> tuple[_Taxels, _Taxels, _Taxels]:
+        """Return the taxels that are dead, stuck and noisy.
+
+        Parameters
+        ----------
+        array : the sensor
+        events, moved : shape (taxels,)
+            Events of each taxel, and those in the direction of the one before.
+        values : three arrays of shape (taxels,), or None without intensities
+            Number of different values; least and greatest held value, -1 where unknown.
+        """
+        sensor = Array._from_parts(array)
+        counts = [np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))]
+        named = judged(sensor, Told(*counts)).named()
+        return named["dead"], named["stuck"], named["noisy"]
+
+    def cut(self, path: Path, out: Path, start_us: int, stop_us: int) -> list[str]:
+        """Write a stretch of a recording to a new file; return what that file cannot hold."""
+        with _reasons():
+            (part,) = cut(open_recording(path), start_us=start_us, stop_us=stop_us)
+            return list(convert(part, out))
+
+    def read_labels(self, table: Path, recording: str) -> list[tuple[str, int]]:
+        """Return the labels of a recording, each with its time (us), from a table."""
+        with _reasons():
+            labels = Labels(table)
+        name = labels.named(recording)
+        return [(row.label, row.t_us) for row in labels.rows if row.recording == name]
+
+    def write_labels(self, table: Path, rows: Sequence[tuple[str, int]]) -> None:
+        """Write a table of labels."""
+        with _reasons(), self._file_lock:
+            write_labels(table, rows)
+
+    def read_presets(self) -> tuple[Path, dict[str, dict[str, object]]]:
+        """Return the file of the user's presets, and the presets: value by register name."""
+        place = presets_path()
+        try:
+            with _reasons():
+                own = tomllib.loads(place.read_text("utf-8")) if place.exists() else {}
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ProblemError(f"{place}: no table of presets: {error}") from None
+        return place, {name: values for name, values in own.items() if isinstance(values, dict)}
+
+    def write_presets(self, presets: Mapping[str, Mapping[str, object]]) -> None:
+        """Write the user's presets."""
+        place = presets_path()
+        lines = ["# Presets of the panel: a table each, every register in its own unit (taxel's docs, registers)."]
+        for name, values in sorted(presets.items()):
+            # A basic string of TOML has the escapes of JSON.
+            lines += ["", f"[{json.dumps(name)}]"]
+            lines += [f"{register} = {json.dumps(value)}" for register, value in values.items()]
+        with _reasons(), self._file_lock:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            with whole_file(place, overwrite=True) as part:
+                part.write_text("\n".join(lines) + "\n", "utf-8")

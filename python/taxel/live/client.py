@@ -1,0 +1,487 @@
+"""A client of the panel: what the panel's server sends, as Python objects (protocol: docs/panel-protocol.md)."""
+
+from __future__ import annotations
+
+import json
+import struct
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, ClassVar
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import instance, number, shown, text
+from taxel._core import ProblemError
+from taxel.encode import Encoder
+from taxel.spikes import to_us
+
+if TYPE_CHECKING:
+    from websockets.sync.client import ClientConnection
+
+__all__ = ["Curves", "Detection", "Item", "Note", "PanelClient", "Picture", "Spikes", "Subject"]
+
+#: Pressure of a taxel without any event so far, and time of a picture before the first event.
+_UNKNOWN, _NO_TIME = 65_535, -(2**63)
+
+#: A flag of a picture: forget all columns that came before.
+_RESTART = 4
+
+#: Late events change a column of time for so long, us; after that it is final.
+_LATE_US = 120_000
+
+#: The scale of pictures is the largest value of so long, us.
+_SCALE_US = 10_000_000
+
+#: Longer than the server waits between two messages of spikes, s.
+_SPIKES_WITHIN_S = 0.05
+
+#: The server sends at most 60 pictures a second.
+_MOST_HZ = 60.0
+
+_CURVES = np.dtype([("force", "<u4"), ("area", "<u4"), ("x", "<f4"), ("y", "<f4")])
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """Name the sensor or recording that is shown.
+
+    A new object of the same name means that time begins anew, as after a reset of the board.
+
+    Attributes
+    ----------
+    name : str
+    rows, columns : int
+    """
+
+    name: str
+    rows: int
+    columns: int
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Hold the state of the array at a time.
+
+    Attributes
+    ----------
+    t : int, us
+    above : uint16, shape (rows, columns), ticks above rest
+    known : bool, shape (rows, columns)
+        False for a taxel without any event so far.
+    change : int8, shape (rows, columns), ticks
+        The largest recent change, decaying.
+    full, full_change : int, ticks
+        The largest value above rest, and the largest change either way, of the last 10 s; 1 at least.
+    """
+
+    kind: ClassVar[str] = "pictures"
+    count: ClassVar[int] = 1
+    t: int
+    above: NDArray[np.uint16]
+    known: NDArray[np.bool_]
+    change: NDArray[np.int8]
+    full: int
+    full_change: int
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """Hold the contact as a whole over time.
+
+    Attributes
+    ----------
+    t : int64, shape (n,), us
+    force : uint32, shape (n,), ticks above rest, summed over the array
+    area : uint32, shape (n,), taxels above rest
+    x, y : float32, shape (n,), taxels
+        Column and row of the centre; NaN where nothing is pressed.
+    """
+
+    kind: ClassVar[str] = "curves"
+    t: NDArray[np.int64]
+    force: NDArray[np.uint32]
+    area: NDArray[np.uint32]
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+
+    @property
+    def count(self) -> int:
+        """How many times."""
+        return len(self.t)
+
+
+@dataclass(frozen=True, eq=False)
+class Spikes:
+    """Hold spikes of the encoder.
+
+    Attributes
+    ----------
+    encoder : str
+    t : int64, shape (n,), us
+    train : int64, shape (n,)
+    value : float64, shape (n,)
+    left_out : int
+        How many more there were than the server sends at once.
+    """
+
+    kind: ClassVar[str] = "spikes"
+    encoder: str
+    t: NDArray[np.int64]
+    train: NDArray[np.int64]
+    value: NDArray[np.float64]
+    left_out: int
+
+    @property
+    def count(self) -> int:
+        """How many spikes."""
+        return len(self.t)
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Hold a detection of a readout.
+
+    Attributes
+    ----------
+    label : str
+    t, known : int, us
+        When the event was, and when it could first be detected.
+    said, latency : int or None, us
+        When the detection was reported, and how long after `known`; None in a recording.
+    slope : float or None, mV/ms
+    """
+
+    kind: ClassVar[str] = "detections"
+    count: ClassVar[int] = 1
+    label: str
+    t: int
+    known: int
+    said: int | None = None
+    latency: int | None = None
+    slope: float | None = None
+
+
+@dataclass(frozen=True)
+class Note:
+    """Hold a note or a label of a recording.
+
+    Attributes
+    ----------
+    text : str
+    t : int, us
+    """
+
+    kind: ClassVar[str] = "notes"
+    count: ClassVar[int] = 1
+    text: str
+    t: int
+
+
+Item = Picture | Curves | Spikes | Detection | Note
+
+
+class PanelClient:
+    """Receive what a panel shows: a context manager, and an iterator over pairs of `Subject` and `Item`.
+
+    The client is one more viewer of the panel. It receives a picture only when it has asked for one, so that it may be
+    as slow as it likes without delaying what is received and recorded. The iteration ends with the recording or with
+    the panel's server.
+
+    Parameters
+    ----------
+    url : str
+        The panel's address with its token, as `Panel.url` gives it and ``taxel live --panel`` prints it. The recording
+        that it names, if any, is opened at its beginning, paused: see `play`.
+    rate_hz : float, 1 to 60
+        Maximum number of pictures a second.
+    encoder : Encoder, optional
+        The encoder whose spikes are wanted.
+    recording : str, optional
+        Name of another recording in the panel's folder.
+
+    Raises
+    ------
+    ImportError : the package `websockets` is not installed
+    OSError : no server listens there
+    ProblemError : arguments that make no sense; an address whose token the server refuses
+
+    See Also
+    --------
+    Viewer : shows the same in Rerun or Foxglove.
+
+    Examples
+    --------
+    >>> from taxel.live import Live, Panel, PanelClient, send
+    >>> with Live(0, host="127.0.0.1") as live, Panel(live) as panel, PanelClient(panel.url) as client:
+    ...     _ = send([bytes.fromhex("c000050304")], *live.address, seconds=0.2)
+    ...     subject, picture = next(iter(client))
+    >>> picture.above.shape
+    (64, 64)
+    """
+
+    def __init__(
+        self, url: str, *, rate_hz: float = 30.0, encoder: Encoder | None = None, recording: str | None = None
+    ) -> None:
+        address, token, opens = _parts(url)
+        rate = number("rate_hz", rate_hz)
+        if not 1.0 <= rate <= _MOST_HZ:
+            raise ProblemError(f"rate_hz is {rate:g}: must lie in 1 to {_MOST_HZ:g}")
+        wanted = None if encoder is None else instance("encoder", encoder, Encoder).to_json()
+        opens = opens if recording is None else text("recording", recording)
+        self._socket = _connected(address, token)
+        self._period_s, self._live = 1.0 / rate, opens is None
+        self._subject: Subject | None = None
+        self._noise_floor = 0
+        self._rest: NDArray[np.uint16] | None = None
+        self._time = self._curves_until = _NO_TIME
+        self._columns: tuple[NDArray[np.int64], NDArray[Any]] | None = None
+        self._full, self._full_change = _Scale(), _Scale()
+        #: Of a recording, what is yielded when playback has come to its time.
+        self._later: deque[Detection | Note] = deque()
+        self._plays = self._ends = False
+        self._warning: str | None = None
+        if opens is not None:
+            self._send(type="open", name=opens)
+        if wanted is not None:
+            self._send(type="encode", encoder=json.loads(wanted))
+
+    @property
+    def warning(self) -> str | None:
+        """The last warning or refusal of the server, in words for a person."""
+        return self._warning
+
+    def play(self, speed: float = 1.0) -> None:
+        """Play the recording from where it is.
+
+        Parameters
+        ----------
+        speed : float, 0.001 to 100
+            Board time over real time.
+        """
+        self._send(type="play", speed=number("speed", speed))
+
+    def close(self) -> None:
+        """Disconnect; an iteration that runs ends."""
+        self._socket.close()
+
+    def __enter__(self) -> PanelClient:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[tuple[Subject, Item]]:
+        """Yield what is shown as it arrives, until the recording or the server ends."""
+        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415  an extra
+
+        self._send(type="credit", n=1)
+        due: float | None = None
+        while True:
+            try:
+                message = self._socket.recv(None if due is None else max(0.0, due - time.monotonic()))
+            except TimeoutError:
+                self._send(type="credit", n=1)
+                due = None
+                continue
+            except ConnectionClosed:
+                break
+            if isinstance(message, bytes):
+                due = time.monotonic() + self._period_s
+                yield from self._picture(message)
+                if self._ends:
+                    yield from self._last_spikes()
+                    break
+            else:
+                yield from self._message(json.loads(message))
+        yield from self._final_curves(over=True)
+        # Detections that a readout made after a recording's last event.
+        while self._ends and self._later and self._subject is not None:
+            yield self._subject, self._later.popleft()
+
+    def _send(self, **message: Any) -> None:
+        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415  an extra
+
+        try:
+            self._socket.send(json.dumps(message))
+        except ConnectionClosed:
+            # The next `recv` reports it too.
+            return
+
+    def _message(self, message: dict[str, Any]) -> Iterator[tuple[Subject, Item]]:
+        kind = message["type"]
+        if kind == "hello" and self._live and message["array"] is not None:
+            self._begin(message["array"], message["array"]["name"] or "board")
+        elif kind == "opened":
+            self._begin(message["array"], message["name"])
+            self._noise_floor = (message["registers"] or {}).get("noise_floor", self._noise_floor)
+            found: list[Detection | Note] = [
+                Detection(one["label"], one["t_us"], one["known_us"]) for one in message["detections"]
+            ]
+            found += [Note(one["text"], one["t_us"]) for one in message["notes"] if one["t_us"] is not None]
+            self._yield_later(found)
+        elif kind == "labels":
+            self._yield_later([Note(one["label"], one["t_us"]) for one in message["labels"]])
+        elif kind == "registers":
+            self._noise_floor = message["values"]["noise_floor"]
+        elif kind == "detection" and self._subject is not None:
+            times = message["t_us"], message["known_us"], message["said_us"], message["latency_us"]
+            yield self._subject, Detection(message["label"], *times, message["slope_mv_per_ms"])
+        elif kind == "spikes" and self._subject is not None:
+            yield self._subject, _spikes(message)
+        elif kind == "transport":
+            # A recording is paused before it is played as well.
+            self._ends = self._plays and message["state"] == "paused"
+            self._plays = message["state"] == "playing"
+        elif kind == "warning":
+            self._warning = message["text"]
+        elif kind == "refused":
+            self._warning = message["reason"]
+
+    def _begin(self, array: dict[str, Any], name: str) -> None:
+        shape = array["rows"], array["columns"]
+        if self._subject is None or (name, *shape) != (self._subject.name, self._subject.rows, self._subject.columns):
+            self._subject = Subject(name, *shape)
+            self._rest, self._columns = None, None
+            self._restart()
+
+    def _restart(self) -> None:
+        """Begin time anew."""
+        self._time = self._curves_until = _NO_TIME
+        self._full, self._full_change = _Scale(), _Scale()
+
+    def _yield_later(self, items: Sequence[Detection | Note]) -> None:
+        self._later = deque(sorted([*self._later, *items], key=_time_of))
+
+    def _picture(self, message: bytes) -> Iterator[tuple[Subject, Item]]:
+        flags, _, rows, columns, t = struct.unpack_from("<HIHHq", message, 6)
+        column_us, first, count = struct.unpack_from("<IqI", message, 44)
+        pressure, change, curves, rest = (_section(message, *which) for which in _SECTIONS)
+        if len(rest):
+            self._rest = rest
+        subject = self._subject
+        if subject is None or t == _NO_TIME or (rows, columns) != (subject.rows, subject.columns):
+            return
+        if flags & _RESTART and t < self._time:
+            # The board was reset, or its source had stalled.
+            subject = self._subject = Subject(subject.name, rows, columns)
+            self._restart()
+        self._time = t
+        known = pressure != _UNKNOWN
+        if self._rest is not None and len(self._rest) == len(pressure):
+            above = np.where(known & (self._rest != _UNKNOWN), pressure.astype(np.int32) - self._rest, 0)
+        else:
+            above = np.zeros(len(pressure), np.int32)
+        above[above <= self._noise_floor] = 0
+        shape = rows, columns
+        full = self._full.of(t, int(above.max(initial=0)))
+        full_change = self._full_change.of(t, int(np.abs(change.astype(np.int16)).max(initial=0)))
+        drawn = above.astype(np.uint16).reshape(shape)
+        yield subject, Picture(t, drawn, known.reshape(shape), change.reshape(shape), full, full_change)
+        self._columns = (np.arange(first + 1, first + count + 1, dtype=np.int64) * column_us, curves)
+        yield from self._final_curves(over=False)
+        while self._later and _time_of(self._later[0]) <= t:
+            yield subject, self._later.popleft()
+
+    def _final_curves(self, *, over: bool) -> Iterator[tuple[Subject, Item]]:
+        """Yield the new curves that no late event can change any more; all of them where the source is over."""
+        if self._columns is None or self._subject is None:
+            return
+        ends, curves = self._columns
+        until = self._time if over else self._time - _LATE_US
+        new = (ends > self._curves_until) & (ends <= until)
+        if new.any():
+            self._curves_until = int(ends[new][-1])
+            chosen = curves[new]
+            yield self._subject, Curves(ends[new], chosen["force"], chosen["area"], chosen["x"], chosen["y"])
+
+    def _last_spikes(self) -> Iterator[tuple[Subject, Item]]:
+        """Yield the spikes that the server sends after a recording's last picture."""
+        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415  an extra
+
+        for n in range(2):
+            time.sleep(_SPIKES_WITHIN_S)
+            self._send(type="overview", id=n)
+            try:
+                for message in self._socket:
+                    if isinstance(message, bytes):
+                        continue
+                    received = json.loads(message)
+                    yield from self._message(received)
+                    if received["type"] in ("done", "refused") and received.get("id") == n:
+                        break
+            except ConnectionClosed:
+                return
+
+
+class _Scale:
+    """The largest recent value, 1 at least."""
+
+    def __init__(self) -> None:
+        # Falling values, so that the first is the largest of all.
+        self._peaks: deque[tuple[int, int]] = deque()
+
+    def of(self, t: int, value: int) -> int:
+        """Return it, with the value of this time."""
+        while self._peaks and self._peaks[0][0] < t - _SCALE_US:
+            self._peaks.popleft()
+        while self._peaks and self._peaks[-1][1] <= value:
+            self._peaks.pop()
+        self._peaks.append((t, value))
+        return max(1, self._peaks[0][1])
+
+
+def _parts(url: object) -> tuple[str, str, str | None]:
+    """Return host and port, token, and the recording that a panel's address names."""
+    parts = urlsplit(text("url", url))
+    keys = parse_qs(parts.fragment)
+    if parts.scheme != "http" or not parts.netloc or "token" not in keys:
+        raise ProblemError(f"url is {shown(url)}: must be a panel's address, http://HOST:PORT/#token=...")
+    return parts.netloc, keys["token"][0], keys.get("open", [None])[0]
+
+
+def _connected(address: str, token: str) -> ClientConnection:
+    try:
+        from websockets.exceptions import InvalidHandshake  # noqa: PLC0415  an extra
+        from websockets.sync.client import connect  # noqa: PLC0415  an extra
+        from websockets.typing import Origin, Subprotocol  # noqa: PLC0415  an extra
+    except ImportError:
+        raise ImportError("websockets is not installed: pip install websockets") from None
+    try:
+        # Newer versions connect when the context is entered; `PanelClient.close` closes the connection.
+        return connect(
+            f"ws://{address}/socket",
+            origin=Origin(f"http://{address}"),
+            subprotocols=[Subprotocol("taxel.panel.1"), Subprotocol(f"token.{token}")],
+            compression=None,
+            max_size=None,
+            proxy=None,
+        ).__enter__()
+    except InvalidHandshake as error:
+        raise ProblemError(f"panel at {address}: refuses the connection, perhaps for its token: {error}") from None
+
+
+#: Number and type of the sections of a picture that are read.
+_SECTIONS = ((0, np.dtype("<u2")), (1, np.dtype("i1")), (3, _CURVES), (5, np.dtype("<u2")))
+
+
+def _section(message: bytes, number: int, dtype: np.dtype[Any]) -> NDArray[Any]:
+    start, size = struct.unpack_from("<II", message, 64 + 8 * number)
+    return np.frombuffer(message, dtype, size // dtype.itemsize, start)
+
+
+def _spikes(message: dict[str, Any]) -> Spikes:
+    times = np.round(to_us(np.array(message["t_ms"], np.float64))).astype(np.int64)
+    trains, values = np.array(message["train"], np.int64), np.array(message["value"], np.float64)
+    return Spikes(message["encoder"], times, trains, values, message["left_out"])
+
+
+def _time_of(item: Detection | Note) -> int:
+    """Return the time at which an item is yielded: of a detection, when it was known."""
+    return item.known if isinstance(item, Detection) else item.t

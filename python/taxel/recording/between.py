@@ -1,0 +1,78 @@
+"""A part of a recording by time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import ProblemError
+from taxel.recording.contents import UNKNOWN, Contents, once
+from taxel.recording.fates import after
+
+__all__ = ["between"]
+
+
+def between(of: Contents, start: float, stop: float) -> Contents:
+    """Return the part of ``start <= t < stop`` (us); notes without a time are left out.
+
+    What the taxels held at its beginning is known from what came before it. Taxels that were zeroed before it stay so.
+    """
+    return after(
+        "between",
+        of,
+        events=once(lambda: None if of.events is None else of.events.between(start, stop)) if of.has_events else None,
+        frames=None if of.has_events else once(lambda: None if of.frames is None else of.frames.between(start, stop)),
+        stretch=once(lambda: _stretch(of, start, stop)),
+        held=once(lambda: _held_at(of, start)),
+        notes=once(lambda: tuple(n for n in of.notes if n.t is not None and start <= n.t < stop)),
+        detections=once(lambda: of.detections.between(start, stop)),
+        zeroings=once(lambda: tuple(z for z in of.zeroings if z.t < stop)),
+        samples=once(
+            lambda: None if of.samples is None else of.samples.between(start, stop), lambda: of.holds("samples")
+        ),
+        sources=once(lambda: _sources(of, start, stop)),
+    )
+
+
+def _sources(of: Contents, start: float, stop: float) -> Mapping[str, Contents]:
+    """Return the same part of all sources of a file, which have one clock only where they were put on it."""
+    sources = of.sources
+    if len(sources) > 1 and of.clock_of is None:
+        raise ProblemError(
+            f"{of.path}: a slice by one clock, and its sources ({', '.join(sources)}) have each its own; say "
+            "on_clock(name) before between"
+        )
+    parts: dict[str, Contents] = {}
+    for name, one in sources.items():
+        parts[name] = between(one.but(sources={}), start, stop).but(sources=parts)
+    return parts
+
+
+def _stretch(of: Contents, start: float, stop: float) -> tuple[int, int]:
+    """Return the first time and the end of a part: those of the whole, where they lie within it."""
+    t = of.table.t
+    whole = of.stretch or ((int(t.min()), int(t.max()) + 1) if len(t) else (0, 1))
+    first, last = max(whole[0], _whole(start)), min(whole[1], _whole(stop))
+    return first, max(first, last)
+
+
+def _whole(value: float) -> int:
+    """Return a bound in whole us, infinite ones far away."""
+    return int(np.ceil(np.clip(value, -(2.0**62), 2.0**62)))
+
+
+def _held_at(of: Contents, start: float) -> NDArray[np.uint16] | None:
+    """Return what the taxels held at a time, as far as is known."""
+    events = of.events if of.has_events else None
+    if events is None or events.intensity is None or events.present is None:
+        return of.held
+    before = np.flatnonzero(events.present & (events.t < start))
+    if not len(before):
+        return of.held
+    now = np.full(of.array.shape, UNKNOWN, np.uint16) if of.held is None else of.held.copy()
+    last = before[np.argsort(events.t[before], kind="stable")]
+    # Of values at one place the last one stays.
+    now[events.y[last], events.x[last]] = events.intensity[last]
+    return now

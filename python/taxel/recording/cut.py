@@ -1,0 +1,129 @@
+"""Parts of a recording: by time, by region, and around each note of a label."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taxel._base.arguments import finite, instance, text, window
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.recording.contents import Contents, once
+from taxel.recording.fates import after
+from taxel.recording.notes import Zeroing
+from taxel.recording.recording import Recording
+
+__all__ = ["cut", "region"]
+
+
+def cut(
+    recording: Recording,
+    *,
+    start_us: float = -np.inf,
+    stop_us: float = np.inf,
+    columns: slice | None = None,
+    rows: slice | None = None,
+    label: str | None = None,
+    before_us: float = 500_000.0,
+    after_us: float = 500_000.0,
+) -> list[Recording]:
+    """Cut a stretch of time, a region of the sensor, or what lies around each note of a label.
+
+    Parameters
+    ----------
+    recording : Recording
+    start_us, stop_us : float, us
+        What is kept, by the board's clock: ``start_us <= t < stop_us``.
+    columns, rows : slice, optional
+        The rectangle that is kept; it becomes a sensor of its own, whose columns and rows count from 0. All columns and
+        rows are the recording as it is.
+    label : str, optional
+        Cut around each note of this text: one recording each, of which there may be none.
+    before_us, after_us : float, us
+        How much around it.
+
+    Returns
+    -------
+    list of Recording
+        One, or one a note. Times stay the board's. What a part by region cannot hold (datagrams) stands in its `lost`;
+        its registers are those of the whole sensor.
+
+    Raises
+    ------
+    ProblemError : a start after its stop, a time before or after a label below 0, or a region without a taxel
+
+    Examples
+    --------
+    >>> import pathlib, tempfile, taxel
+    >>> place = pathlib.Path(tempfile.mkdtemp()) / "two.npz"
+    >>> events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    >>> _ = taxel.convert(events, place)
+    >>> taxel.cut(taxel.open(place), start_us=100, columns=slice(4, 8))
+    [Recording(two.npz: 1 events, 200 to 200 us, 8 x 4 taxels)]
+    """
+    instance("recording", recording, Recording)
+    start_us, stop_us = window("us", start_us, stop_us)
+    around = [
+        finite(name, given, "us", least=0.0) for name, given in (("before_us", before_us), ("after_us", after_us))
+    ]
+    whole = (start_us, stop_us) == (-np.inf, np.inf)
+    kept = recording if whole else recording.between(start_us, stop_us)
+    if label is None:
+        parts = [kept]
+    else:
+        text("label", label)
+        times = [note.t for note in kept.notes if note.text == label and note.t is not None]
+        parts = [kept.between(t - around[0], t + around[1]) for t in times]
+    if columns is None and rows is None:
+        return parts
+    across, down = (slice(None) if chosen is None else chosen for chosen in (columns, rows))
+    return [Recording(region(part._contents, across, down)) for part in parts]
+
+
+def region(of: Contents, columns: slice, rows: slice) -> Contents:
+    """Return the part of a recording within a rectangle, as a sensor of its own; all of it as it is.
+
+    Raises
+    ------
+    ProblemError : no taxel lies in the rectangle, or a file of several boards
+    """
+    array = of.array
+    (left, right), (top, bottom) = array.region(columns, rows)
+    if right <= left or bottom <= top:
+        raise ProblemError(f"columns {left} to {right}, rows {top} to {bottom}: no taxel of {array!r} lies there")
+    if (bottom - top, right - left) == array.shape:
+        return of
+    if of.is_several:
+        # Its events say which sources there are.
+        _ = of.events
+    exists = None if array.exists is None else array.exists[top:bottom, left:right]
+    small = Array(bottom - top, right - left, array.pitch_mm, exists, array.name)
+
+    def events() -> Events | None:
+        if of.events is None:
+            return None
+        inside = of.events.region(columns, rows)
+        x, y = (inside.x - np.uint16(left)), (inside.y - np.uint16(top))
+        ticks, present, repaired = inside.intensity, inside.present, inside.repaired
+        return Events._unchecked(inside.t, x, y, inside.p, small, ticks, present, repaired, of.events.markers)
+
+    return after(
+        "region",
+        of,
+        array=small,
+        events=once(events) if of.has_events else None,
+        frames=None if of.has_events else once(lambda: of.frames and of.frames.region(columns, rows)),
+        held=once(lambda: None if of.held is None else np.ascontiguousarray(of.held[top:bottom, left:right])),
+        zeroings=once(
+            lambda: tuple(
+                Zeroing(z.t, z.x - left, z.y - top, z.rest, z.before)
+                for z in of.zeroings
+                if left <= z.x < right and top <= z.y < bottom
+            )
+        ),
+        calibration=once(
+            lambda: None if of.calibration is None else of.calibration._region(columns, rows),
+            lambda: of.holds("calibration"),
+        ),
+        columns=None if of.columns is None else of.columns[left:right],
+    )

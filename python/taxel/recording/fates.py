@@ -1,0 +1,166 @@
+"""What becomes of each field of a recording's contents in each function: carried, changed or lost, as one table.
+
+`=` the field is carried over as it is. `~` the function gives it another value. `-` the field is lost: it gets its
+default, and `LINES` says so in `Contents.lost` where it held anything. A field that someone adds to `Contents` and does
+not decide here fails `tests/recording/test_fates.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, fields
+from typing import Any
+
+import numpy as np
+
+from taxel.array import Array
+from taxel.recording.contents import UNKNOWN, Contents, once
+
+__all__ = ["CARRIED", "CHANGED", "FATES", "LINES", "LOST", "after", "sensor"]
+
+CARRIED, CHANGED, LOST = "=", "~", "-"
+
+#: The last five columns are `convert` to that kind of file; `pictures` is its `frames_hz`, and `Recording.frames`.
+_TABLE = """
+                  between region merge on_clock with_notes calibrated pictures source .mcap .lsa .npz .csv .h5
+path                 =      =      ~      =         =          =         =       =      ~     ~    ~    ~   ~
+name                 =      =      ~      =         =          =         =       ~      ~     ~    ~    ~   ~
+kind                 =      =      ~      =         =          =         =       =      ~     ~    ~    ~   ~
+array                =      ~      ~      =         =          =         =       ~      =     ~    =    ~   =
+label                =      =      ~      =         =          =         =       ~      ~     ~    ~    ~   ~
+source               =      =      ~      =         =          =         =       ~      ~     -    ~    -   ~
+events               ~      ~      ~      ~         =          ~         ~       ~      ~     ~    =    ~   =
+frames               ~      ~      ~      ~         =          ~         ~       ~      ~     ~    =    ~   =
+stretch              ~      =      -      =         =          =         =       ~      -     -    -    -   -
+held                 ~      ~      ~      =         =          ~         ~       ~      =     -    =    -   =
+registers            =      =      ~      =         =          =         =       ~      =     -    =    -   =
+register_changes     =      =      ~      =         =          =         =       ~      =     -    =    -   =
+board_changes        =      =      ~      ~         =          =         =       ~      =     -    =    -   =
+notes                ~      =      ~      ~         ~          =         =       ~      =     -    =    -   =
+detections           ~      =      ~      ~         =          =         =       ~      =     -    =    -   =
+zeroings             ~      ~      ~      ~         =          =         =       ~      =     -    =    -   =
+calibration          =      ~      ~      =         =          ~         =       ~      ~     ~    ~    ~   ~
+clock                =      =      ~      ~         =          =         =       ~      ~     -    -    -   -
+clock_of             =      =      ~      ~         =          =         =       =      -     -    -    -   -
+counts               =      =      ~      =         =          =         =       ~      ~     -    =    -   =
+verdict              =      =      ~      =         =          =         =       ~      ~     -    =    -   =
+datagrams            =      -      -      =         =          =         =       ~      ~     -    -    -   -
+payload              =      -      -      =         =          =         =       ~      ~     ~    -    -   -
+version_2            =      -      -      =         =          =         =       ~      ~     -    -    -   -
+differences          =      -      -      =         =          =         =       ~      ~     -    -    -   -
+origin_us            =      -      -      =         =          =         =       ~      ~     -    -    -   -
+unmarked             =      -      -      =         =          =         =       ~      ~     -    -    -   -
+samples              ~      -      -      ~         =          -         =       ~      =     -    -    -   -
+columns              =      ~      ~      =         =          =         =       ~      =     -    =    -   =
+truncated            =      =      ~      =         =          =         =       ~      ~     -    =    -   =
+rebuilt              =      =      ~      =         =          =         =       ~      ~     -    =    -   =
+sources              ~      -      -      ~         ~          =         =       =      -     -    -    -   -
+lost                 =      ~      ~      ~         =          ~         =       ~      ~     ~    ~    ~   ~
+"""
+
+_HEADER, *_ROWS = _TABLE.strip("\n").splitlines()
+STEPS = tuple(_HEADER.split())
+#: By function and field.
+FATES: dict[str, dict[str, str]] = {step: {} for step in STEPS}
+for _row in _ROWS:
+    _field, *_fates = _row.split()
+    for _step, _fate in zip(STEPS, _fates, strict=True):
+        FATES[_step][_field] = _fate
+
+_DEFAULTS: dict[str, Callable[[], Any]] = {
+    one.name: (lambda one=one: one.default) if one.default_factory is MISSING else one.default_factory  # type: ignore[misc]
+    for one in fields(Contents)
+    if one.default is not MISSING or one.default_factory is not MISSING
+}
+
+
+def sensor(array: Array) -> str:
+    """Return the line that says that a sensor is lost."""
+    some = "" if array.exists is None else f", {array.taxels} exist"
+    return f'the sensor ({array.rows} x {array.columns} taxels{some}, {array.pitch_mm:g} mm apart, "{array.name}")'
+
+
+def _datagrams(of: Contents, step: str) -> str:
+    if step == ".lsa" and not _made(of) and not of.version_2:
+        return "arrival times, and where datagrams begin"
+    return "raw datagrams" + " with their arrival times" * (FATES[step]["clock"] == LOST)
+
+
+def _made(of: Contents) -> bool:
+    """Tell whether a file's bytes are made of events, as the datagrams are not those of this part, or by this clock."""
+    return of.is_slice or of.clock_of is not None
+
+
+def _sources(of: Contents, _: str) -> list[str]:
+    return [f"the source {name}" for name in of.sources if name != of.label]
+
+
+#: The line where a field is lost that held anything. None: it is part of another, or can be told from what is there.
+LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
+    "source": lambda of, _: f"where it came from ({of.source})",
+    # A part that was written is a recording of its own.
+    "stretch": None,
+    "held": lambda of, _: f"what {np.count_nonzero(of.held != UNKNOWN)} taxels held at the beginning",
+    "registers": lambda _, __: "the board's registers",
+    "register_changes": lambda of, _: f"{len(of.register_changes)} settings of the registers",
+    "board_changes": lambda of, _: f"{len(of.board_changes)} changes of the board",
+    "notes": lambda of, _: f"{len(of.notes)} notes",
+    "detections": lambda of, _: f"{len(of.detections)} detections",
+    "zeroings": lambda of, _: f"{len(of.zeroings)} zeroed taxels",
+    "clock": lambda of, _: [] if of.holds("datagrams") else "arrival times",
+    "clock_of": lambda of, _: f"by whose clock times are ({of.clock_of})",
+    "counts": lambda _, __: "what was received and lost, by cause",
+    # The counts in one line.
+    "verdict": None,
+    "datagrams": _datagrams,
+    "payload": lambda _, __: "raw bytes (words that are no events)",
+    # These say how to read the datagrams; a .lsa has none, but their bytes.
+    "version_2": None,
+    "differences": lambda _, step: "that intensities are differences" if step == ".lsa" else [],
+    "origin_us": None,
+    "unmarked": None,
+    "samples": lambda _, __: "the lines of the stream as they came",
+    "columns": lambda of, _: f"the names of the columns ({', '.join(of.columns or ())})",
+    "truncated": lambda _, __: "that its end is missing",
+    "rebuilt": lambda _, __: "what reading had to put up with",
+    "sources": _sources,
+}
+
+
+def after(step: str, of: Contents, lines: Callable[[], Iterable[str]] | None = None, **changed: Any) -> Contents:
+    """Return the contents that a function makes of others, by the table.
+
+    Parameters
+    ----------
+    step : str
+        The function: a column of the table.
+    of : Contents
+    lines : function that returns lines, optional
+        What of the changed fields is lost.
+    **changed
+        A value (or `once`) for each field that the table calls changed, and for no other.
+    """
+    fates = FATES[step]
+    wanted = {name for name, fate in fates.items() if fate == CHANGED} - {"lost"}
+    if changed.keys() != wanted:
+        raise TypeError(f"{step}: changes {sorted(changed)}; the table of fates says {sorted(wanted)}")
+    gone = [name for name, fate in fates.items() if fate == LOST]
+    changed |= {name: _DEFAULTS[name]() for name in gone}
+    if fates["lost"] == CHANGED:
+        changed["lost"] = once(lambda: _together(of.lost, _said(step, of, gone), () if lines is None else lines()))
+    return of.but(**changed)
+
+
+def _said(step: str, of: Contents, gone: Iterable[str]) -> list[str]:
+    said = []
+    for name in gone:
+        line = LINES[name]
+        if line is not None and of.holds(name):
+            lost = line(of, step)
+            said += [lost] if isinstance(lost, str) else lost
+    return said
+
+
+def _together(*every: Iterable[str]) -> tuple[str, ...]:
+    """Return lines in their order, each once."""
+    return tuple(dict.fromkeys(line for lines in every for line in lines))

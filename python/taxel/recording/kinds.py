@@ -1,0 +1,89 @@
+"""Which kind of recording a file is, by its first bytes and its ending."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from taxel._core import FormatError
+from taxel.recording.contents import Contents
+
+__all__ = ["ENDINGS", "kind_of", "kind_of_file", "verdict_of"]
+
+#: The kinds of ours by their endings.
+ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
+
+#: How files of ours begin that have a magic.
+_MAGIC = {
+    b"\x89MCAP0\r\n": "mcap",
+    b"PK\x03\x04": "npz",
+    b"PK\x05\x06": "npz",
+    b"\x89HDF\r\n\x1a\n": "h5",
+}
+#: How well-known files of other kinds begin, and what to do with them.
+_STRANGERS = {
+    b"\x1f\x8b": "gzip; unpack it first",
+    b"\x28\xb5\x2f\xfd": "zstd; unpack it first",
+    b"\x04\x22\x4d\x18": "lz4; unpack it first",
+    b"BZh": "bzip2; unpack it first",
+    b"\xfd7zXZ": "xz; unpack it first",
+    b"\x89PNG": "a PNG picture, no recording",
+    b"%PDF": "a PDF document, no recording",
+    b"SQLite": "SQLite (a ROS 2 bag?); convert it to MCAP first",
+    b"#ROSBAG": "a ROS 1 bag; convert it to MCAP first",
+    b"\x93NUMPY": "a single NumPy array; save its columns t, x, y, p with numpy.savez",
+}
+
+
+def kind_of_file(kind: str) -> str:
+    """Return what a kind of recording is called: by its ending where it is ours, else by its format.
+
+    Examples
+    --------
+    >>> kind_of_file("npz"), kind_of_file("pedar")
+    ('.npz', 'pedar recording')
+    """
+    return f".{kind}" if kind in ENDINGS.values() else f"{kind} recording"
+
+
+def verdict_of(contents: Contents) -> str:
+    """Return in one line what was lost of a recording, or that its file does not say."""
+    said = contents.verdict
+    return f"the {kind_of_file(contents.kind)} does not say what was lost" if said is None else said
+
+
+def kind_of(path: Path) -> str:
+    """Return the kind of a file by its first bytes and its ending, which must not contradict each other.
+
+    Raises
+    ------
+    FormatError : no recording (says what it is, where that is known)
+    OSError : the file is not there, or cannot be read
+    """
+    with path.open("rb") as file:
+        head = file.read(16)
+    ending = ENDINGS.get(path.suffix.lower())
+    found = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
+    begins = " ".join(f"{byte:02X}" for byte in head[:4]) or "nothing"
+    if found is not None and ending in (None, found):
+        return found
+    if ending == "lsa":
+        # Raw bytes may begin with anything.
+        return ending
+    stranger = next((what for magic, what in _STRANGERS.items() if head.startswith(magic)), None)
+    wanted = {"mcap": "the MCAP magic", "npz": "the magic of a .npz", "csv": "the names of columns"}
+    wanted["h5"] = "the magic of HDF5"
+    if found is not None:
+        stranger = f"a .{found} file; rename it"
+    if stranger is not None:
+        right = wanted[ending] if ending else "a recording"
+        what, _, advice = stranger.partition("; ")
+        raise FormatError(
+            f"{path}, byte 0: starts with {begins} ({what}), not with {right}" + f"; {advice}" * bool(advice)
+        )
+    if ending is None:
+        raise FormatError(f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}")
+    if ending in {"npz", "h5"}:
+        magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
+        raise FormatError(f"{path}, byte 0: starts with {begins}, not with {wanted[ending]} ({magic})")
+    # The compiled reader says what is wrong with a .mcap, the table's reader with a .csv.
+    return ending

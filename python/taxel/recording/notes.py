@@ -1,0 +1,149 @@
+"""What stands in a recording beside its events: notes, zeroed taxels, changes of the board, raw bytes and lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["BoardChange", "Datagrams", "Note", "Samples", "Zeroing"]
+
+
+@dataclass(frozen=True)
+class Note:
+    """Hold what a person wrote down while recording.
+
+    Parameters
+    ----------
+    text : str
+    t : int, us, optional
+        The board's time, where it was known.
+    at_ns : int, ns since 1970
+        The host's time.
+    """
+
+    text: str
+    t: int | None
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class Zeroing:
+    """Hold that a person zeroed a taxel: from then on it rests at what it held.
+
+    Parameters
+    ----------
+    t : int, us
+        When: after all events up to then, before later ones.
+    x, y : int
+        The taxel's column and row.
+    rest : float, ticks
+        What it rests at from then on.
+    before : float, ticks, optional
+        What it rested at before, where that was known.
+    """
+
+    t: int
+    x: int
+    y: int
+    rest: float
+    before: float | None
+
+
+@dataclass(frozen=True)
+class BoardChange:
+    """Hold a change of the board while recording.
+
+    Attributes
+    ----------
+    t : int, us, or None
+        The board's time, which goes on over the change; None where it was not known.
+    at_ns : int, ns since 1970
+        When it was noticed.
+    change : str
+        "reset": the board was reset, so its taxels hold nothing until their next event. "wire": it speaks another
+        version of the wire.
+    version : int or None
+        Of the wire from here on.
+    asked : bool
+        Whether the host asked for that change; else the board's datagrams showed it.
+    """
+
+    t: int | None
+    at_ns: int
+    change: str
+    version: int | None = None
+    asked: bool = False
+
+    def _described(self) -> dict[str, Any]:
+        """Return the change as files hold it, without the host's time."""
+        said: dict[str, Any] = {"t_us": self.t, "change": self.change}
+        if self.version is not None:
+            said |= {"version": self.version, "asked": self.asked}
+        return said
+
+
+@dataclass(frozen=True, eq=False)
+class Datagrams:
+    """Hold raw datagrams as they came.
+
+    Parameters
+    ----------
+    arrived_ns : int64, shape (n,), ns since 1970
+    number : uint64, shape (n,)
+        Our own arrival number: a hole in it is a datagram that was received but is not here.
+    offsets : int64, shape (n + 1,)
+        Where each begins in `payload`, and at last where all end.
+    payload : uint8, shape (bytes,)
+    """
+
+    arrived_ns: NDArray[np.int64]
+    number: NDArray[np.uint64]
+    offsets: NDArray[np.int64]
+    payload: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.arrived_ns)
+
+    def __getitem__(self, k: int) -> bytes:
+        """Return the bytes of one datagram."""
+        n = range(len(self))[k]
+        return self.payload[self.offsets[n] : self.offsets[n + 1]].tobytes()
+
+    def __repr__(self) -> str:
+        return f"Datagrams({len(self)}, {self.payload.size} bytes)"
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Hold the lines of a stream of numbers as they came.
+
+    Parameters
+    ----------
+    about : mapping
+        What the file says of the stream: its name, columns, and which of them is its own time.
+    arrived_ns : int64, shape (n,), ns since 1970
+    number : uint64, shape (n,)
+        Our own arrival number.
+    t : int64, shape (n,), us
+        The stream's own time, unwrapped; the host's where it has none.
+    values : float64, shape (n, columns)
+        All columns of each line, its own time unwrapped.
+    """
+
+    about: Mapping[str, Any]
+    arrived_ns: NDArray[np.int64]
+    number: NDArray[np.uint64]
+    t: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def between(self, start: float, stop: float) -> Samples:
+        """Return the lines of ``start <= t < stop`` (us)."""
+        inside = (self.t >= start) & (self.t < stop)
+        return Samples(self.about, self.arrived_ns[inside], self.number[inside], self.t[inside], self.values[inside])

@@ -1,0 +1,126 @@
+"""Events or pictures as named columns, as a .npz and a .h5 hold them.
+
+Events are ``t x y p``, with ``intensity present``, ``repaired`` and ``markers`` where there are any; pictures are
+``values t unit``. ``held`` is what the taxels held at the beginning; ``about`` is JSON of all that no column holds.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.archive import read_arrays, stored_names
+from taxel._base.columns import frozen
+from taxel._core import FormatError, ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.formats.checks import table as limited
+from taxel.frames import Frames
+from taxel.recording.about import about_of, json_of
+from taxel.recording.contents import Contents
+
+__all__ = ["TEXTS", "around", "columns_of", "contents_of", "read_npz", "write_npz"]
+
+_EVENTS = ("t", "x", "y", "p")
+_COLUMNS = (*_EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
+#: The columns that are one text.
+TEXTS = ("about", "unit")
+
+
+def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
+    """Return a recording as columns by name."""
+    table = contents.table
+    columns: dict[str, Any]
+    if isinstance(table, Frames):
+        columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
+    else:
+        columns = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
+        if table.intensity is not None:
+            columns |= {"intensity": table.intensity, "present": table.present}
+        if table.repaired is not None:
+            columns["repaired"] = table.repaired
+        columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
+    if contents.held is not None:
+        columns["held"] = contents.held
+    return {**columns, "about": np.array(json_of(contents))}
+
+
+def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Contents:
+    """Return the contents of a file of columns, which become its own.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+    columns : dict from name to array
+    array : Array, optional
+        The sensor, where the caller says; else what the file says, else one around the events.
+
+    Raises
+    ------
+    FormatError : a column is missing, or makes no sense
+    """
+    columns = {name: frozen(values) for name, values in columns.items()}
+    about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
+    said = about.pop("array", None)
+    sensor = array or said
+    try:
+        if "values" in columns and "t" in columns:
+            unit = str(columns.get("unit", "counts"))
+            table: Events | Frames = Frames(columns["values"], columns["t"], unit=unit, array=sensor)
+        else:
+            missing = [name for name in _EVENTS if name not in columns]
+            if missing:
+                names = ", ".join(columns) or "nothing"
+                raise FormatError(
+                    f"{path}: holds {names}: {missing[0]} is missing; must be t, x, y, p (events) or values, t "
+                    "(pictures)"
+                )
+            t, x, y, p = (columns[name] for name in _EVENTS)
+            markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]
+            extra = {name: columns[name] for name in ("intensity", "present", "repaired") if name in columns}
+            table = Events(t, x, y, p, array=sensor or around(x, y), markers=markers, **extra)
+        limited(path, table)
+        held = _held(columns["held"], table.array) if "held" in columns else None
+    except (ProblemError, ValueError, TypeError, OverflowError) as error:
+        said = str(error).split("\n", maxsplit=1)[0]
+        raise FormatError(f"{path}: {said if len(said) <= 200 else said[:197] + '...'}") from None
+    events, frames = (table, None) if isinstance(table, Events) else (None, table)
+    return Contents(path, path.name, kind, table.array, events=events, frames=frames, held=held, **about)
+
+
+def _held(held: NDArray[Any], array: Array) -> NDArray[np.uint16]:
+    if held.dtype != np.uint16 or held.shape != array.shape:
+        raise ProblemError(f"held is {held.dtype} of shape {held.shape}: must be uint16 of {array.shape}")
+    return held
+
+
+def write_npz(file: BinaryIO, contents: Contents) -> None:
+    """Write a .npz."""
+    np.savez_compressed(file, **cast(dict[str, Any], columns_of(contents)))
+
+
+def read_npz(path: Path, array: Array | None) -> Contents:
+    """Read a .npz of ours, or one with the columns ``t x y p`` or ``values t``.
+
+    Raises
+    ------
+    FormatError : damage, or no such columns
+    """
+    # A column of another name is not read, but stands in the error of what is missing.
+    columns = read_arrays(path, _COLUMNS, texts=TEXTS) or {name: np.empty(0) for name in stored_names(path)[:8]}
+    return contents_of(path, "npz", columns, array)
+
+
+def around(x: NDArray[Any], y: NDArray[Any]) -> Array:
+    """Return the thesis' array, or a larger one where events lie outside it."""
+    thesis = Array.thesis()
+    if not len(x):
+        return thesis
+    if min(x.min(), y.min()) < 0 or max(x.max(), y.max()) >= 65_535:
+        raise ProblemError("x and y: must lie in 0 to 65534")
+    rows, columns = max(thesis.rows, int(y.max()) + 1), max(thesis.columns, int(x.max()) + 1)
+    return thesis if (rows, columns) == thesis.shape else Array(rows, columns)

@@ -1,0 +1,49 @@
+"""Reads the manual's raw bytes (.lsa)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from taxel import _core
+from taxel.array import Array
+from taxel.events import Events
+from taxel.recording.contents import Contents
+
+__all__ = ["read_lsa"]
+
+
+def read_lsa(path: Path, array: Array, pairing: str, differences: bool) -> Contents:
+    """Return the contents of a .lsa.
+
+    Parameters
+    ----------
+    path : Path
+    array : Array
+        The sensor, which the file does not hold.
+    pairing : {"direct", "taxel"}
+    differences : bool
+        Whether intensities are differences.
+
+    Raises
+    ------
+    OSError : the file cannot be read
+    """
+    payload, parts, decoder, complete = _core.read_lsa(path, array._parts(), pairing, differences)
+    damage = json.loads(_core.recording_damage(decoder))
+    _, _, damaged = _core.recording_verdict(json.dumps({"decoder": damage})).partition("; ")
+    verdict = ["raw bytes do not say what was lost, nor how many turns of 6.5536 s a longer silence had"]
+    verdict += [damaged] * bool(damaged)
+    verdict += [f"{path.with_suffix('.lss').name} is not there: the recording was not finished"] * (not complete)
+    return Contents(
+        path,
+        path.name,
+        "lsa",
+        array,
+        events=Events._from_parts(parts, array),
+        counts={"bytes": len(payload), "decoder": json.loads(decoder)},
+        verdict="; ".join(verdict),
+        payload=payload,
+        differences=differences,
+        truncated=not complete,
+    )

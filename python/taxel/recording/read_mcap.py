@@ -1,0 +1,200 @@
+"""Reads the live format: each of its sources as contents, none of whose fields is read before it is asked for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel.array import Array
+from taxel.clock import Clock
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recording.about import array_of, board_changes_of, detections_of, notes_of, zeroings_of
+from taxel.recording.contents import Contents, Once, alone, once
+from taxel.recording.notes import Datagrams, Samples
+from taxel.wire import Registers
+
+__all__ = ["ascending", "read_mcap"]
+
+
+def read_mcap(path: Path, pairing: str) -> Contents:
+    """Return the contents of a .mcap: those of its only source or board, with all sources in them.
+
+    Raises
+    ------
+    FormatError : no recording of the live format, or damaged where nothing can be read
+    OSError : the file cannot be read
+    """
+    reader = _core.RecordingReader(path)
+    sources: dict[str, Contents] = {}
+    for name in reader.sources():
+        one = _Source(path, reader.of_source(name), sources)
+        sources[name] = one.board(pairing) if one.header.get("stream") is None else one.stream()
+    return alone(sources)
+
+
+class _Source:
+    """What the fields of one source share: what the file says of it, and what is read of it once."""
+
+    def __init__(self, path: Path, reader: _core.RecordingReader, sources: dict[str, Contents]) -> None:
+        self.reader = reader
+        about = json.loads(reader.about())
+        self.header, self.ending, self.opened = about["header"], about["ending"] or {}, about["rebuilt"]
+        self.array = array_of(self.header["array"])
+        self.remarks = Once(lambda: json.loads(reader.remarks()))
+        self.common: dict[str, Any] = {
+            "path": path,
+            "name": path.name,
+            "kind": "mcap",
+            "array": self.array,
+            "label": self.header.get("name", "board"),
+            "source": self.header["source"],
+            "verdict": once(self.verdict),
+            "truncated": bool(self.opened["unfinished"]) or "finished" not in self.ending,
+            "rebuilt": once(self.rebuilt),
+            "sources": sources,
+            "lost": tuple(self.header.get("lost", ())),
+        }
+
+    def board(self, pairing: str) -> Contents:
+        """Return the contents of a board."""
+        decoded = Once(lambda: self.reader.decode(pairing))
+        arrived = lambda: self.remarks()["datagrams"] > 0  # noqa: E731  the same for two fields
+        return Contents(
+            **self.common,
+            events=once(lambda: Events._from_parts(decoded()[0], self.array)),
+            held=once(self.held),
+            registers=once(self.registers),
+            register_changes=once(self.register_changes),
+            board_changes=once(lambda: board_changes_of(self.remarks()["board"])),
+            notes=once(lambda: notes_of(self.remarks()["notes"])),
+            detections=once(lambda: detections_of(self.remarks()["detections"])),
+            zeroings=once(lambda: zeroings_of([one for _, one in self.remarks()["zeroings"]])),
+            clock=once(lambda: _clock(decoded()), arrived),
+            counts=once(lambda: self.counts_of_board(decoded()), lambda: True),
+            datagrams=once(lambda: Datagrams(*self.reader.datagrams()), arrived),
+            version_2=once(lambda: bool(json.loads(decoded()[6])["intact"])),
+            differences=bool(self.header["difference"]),
+            origin_us=int(self.header["origin_us"]),
+            unmarked=tuple(self.header.get("repaired", ())),
+        )
+
+    def stream(self) -> Contents:
+        """Return the contents of a stream of numbers, whose lines are pictures of one row."""
+        stream = self.header["stream"]
+        read = Once(self.reader.samples)
+
+        def samples() -> Samples:
+            arrived, number, t, values, _, _ = read()
+            rows = values.reshape(len(t), self.array.columns)
+            if stream.get("time") is not None:
+                own = t / float(stream["unit_us"])
+                rows = np.insert(rows, stream["columns"].index(stream["time"]), own, axis=1)
+            return Samples(self.header, arrived, number, t, np.ascontiguousarray(rows))
+
+        def frames() -> Frames:
+            _, _, t, values, _, _ = read()
+            order = np.argsort(t, kind="stable")
+            rows = values.reshape(len(t), 1, self.array.columns)[order]
+            return Frames(rows.astype(np.float32), ascending(t[order]), unit="as sent", array=self.array)
+
+        return Contents(
+            **self.common,
+            frames=once(frames),
+            clock=once(lambda: Clock(read()[2], read()[0])),
+            counts=once(lambda: self.counts_of_stream(read()), lambda: True),
+            samples=once(samples, lambda: self.remarks()["samples"] > 0),
+            columns=tuple(name for name in stream["columns"] if name != stream.get("time")),
+        )
+
+    def driven(self) -> Array:
+        """Return the array that the registers drive."""
+        said = self.header.get("driven")
+        return self.array if said is None else array_of(said)
+
+    def registers(self) -> Registers | None:
+        """Return the registers at the beginning, or the first that were set."""
+        first = self.header["registers"]
+        if first is None:
+            changes = self.register_changes()
+            return changes[0][1] if changes else None
+        return Registers._of(first, self.driven())
+
+    def register_changes(self) -> tuple[tuple[int, Registers], ...]:
+        """Return the registers as they were set."""
+        return tuple((at, Registers._of(values, self.driven())) for at, values in self.remarks()["registers"])
+
+    def held(self) -> NDArray[np.uint16] | None:
+        """Return what the taxels held at the beginning."""
+        held = self.remarks()["held"]
+        if held is None or len(held) != self.array.rows * self.array.columns:
+            return None
+        return np.array(held, np.uint16).reshape(self.array.shape)
+
+    def rebuilt(self) -> dict[str, int]:
+        """Return what reading had to put up with."""
+        rebuilt = {key: int(value) for key, value in self.opened.items() if key != "unfinished"}
+        return {**rebuilt, "bad_chunks": int(self.remarks()["bad_chunks"])}
+
+    def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
+        """Return what came and was lost of a board, by cause."""
+        said = self.ending.get("finished", {}).get("counts") or self.remarks()["counts"] or {}
+        _, decoder, _, _, number, *_ = decoded
+        missing = int(number[-1]) - int(number[0]) + 1 - len(number) if len(number) else 0
+        return {
+            "datagrams": self.remarks()["datagrams"],
+            "bytes": self.remarks()["datagram_bytes"],
+            "missing_numbers": max(0, missing),
+            **{name: said.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
+            "decoder": json.loads(decoder),
+            **self.rebuilt(),
+        }
+
+    def counts_of_stream(self, read: tuple[Any, ...]) -> dict[str, Any]:
+        """Return what came and was lost of a stream, by cause."""
+        _, _, t, _, bad, resets = read
+        said = self.ending.get("finished", {}).get("counts") or {}
+        seen = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
+        return {**seen, "received": said.get("received"), **self.rebuilt()}
+
+    def verdict(self) -> str:
+        """Return in one line what was lost where."""
+        rebuilt = self.rebuilt()
+        bad = []
+        if rebuilt["large_chunks"]:
+            bad.append(f"{rebuilt['large_chunks']} chunks skipped that say they unpack to more than 64 MiB")
+        if rebuilt["bad_chunks"]:
+            bad.append(f"{rebuilt['bad_chunks']} bad chunks skipped")
+        if rebuilt["gaps"]:
+            bad.append(f"{rebuilt['skipped_bytes']} bytes of the file skipped in {rebuilt['gaps']} places")
+        if rebuilt["torn_bytes"]:
+            bad.append(f"{rebuilt['torn_bytes']} torn bytes at the end")
+        if "finished" in self.ending:
+            said = str(self.ending["finished"]["verdict"])
+            return f"LOST in the file: {', '.join(bad)}; while recording: {said}" if bad else said
+        why = "not finished: what came last is missing"
+        if "stopped" in self.ending:
+            why = f"stopped by an error ({self.ending['stopped']}): what came last is missing"
+        so_far = self.remarks()["counts"]
+        known = "no counts were kept yet"
+        if so_far is not None:
+            # What was received then is more than what the file holds now: the rest is the unfinished end.
+            known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))
+        return "; ".join([why, *bad, f"until then: {known}"])
+
+
+def _clock(decoded: tuple[Any, ...]) -> Clock:
+    arrived, left = decoded[3], decoded[7]
+    has = left > np.iinfo(np.int64).min
+    return Clock(np.ascontiguousarray(left[has]), np.ascontiguousarray(arrived[has]))
+
+
+def ascending(t: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return times of pictures, of which two at one time follow one another by 1 us."""
+    steps = np.arange(len(t))
+    return np.maximum.accumulate(t - steps) + steps if len(t) else t

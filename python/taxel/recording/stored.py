@@ -1,0 +1,147 @@
+"""What a file of each kind can hold of a recording: contents as they will be read again, and what is lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taxel import _core, wire
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recording.beside import calibration_beside, has_calibration
+from taxel.recording.contents import Contents, once
+from taxel.recording.csv import array_in_csv
+from taxel.recording.fates import after, sensor
+from taxel.recording.kinds import ENDINGS, verdict_of
+from taxel.recording.write_mcap import cut_raw, encoded
+
+__all__ = ["STAMP_US", "is_made", "stored"]
+
+#: The unit of the stamps of wire version 1, us.
+STAMP_US = 100
+
+#: What says how to read datagrams.
+_OF_DATAGRAMS = ("version_2", "differences", "origin_us", "unmarked")
+
+#: So many numbers of repaired events at most stand in the description of a .mcap, which holds 16 MiB.
+_MOST = 1_000_000
+
+
+def stored(of: Contents, place: Path) -> Contents:
+    """Return what a file holds of a recording; the kind of file is the ending of its place.
+
+    Raises
+    ------
+    ProblemError : something that the kind of file cannot hold at all (pictures in a .mcap)
+    """
+    ending = place.suffix.lower()
+    common: dict[str, Any] = {"path": place, "name": place.name, "kind": ENDINGS[ending], "label": "board"}
+    lines = {".mcap": _mcap, ".lsa": _lsa, ".csv": _csv, ".npz": _table, ".h5": _table}[ending]
+    return lines(of, ending, common | _calibration(of, place))
+
+
+def is_made(of: Contents) -> bool:
+    """Tell whether the bytes of a file are made of events, as there are no datagrams of just these events."""
+    return of.is_slice or of.clock_of is not None or not (of.holds("datagrams") or of.holds("payload"))
+
+
+def _calibration(of: Contents, place: Path) -> dict[str, Any]:
+    """Return the calibration that lies beside a new file."""
+    return {"calibration": once(lambda: calibration_beside(place, of), lambda: has_calibration(place))}
+
+
+def _left_beside(of: Contents, place: Path) -> list[str]:
+    """Say that a recording's calibration does not lie beside the new file."""
+    if not of.holds("calibration") or has_calibration(place):
+        return []
+    return ["the calibration, a file of its own: lay a copy beside the new one"]
+
+
+def _table(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
+    """Return what a .npz or a .h5 holds: all but the bytes as they came."""
+    place = common["path"]
+    return after(ending, of, lambda: _left_beside(of, place), **common, source=of.source or of.name)
+
+
+def _csv(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
+    """Return what a .csv holds: events without markers, or pictures without their unit."""
+    place = common["path"]
+    table, events, frames = of.table, None, None
+    lost = [sensor(of.array)]
+    if isinstance(table, Events):
+        lost += [f"{len(table.markers)} markers of start and stop"] * bool(table.markers)
+        events = table[:]
+        events.markers = ()
+        events.array = array_in_csv(table)
+    else:
+        lost += [f"the unit ({table.unit})"] * (table.unit != "counts")
+        array = array_in_csv(table)
+        frames = Frames(table.values[:, : array.rows, : array.columns], table.t, array=array)
+    changed: dict[str, Any] = {"events": events, "frames": frames, "array": array_in_csv(table)}
+    return after(ending, of, lambda: [*lost, *_left_beside(of, place)], **common, **changed)
+
+
+def _lsa(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
+    """Return what a .lsa holds: the board's bytes as they came, or made of the events."""
+    place, events = common["path"], _events(of, common["path"])
+    lost = [sensor(of.array)] * (of.array != Array.thesis())
+    payload = of.payload if of.datagrams is None else of.datagrams.payload
+    if payload is None or is_made(of) or of.version_2:
+        lost += ["raw bytes (words that are no events)"] * of.holds("payload")
+        times = np.concatenate([events.t, np.array([at for at, _ in events.markers], np.int64)])
+        lost += ["times finer than 100 us"] * bool((times % STAMP_US).any())
+        lost += ["which events are repaired"] * (events.repaired is not None)
+        payload = np.frombuffer(_core.wire_encode(events._parts()), np.uint8)
+    again = wire.decode(payload, array=of.array, differences=of.differences and not is_made(of))
+    if len(again) != len(events):
+        lost.append(f"the pairing of intensities ({len(again)} events when paired directly)")
+    elif (again.t != events.t // STAMP_US * STAMP_US).any():
+        lost.append("whole turns of 6.5536 s in times")
+    changed: dict[str, Any] = {"array": Array.thesis(), "events": once(lambda: events), "frames": None}
+    return after(ending, of, lambda: [*lost, *_left_beside(of, place)], **common, **changed, payload=payload)
+
+
+def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
+    """Return what a .mcap holds: all; where there are no datagrams of just these events, the events in new ones."""
+    place, verdict = common["path"], verdict_of(of)
+    changed: dict[str, Any] = {
+        "source": of.source or of.name or "events",
+        "rebuilt": {},
+        "truncated": False,
+        "counts": once(lambda: of.counts),
+        "verdict": f"converted from a recording that says: {verdict}" if of.kind != "events" else None,
+    }
+    if of.samples is not None:
+        stay = (*_OF_DATAGRAMS, "events", "frames", "clock", "datagrams", "payload", "label")
+        changed |= {name: vars(of)[name] for name in stay}
+        bad = of.counts.get("lines_that_could_not_be_read", 0)
+        lines = [f"{bad} lines that could not be read"] * bool(bad)
+        return after(ending, of, lambda: [*lines, *_left_beside(of, place)], **(common | changed))
+    events = _events(of, place)
+    changed |= {"events": once(lambda: events), "frames": None, "payload": None}
+    if not is_made(of):
+        same = (*_OF_DATAGRAMS, "clock", "datagrams", "payload")
+        changed |= {name: vars(of)[name] for name in same}
+        if of.datagrams is None and of.payload is not None:
+            changed["datagrams"] = cut_raw(of.payload)
+        return after(ending, of, lambda: _left_beside(of, place), **common, **changed)
+    clock = of.clock if of.clock is not None and len(of.clock.board_us) else None
+    lost = ["raw datagrams"] * of.holds("datagrams") + ["raw bytes (words that are no events)"] * of.holds("payload")
+    origin_us, datagrams, unmarked = encoded(events, of.held, clock)
+    lost += [f"that {len(unmarked) - _MOST} of the events are repaired"] * (len(unmarked) > _MOST)
+    changed |= {"datagrams": datagrams, "version_2": True, "differences": False, "clock": clock}
+    changed |= {"origin_us": origin_us, "unmarked": tuple(unmarked[:_MOST].tolist())}
+    return after(ending, of, lambda: [*lost, *_left_beside(of, place)], **common, **changed)
+
+
+def _events(of: Contents, place: Path) -> Events:
+    events = of.events
+    if events is None:
+        raise ProblemError(
+            f"{place}: a {place.suffix.lower()} holds events and no pictures; write pictures to .npz, .csv or .h5"
+        )
+    return events

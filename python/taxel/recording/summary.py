@@ -1,0 +1,107 @@
+"""What is in a recording, in numbers: its size and rates, its pressure, which taxels are dead, and what was lost."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.recording.health import health
+from taxel.recording.pressure import Series
+from taxel.recording.recording import Recording
+
+__all__ = ["summary"]
+
+#: The stretch over which the highest rate is taken, us.
+_PEAK_US = 10_000
+
+
+def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
+    """Return all that `taxel info` says, as JSON holds it.
+
+    Parameters
+    ----------
+    recording : Recording
+    pressed : Series, optional
+        Its pressure over time (`taxel.recording.pressure.series`), where it has any.
+    """
+    array = recording.array
+    table = recording.events if recording.has_events else recording.frames()
+    span = (int(table.t.min()), int(table.t.max())) if len(table) else None
+    seconds = (span[1] - span[0]) / 1e6 if span else 0.0
+    said: dict[str, Any] = {
+        "file": _named(recording),
+        "kind": recording.kind,
+        "source": recording.source,
+        "array": {name: value for name, value in array._geometry().items() if name != "exists"},
+        "array_assumed": recording.kind in ("csv", "lsa") and recording.has_events,
+        "from_us": span[0] if span else None,
+        "to_us": span[1] if span else None,
+        "seconds": seconds,
+    }
+    if recording.has_events:
+        events = recording.events
+        said["events"] = len(events)
+        said["intensities"] = 0 if events.present is None else int(events.present.sum())
+        said["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
+        said["events_per_s_board"] = len(events) / seconds if seconds else None
+        said["peak_events_per_s_board"] = _peak(events.t)
+    else:
+        said["pictures"], said["unit"] = len(table), recording.frames().unit
+        said["pictures_per_s"] = (len(table) - 1) / seconds if seconds else None
+    clock = recording.clock
+    if clock is not None and len(clock.board_us) > 1:
+        host = (int(clock.arrived_ns.max()) - int(clock.arrived_ns.min())) / 1e9
+        late = np.percentile(clock.delay_us, [50, 99])
+        said |= {
+            "seconds_host": host,
+            "events_per_s_host": said["events"] / host if host and "events" in said else None,
+            "datagrams_per_s_host": len(clock.arrived_ns) / host if host else None,
+            "drift_ppm": clock.drift_ppm,
+            "delay_us": {"median": float(late[0]), "p99": float(late[1])},
+        }
+    calibration = recording.calibration
+    said["calibration"] = None if calibration is None else calibration.described()
+    said["pressure"] = None if pressed is None else _pressure(pressed)
+    return said | {
+        "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
+        "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
+        "registers": None if recording.registers is None else json.loads(recording.registers._json()),
+        "taxels": health(table).named(),
+        "counts": recording.counts,
+        "truncated": recording.truncated,
+        "rebuilt": recording.rebuilt,
+        "lost": list(recording.lost),
+        "verdict": recording.verdict,
+    }
+
+
+def _named(recording: Recording) -> str:
+    """Return the file, and which trial of it this is where other people's holds several."""
+    place = str(recording.path)
+    return place if place.endswith(recording.name) else f"{place}, {recording.name}"
+
+
+def _pressure(pressed: Series) -> dict[str, Any] | None:
+    """Return the largest contact area, peak and sum with their times, and where the centre went."""
+    if not len(pressed.t):
+        return None
+    said: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
+    for name, values in {"area_mm2": pressed.area, "peak": pressed.peak, "sum": pressed.total}.items():
+        k = int(values.argmax())
+        said[name] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
+    centre = pressed.centre[~np.isnan(pressed.centre).any(axis=1)]
+    limits = {"x": [float(v) for v in (centre[:, 0].min(), centre[:, 0].max())]} if len(centre) else None
+    if limits is not None:
+        limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
+    return said | {"centre_mm": limits}
+
+
+def _peak(t: NDArray[np.int64]) -> float | None:
+    """Return the highest rate in a stretch of 10 ms of board time, events/s."""
+    if not len(t):
+        return None
+    _, counts = np.unique(t // _PEAK_US, return_counts=True)
+    return float(counts.max() / (_PEAK_US / 1e6))

@@ -1,0 +1,462 @@
+"""Spike times by train."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._base.archive import read_arrays
+from taxel._base.arguments import bare, column, floats, nth, number, several, shown, window
+from taxel._base.arguments import path as checked_path
+from taxel._base.columns import Columns, frozen, kept
+from taxel._base.drawing import draw
+from taxel._base.files import write_whole
+from taxel._core import FormatError, ProblemError
+from taxel.spikes.exchange import read_nwb, write_nwb
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["SpikeTrains"]
+
+
+class SpikeTrains(Columns):
+    """Hold spike times by train, with the window that was listened to.
+
+    Parameters
+    ----------
+    times : float64, shape (spikes,), ms
+        All times, train after train, ascending in each.
+    offsets : int64, shape (trains + 1,)
+        Where each train begins in `times`, and at last where all end.
+    start, stop : float, ms
+        The window: without it an empty train could not say "silent".
+    values : float32, shape (spikes,), optional
+        A signed value a spike (polarity, bits), where the encoder has one.
+
+    Raises
+    ------
+    ProblemError : times not finite, not ascending or outside the window (names train and spike)
+
+    Notes
+    -----
+    `times`, `offsets` and `values` are read-only: arrays of the caller's are copied once, unless they are read-only
+    themselves.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[1.0, 5.0], [], [3.0]], stop=10.0)
+    >>> trains
+    SpikeTrains(3 trains, 3 spikes, 0 to 10 ms)
+    >>> trains[0]
+    array([1., 5.])
+    """
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        offsets: ArrayLike,
+        start: float,
+        stop: float,
+        values: ArrayLike | None = None,
+    ) -> None:
+        self.times: NDArray[np.float64] = kept("times", times, np.float64, "ms")
+        self.offsets: NDArray[np.int64] = kept("offsets", offsets, np.int64)
+        self.values: NDArray[np.float32] | None = None if values is None else kept("values", values, np.float32)
+        _finite_values(self.values)
+        self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
+        _core.check_spikes(self._parts())
+
+    @classmethod
+    def from_lists(
+        cls,
+        times: Sequence[ArrayLike],
+        start: float = 0.0,
+        stop: float | None = None,
+        values: Sequence[ArrayLike] | None = None,
+    ) -> SpikeTrains:
+        """Build spike trains from one list of times a train.
+
+        Parameters
+        ----------
+        times : sequence of float sequences, ms
+            Ascending in each train; a train may be empty.
+        start : float, ms
+        stop : float, ms, optional
+            The last spike's time where it is left out.
+        values : sequence of float sequences, optional
+            A signed value a spike.
+
+        Returns
+        -------
+        SpikeTrains
+
+        Raises
+        ------
+        ProblemError : times that make no sense (names train and spike)
+        """
+        flat, counts = _by_train("times", bare("times", times, "ms"), np.float64)
+        signed = None
+        if values is not None:
+            signed, valued = _by_train("values", bare("values", values), np.float32)
+            if valued != counts:
+                raise ProblemError("values: must have the lengths of the trains, one value a spike")
+            _finite_values(signed)
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        if stop is None:
+            # What is not finite is refused below, by its place.
+            stop = float(max(number("start", start, "ms"), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
+        return cls._of_own(flat, offsets, start, stop, signed)
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    def __iter__(self) -> Iterator[NDArray[np.float64]]:
+        return (self[n] for n in range(len(self)))
+
+    def __getitem__(self, train: int) -> NDArray[np.float64]:
+        """Return the times of one train, ms."""
+        if isinstance(train, bool) or not isinstance(train, int | np.integer):
+            raise ProblemError(f"trains[{shown(train)}]: choose one train by its number, several by select")
+        n = nth("train", train, len(self))
+        return self.times[self.offsets[n] : self.offsets[n + 1]]
+
+    def __add__(self, other: SpikeTrains) -> SpikeTrains:
+        """Return the spikes of both, train by train in order of time; the window holds both windows.
+
+        Raises
+        ------
+        ProblemError : another number of trains, or only one of the two is signed
+        """
+        if not isinstance(other, SpikeTrains):
+            return NotImplemented
+        if len(self) != len(other):
+            raise ProblemError(f"{len(self)} trains and {len(other)}: only equally many are merged")
+        if self.signed != other.signed:
+            raise ProblemError("signed and unsigned trains: only alike ones are merged; see split_by_sign")
+        times = np.concatenate([self.times, other.times])
+        train = np.concatenate(
+            [np.repeat(np.arange(len(self)), self.counts), np.repeat(np.arange(len(self)), other.counts)]
+        )
+        order = np.lexsort((times, train))
+        values = None
+        if self.values is not None and other.values is not None:
+            values = np.concatenate([self.values, other.values])[order]
+        offsets = self.offsets + other.offsets
+        return self._of_own(times[order], offsets, min(self.start, other.start), max(self.stop, other.stop), values)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Spikes by train."""
+        return np.diff(self.offsets)
+
+    @property
+    def signed(self) -> bool:
+        """Whether spikes carry a signed value."""
+        return self.values is not None
+
+    def split_by_sign(self) -> SpikeTrains:
+        """Return all ON trains (value above 0), then all OFF trains; unsigned trains come back as they are."""
+        return self._from_parts(_core.split_by_sign(self._parts()))
+
+    def between(self, start: float, stop: float) -> SpikeTrains:
+        """Return the spikes of ``start <= t < stop`` (ms), with that window; times stay as they are."""
+        start, stop = window("ms", start, stop)
+        return self._where((self.times >= start) & (self.times < stop), start, stop)
+
+    def select(self, trains: ArrayLike) -> SpikeTrains:
+        """Return the named trains, in the order given.
+
+        Parameters
+        ----------
+        trains : int or bool array
+            Numbers of trains, or a mask over all of them.
+
+        Raises
+        ------
+        ProblemError : a number outside the trains
+        """
+        try:
+            chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
+        except ValueError as error:
+            raise ProblemError(f"trains: {error}") from None
+        if chosen.dtype == bool:
+            if chosen.shape != (len(self),):
+                raise ProblemError(f"mask has shape {chosen.shape}: must be ({len(self)},)")
+            chosen = np.flatnonzero(chosen)
+        numbers = column("trains", chosen, np.int64).tolist()
+        outside = [n for n in numbers if not 0 <= n < len(self)]
+        if outside:
+            raise ProblemError(f"train {outside[0]}: there are trains 0 to {len(self) - 1}")
+        values = None
+        if self.values is not None:
+            values = [self.values[self.offsets[n] : self.offsets[n + 1]] for n in numbers]
+        return SpikeTrains.from_lists([self[n] for n in numbers], self.start, self.stop, values)
+
+    def delayed(self, delays_ms: ArrayLike) -> SpikeTrains:
+        """Return every train once at each delay: what a learner needs to choose among delays.
+
+        Parameters
+        ----------
+        delays_ms : float64, shape (delays,), ms, 0 or more, ascending
+
+        Returns
+        -------
+        SpikeTrains
+            First all trains at the first delay, then all at the second: train `n` at delay `d` is number
+            ``d * len(trains) + n``, so ``weights.reshape(delays, trains)`` has the weights by delay and train. The
+            window ends later by the longest delay.
+
+        Raises
+        ------
+        ProblemError : delays that are negative, not finite or do not ascend
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[1.0], [4.0]], stop=5.0)
+        >>> list(trains.delayed([0.0, 2.5]))
+        [array([1.]), array([4.]), array([3.5]), array([6.5])]
+        """
+        delays = floats("delays_ms", delays_ms, "ms")
+        wrong = np.flatnonzero(~(np.isfinite(delays) & (delays >= 0)))
+        if len(wrong):
+            raise ProblemError(f"delays_ms[{wrong[0]}] is {delays[wrong[0]]}: must be 0 or more and finite")
+        if not len(delays) or (np.diff(delays) <= 0).any():
+            raise ProblemError("delays_ms: must ascend, one delay or more")
+        times = np.add.outer(delays, self.times).reshape(-1)
+        offsets = np.add.outer(np.arange(len(delays)) * len(self.times), self.offsets[:-1]).reshape(-1)
+        values = None if self.values is None else np.tile(self.values, len(delays))
+        ends = np.append(offsets, len(times))
+        return self._of_own(times, ends, self.start, self.stop + delays[-1], values)
+
+    def _where(self, keep: NDArray[np.bool_], start: float, stop: float) -> SpikeTrains:
+        offsets = np.concatenate([[0], np.cumsum(keep)])[self.offsets]
+        values = None if self.values is None else self.values[keep]
+        return self._of_own(self.times[keep], offsets, start, stop, values)
+
+    def to_numpy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return times (ms) and train numbers of all spikes, by train."""
+        return self.times.copy(), np.repeat(np.arange(len(self)), self.counts)
+
+    def to_neo(self) -> list[Any]:
+        """Return one ``neo.SpikeTrain`` a train; signed values become the array annotation ``value``.
+
+        Raises
+        ------
+        ImportError : neo is not installed (``pip install taxel[neo]``)
+        """
+        from neo import SpikeTrain  # noqa: PLC0415  heavy, and an extra
+
+        trains = []
+        for n in range(len(self)):
+            notes = {}
+            if self.values is not None:
+                notes = {"array_annotations": {"value": self.values[self.offsets[n] : self.offsets[n + 1]]}}
+            trains.append(SpikeTrain(self[n], units="ms", t_start=self.start, t_stop=self.stop, **notes))
+        return trains
+
+    @classmethod
+    def from_neo(cls, trains: Sequence[Any]) -> SpikeTrains:
+        """Build spike trains from ``neo.SpikeTrain`` objects of any time unit.
+
+        The window is the widest of theirs.
+        """
+        try:
+            foreign = next(([train] for train in trains if not hasattr(train, "rescale")), [])
+        except TypeError:
+            foreign = [trains]
+        if foreign:
+            raise ProblemError(f"trains: {shown(foreign[0])} must be a neo.SpikeTrain")
+        if not len(trains):
+            return cls.from_lists([])
+        times = [np.asarray(t.rescale("ms").magnitude, np.float64) for t in trains]
+        start = min(float(t.t_start.rescale("ms").magnitude) for t in trains)
+        stop = max(float(t.t_stop.rescale("ms").magnitude) for t in trains)
+        values = None
+        if all("value" in t.array_annotations for t in trains):
+            values = [np.asarray(t.array_annotations["value"], np.float32) for t in trains]
+        return cls.from_lists(times, start, stop, values)
+
+    def to_pandas(self) -> Any:
+        """Return a table with a row a spike, ``train t_ms``, and ``value`` of signed ones, train after train.
+
+        Raises
+        ------
+        ImportError : pandas is not installed (``pip install taxel[pandas]``)
+        """
+        import pandas  # noqa: PLC0415  heavy, and an extra
+
+        columns: dict[str, Any] = {"train": np.repeat(np.arange(len(self)), self.counts), "t_ms": self.times}
+        return pandas.DataFrame(columns if self.values is None else columns | {"value": self.values})
+
+    def to_nwb(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        begun: datetime | None = None,
+        description: str = "spike trains of taxel",
+        overwrite: bool = False,
+    ) -> Path:
+        """Write the trains to an NWB file, one unit a train; return its path.
+
+        The window becomes each unit's observation interval, signed values a column ``value``. NWB counts in seconds.
+
+        Parameters
+        ----------
+        path : path
+            NWB's own tools want it to end in ``.nwb``.
+        begun : datetime, optional
+            When time 0 was (NWB insists on it); now, where it is left out. Without a zone, local time.
+        description : str
+            What the session was (NWB insists on it).
+        overwrite : bool
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        ImportError : pynwb is not installed (``pip install taxel[nwb]``)
+        """
+        return write_nwb(
+            path,
+            list(self),
+            self._values(),
+            (self.start, self.stop),
+            begun=begun,
+            description=description,
+            overwrite=overwrite,
+        )
+
+    @classmethod
+    def from_nwb(
+        cls, path: str | os.PathLike[str], *, start: float | None = None, stop: float | None = None
+    ) -> SpikeTrains:
+        """Read the units of an NWB file, one train a unit in the order of its table.
+
+        Parameters
+        ----------
+        path : path
+        start, stop : float, ms, optional
+            The window. Left out: the widest of the units' observation intervals; where the file has none, from 0 or the
+            first spike before it to the last.
+
+        Raises
+        ------
+        FormatError : no NWB file, one without units, or units without spike times (names the file)
+        FileNotFoundError : no such file
+        ImportError : pynwb is not installed (``pip install taxel[nwb]``)
+        """
+        times, first, last, values = read_nwb(path, start, stop)
+        try:
+            return cls.from_lists(times, first, last, values)
+        except ProblemError as error:
+            # With the caller's own window the fault may be the window's, else it is the file's.
+            kind = FormatError if start is None and stop is None else ProblemError
+            raise kind(f"{path}: {error}") from None
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the trains to a .npz (``times offsets start stop``, and ``values`` of signed ones); return its path.
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        """
+        columns: dict[str, Any] = {"times": self.times, "offsets": self.offsets, "start": self.start, "stop": self.stop}
+        if self.values is not None:
+            columns["values"] = self.values
+        return write_whole(path, lambda file: np.savez_compressed(file, **columns), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> SpikeTrains:
+        """Read the trains from the file that `save` wrote.
+
+        Raises
+        ------
+        FormatError : another file (names it)
+        FileNotFoundError : no such file
+        """
+        place = checked_path("path", path)
+        try:
+            held = read_arrays(place, ("times", "offsets", "start", "stop", "values"))
+            return cls(held["times"], held["offsets"], held["start"].item(), held["stop"].item(), held.get("values"))
+        except (ValueError, KeyError, ProblemError, FormatError) as error:
+            raise FormatError(f"{place}: holds no spike trains: {shown(str(error))}") from None
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the raster: time (ms) to the right, trains upwards, OFF spikes in another colour."""
+        return draw("raster", self, ax)  # type: ignore[no-any-return]
+
+    def _repr_html_(self) -> str:
+        return draw("html", self)  # type: ignore[no-any-return]
+
+    def _values(self) -> list[NDArray[np.float32]] | None:
+        """Return the values train by train."""
+        return None if self.values is None else np.split(self.values, self.offsets[1:-1])
+
+    def _parts(self) -> tuple[Any, ...]:
+        return self.times, self.offsets, self.values, self.start, self.stop
+
+    @classmethod
+    def _from_parts(cls, parts: tuple[Any, ...]) -> SpikeTrains:
+        times, offsets, values, start, stop = parts
+        return cls._of_own(times, offsets, start, stop, values)
+
+    @classmethod
+    def _of_own(
+        cls,
+        times: NDArray[np.float64],
+        offsets: NDArray[np.int64],
+        start: float,
+        stop: float,
+        values: NDArray[np.float32] | None,
+    ) -> SpikeTrains:
+        """Build spike trains from new arrays of our own."""
+        return cls(frozen(times), frozen(offsets), start, stop, None if values is None else frozen(values))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, SpikeTrains):
+            return NotImplemented
+        values = (self.values is None) == (other.values is None) and (
+            self.values is None or np.array_equal(self.values, other.values)  # type: ignore[arg-type]
+        )
+        return (
+            values
+            and (self.start, self.stop) == (other.start, other.stop)
+            and np.array_equal(self.offsets, other.offsets)
+            and np.array_equal(self.times, other.times)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        signed = ", signed" if self.signed else ""
+        return f"SpikeTrains({len(self)} trains, {len(self.times)} spikes{signed}, {self.start:g} to {self.stop:g} ms)"
+
+
+def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[NDArray[Any], list[int]]:
+    """Return all entries, train after train, and how many each train has."""
+    entries = several(name, lists)
+    if not entries:
+        return np.empty(0, dtype), []
+    try:
+        # All trains at once: a thousand of one spike each cost little more than one of a thousand.
+        arrays = [np.asarray(entry, object) for entry in entries]
+        return column(name, np.concatenate(arrays), dtype), [len(array) for array in arrays]
+    except (ProblemError, TypeError, ValueError):
+        # One by one, which names the train.
+        each = [np.atleast_1d(np.asarray(entry, object)) for entry in entries]
+        columns = [column(f"{name}[{n}]", array, dtype) for n, array in enumerate(each)]
+        return np.concatenate(columns), [len(values) for values in columns]
+
+
+def _finite_values(values: NDArray[np.float32] | None) -> None:
+    """Refuse a value of a spike that is not finite, by its place."""
+    if values is not None and not np.isfinite(values).all():
+        k = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise ProblemError(f"values[{k}] is {values[k]}: must be finite")

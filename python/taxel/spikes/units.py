@@ -1,0 +1,28 @@
+"""Between ms, the unit of spikes and neurons, and us, the unit of the wire and of events: the only place."""
+
+from __future__ import annotations
+
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["to_ms", "to_us"]
+
+
+@overload
+def to_ms(us: float | np.integer[Any]) -> float: ...
+@overload
+def to_ms(us: NDArray[Any]) -> NDArray[np.float64]: ...
+def to_ms(us: Any) -> Any:
+    """Return times of the wire, us, as neurons count them, ms."""
+    return us / 1000.0
+
+
+@overload
+def to_us(ms: float) -> float: ...
+@overload
+def to_us(ms: NDArray[Any]) -> NDArray[np.float64]: ...
+def to_us(ms: Any) -> Any:
+    """Return times of neurons, ms, as the wire counts them, us; not rounded."""
+    return ms * 1000.0

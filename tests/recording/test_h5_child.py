@@ -1,0 +1,120 @@
+"""A .h5 is read by a child process, which is ended where the HDF5 library hangs or ends."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel._base import h5_file
+from taxel._base.h5_file import H5File
+from taxel._core import FormatError
+
+from .making import some_events
+
+#: Says that it runs, leaves its number, and listens to no signal that can be ignored.
+BLOCKED = """
+import pathlib, signal, sys, time
+for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    signal.signal(number, signal.SIG_IGN)
+pathlib.Path(sys.argv[1]).with_suffix(".pid").write_text(str(__import__("os").getpid()))
+print('{"running": true}', flush=True)
+while True:
+    time.sleep(60)
+"""
+
+
+def gone(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def test_a_library_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, child = tmp_path / "a.h5", tmp_path / "child.py"
+    taxel.convert(some_events(20), path)
+    child.write_text(BLOCKED)
+    monkeypatch.setattr(h5_file, "_CHILD", child)
+    monkeypatch.setattr(h5_file, "PATIENCE_S", 0.5)
+    with pytest.raises(FormatError, match=r"a\.h5: not a whole HDF5 file \(the library has read nothing for 0\.5 s\)"):
+        taxel.open(path)
+    assert gone(int((tmp_path / "a.pid").read_text()))
+
+
+def test_ctrl_c_ends_a_library_that_hangs(tmp_path: Path) -> None:
+    path, child = tmp_path / "a.h5", tmp_path / "child.py"
+    taxel.convert(some_events(20), path)
+    child.write_text(BLOCKED)
+    opening = "import sys, pathlib, taxel; from taxel._base import h5_file; "
+    opening += "h5_file._CHILD = pathlib.Path(sys.argv[2]); taxel.open(sys.argv[1])"
+    process = subprocess.Popen([sys.executable, "-c", opening, path, child], stderr=subprocess.PIPE)
+    written = tmp_path / "a.pid"
+    end = time.monotonic() + 120
+    while not (written.exists() and written.read_text()):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert b"KeyboardInterrupt" in said
+    assert gone(int(written.read_text()))
+
+
+def test_a_library_that_ends_is_said_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, child = tmp_path / "a.h5", tmp_path / "child.py"
+    taxel.convert(some_events(20), path)
+    child.write_text("import os, signal\nprint('{}', flush=True)\nos.kill(os.getpid(), signal.SIGSEGV)\n")
+    monkeypatch.setattr(h5_file, "_CHILD", child)
+    with pytest.raises(FormatError, match="reading it ended the library, status -11"):
+        taxel.open(path)
+
+
+def test_numbers_of_every_kind_come_through_shared_memory_as_they_are(tmp_path: Path) -> None:
+    import h5py
+
+    draw = np.random.default_rng(5)
+    sets = {
+        "large": draw.integers(0, 9, (3000, 700)).astype(np.int32), "one": np.array(7.5), "none": np.zeros((0, 3)),
+        "truth": draw.random(50) < 0.5, "big_end": np.arange(9, dtype=">i2"),
+    }  # fmt: skip
+    with h5py.File(tmp_path / "a.h5", "w") as h5:
+        for name, values in sets.items():
+            h5[name] = values
+        h5.create_dataset("packed", data=sets["large"], chunks=(7, 700), compression="gzip")
+        h5["word"] = "five"
+        h5.create_group("inner")
+        h5.attrs["taxel"] = 1
+        h5.attrs["name"] = "none"
+    with H5File(tmp_path / "a.h5") as file:
+        assert file.attributes == {"taxel": 1, "name": None}
+        for name, values in {**sets, "packed": sets["large"]}.items():
+            read = file.numbers(name)
+            assert (read.dtype, read.shape) == (values.dtype, values.shape)
+            np.testing.assert_array_equal(read, values)
+        assert file.text("word") == "five"
+        with pytest.raises(FormatError, match="data set inner: a group"):
+            file.numbers("inner")
+        with pytest.raises(FormatError, match="must be a text"):
+            file.text("one")
+
+
+def test_a_damaged_file_is_one_error_or_reads(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    taxel.convert(some_events(200), path)
+    whole, draw = path.read_bytes(), np.random.default_rng(3)
+    for _ in range(12):
+        data = bytearray(whole)
+        for place in draw.integers(8, len(data), 4):
+            data[place] = draw.integers(0, 256)
+        path.write_bytes(bytes(data[: int(draw.integers(len(data) // 2, len(data)))]))
+        with contextlib.suppress(FormatError):
+            taxel.open(path)
