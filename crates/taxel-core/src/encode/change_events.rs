@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::law::Law;
-use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled};
+use super::sampled::{BLOCK, Block, Next, Rule, Sampled};
 use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 pub use crate::board::Previous;
@@ -100,9 +100,8 @@ impl Law for ChangeEvents {
             previous: self.previous,
             rounding: self.rounding,
             last: vec![],
-            channels: Channels::new(array).len(),
         };
-        Ok(Box::new(Sampled::new(changes, array, self.period_ms, 0.0)?))
+        Ok(Box::new(Sampled::new(self, changes, array, self.period_ms)?))
     }
 }
 
@@ -113,14 +112,9 @@ struct Changes {
     previous: Previous,
     rounding: Rounding,
     last: Vec<Block>,
-    channels: usize,
 }
 
 impl Rule for Changes {
-    fn trains(&self) -> usize {
-        self.channels
-    }
-
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
         self.last = held.to_vec();
     }

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::law::Law;
 use super::power::power;
-use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled};
+use super::sampled::{BLOCK, Block, Next, Rule, Sampled};
 use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
@@ -143,8 +143,8 @@ impl Law for Fa1 {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let afferents = Afferents::new(self, Channels::new(array).len());
-        Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
+        let afferents = Afferents::new(self);
+        Ok(Box::new(Sampled::new(self, afferents, array, self.period_ms)?.steady()))
     }
 }
 
@@ -187,7 +187,6 @@ pub(super) struct Afferents {
     /// The largest value of a spike.
     most: f64,
     blocks: Vec<Afferent>,
-    channels: usize,
     /// Room for those that may fire at a sample.
     near: Vec<Near>,
     /// 5.1 of every tick up to the largest so far.
@@ -201,7 +200,7 @@ const SOUND: RangeInclusive<f64> = 1e-18..=1e18;
 const TICKS: usize = 65_536;
 
 impl Afferents {
-    pub(super) fn new(parameters: &Fa1, channels: usize) -> Self {
+    pub(super) fn new(parameters: &Fa1) -> Self {
         let (theta_0, t) = (parameters.baseline(), parameters.period_ms);
         let decay = match parameters.decay {
             Decay::Sample => parameters.b * theta_0,
@@ -218,7 +217,6 @@ impl Afferents {
             per_least: 1.0 / least,
             most: f64::from((1_u32 << parameters.bits) - 1),
             blocks: vec![],
-            channels,
             near: vec![],
             table: vec![],
         }
@@ -341,10 +339,6 @@ impl Afferent {
 }
 
 impl Rule for Afferents {
-    fn trains(&self) -> usize {
-        self.channels
-    }
-
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
         let blank =
             Afferent { base: [0.0; BLOCK], theta: [0.0; BLOCK], heard: [0.0; BLOCK], reach: [0.0; BLOCK], still: true };
@@ -420,7 +414,7 @@ mod tests {
 
     /// Equations 5.1 to 5.5 for every afferent at every sample, whatever it may do.
     fn plainly(parameters: &Fa1, pictures: &[Block]) -> Vec<Spike> {
-        let afferents = Afferents::new(parameters, BLOCK);
+        let afferents = Afferents::new(parameters);
         let Afferents { alpha, jump, decay, theta_0, .. } = afferents;
         let (mut base, mut rho, mut theta) = ([0.0; BLOCK], [0.0; BLOCK], [theta_0; BLOCK]);
         power(&pictures[0], alpha, &mut base);
@@ -473,7 +467,7 @@ mod tests {
                     held.map(|held| (held * size) as f32)
                 })
                 .collect();
-            let mut afferents = Afferents::new(&parameters, BLOCK);
+            let mut afferents = Afferents::new(&parameters);
             let mut out = vec![];
             afferents.begin(0, &pictures[..1], &mut out);
             for (t, picture) in (1..).zip(pictures[1..].chunks(1)) {

@@ -93,7 +93,7 @@ impl Law for Fa2 {
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let afferents = ByTaxel::new(self.filter(), self.firing(), self.range, Channels::new(array).len());
-        Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
+        Ok(Box::new(Sampled::new(self, afferents, array, self.period_ms)?.steady()))
     }
 
     fn signed(&self) -> bool {

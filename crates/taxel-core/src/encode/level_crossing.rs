@@ -116,7 +116,7 @@ impl Law for LevelCrossing {
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let crossings = Crossings::new(self, Channels::new(array).len())?;
-        Ok(Box::new(Sampled::new(crossings, array, self.period_ms, self.latency_ms())?))
+        Ok(Box::new(Sampled::new(self, crossings, array, self.period_ms)?))
     }
 
     fn trains(&self, array: &Array) -> usize {
@@ -333,10 +333,6 @@ impl Crossings {
 }
 
 impl Rule for Crossings {
-    fn trains(&self) -> usize {
-        self.states.len() + if self.tonic.is_some() { self.channels } else { 0 }
-    }
-
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         match &mut self.window {
             None => self.settle(t, held, out),

@@ -171,7 +171,7 @@ impl Law for Moments {
         };
         // Place by place: which taxels exist is in `loaded`.
         let places = Array { exists: None, ..array.clone() };
-        Ok(Box::new(Sampled::new(passing, &places, self.period_ms, 0.0)?))
+        Ok(Box::new(Sampled::new(self, passing, &places, self.period_ms)?))
     }
 
     fn trains(&self, _array: &Array) -> usize {
@@ -278,14 +278,6 @@ impl Passing {
 }
 
 impl Rule for Passing {
-    fn trains(&self) -> usize {
-        self.levels.len() * if self.every.is_some() { 3 } else { 2 }
-    }
-
-    fn signed(&self) -> bool {
-        false
-    }
-
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
             self.loaded.take_block(block, values);

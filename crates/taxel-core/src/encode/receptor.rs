@@ -197,14 +197,6 @@ fn share(scale: f64, pressure: f32) -> f64 {
 }
 
 impl<F: Filter> Rule for ByTaxel<F> {
-    fn trains(&self) -> usize {
-        self.channels
-    }
-
-    fn signed(&self) -> bool {
-        false
-    }
-
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
         debug_assert_eq!(held.len(), blocks(self.channels));
         let x: Vec<Lanes> = held.iter().map(|values| values.map(|value| share(self.scale, value))).collect();

@@ -3,6 +3,7 @@
 //! A [`Rule`] knows one encoder's law and nothing of events, pieces or order; [`Sampled`] brings it the samples. What
 //! did not change since the last sample is known by block, so a rule need not look at it.
 
+use super::law::Law;
 use super::periods::micros;
 use super::stream::Stream;
 use super::tare::Tare;
@@ -21,13 +22,6 @@ pub(super) type Block = [f32; BLOCK];
 ///
 /// Channels are the existing taxels in the order of their index. The last block is filled up with channels that always read 0 and must never spike.
 pub(super) trait Rule: Send + Clone + 'static {
-    fn trains(&self) -> usize;
-
-    /// Whether its spikes carry a signed value.
-    fn signed(&self) -> bool {
-        true
-    }
-
     /// The first sample: the encoder begins as if the array had always read it.
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
 
@@ -307,6 +301,8 @@ pub(super) struct Sampled<R> {
     rule: R,
     channels: Channels,
     period: i64,
+    trains: usize,
+    signed: bool,
     latency_ms: f64,
     held: Vec<Block>,
     changed: Vec<bool>,
@@ -339,14 +335,17 @@ impl Above {
 }
 
 impl<R: Rule> Sampled<R> {
-    pub(super) fn new(rule: R, array: &Array, period_ms: f64, latency_ms: f64) -> Result<Self> {
+    /// Samples for a rule, whose law says how many trains it has, whether they are signed, and how late they come.
+    pub(super) fn new(law: &impl Law, rule: R, array: &Array, period_ms: f64) -> Result<Self> {
         let channels = Channels::new(array);
         let n = blocks(channels.len());
         Ok(Self {
             rule,
             channels,
             period: micros("period_ms", period_ms)?,
-            latency_ms,
+            trains: law.trains(array),
+            signed: law.signed(),
+            latency_ms: law.latency_ms(),
             held: vec![[0.0; BLOCK]; n],
             changed: vec![false; n],
             quiet: true,
@@ -410,11 +409,11 @@ impl<R: Rule> Stream for Sampled<R> {
     }
 
     fn trains(&self) -> usize {
-        self.rule.trains()
+        self.trains
     }
 
     fn signed(&self) -> bool {
-        self.rule.signed()
+        self.signed
     }
 
     fn latency_ms(&self) -> f64 {

@@ -206,7 +206,7 @@ impl Law for Skin {
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let placed = self.afferents(array)?;
-        let sampled = Sampled::new(Afferents::new(self, array, &placed), array, self.period_ms, 0.0)?;
+        let sampled = Sampled::new(self, Afferents::new(self, array, &placed), array, self.period_ms)?;
         Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
     }
 
@@ -324,7 +324,6 @@ struct Afferents {
     fa1: Type<fa1::Afferents>,
     sa2: Type<ByTaxel<Slow>>,
     fa2: Type<ByTaxel<Fast>>,
-    trains: usize,
 }
 
 impl Afferents {
@@ -339,23 +338,14 @@ impl Afferents {
         let [a, b, c, d] = skin.types().map(|(kind, _, field)| (first(kind), of(kind), field));
         Self {
             sa1: Type::new(ByTaxel::new(sa1.filter(), sa1.firing(), range, a.1.len()), array, a.0, &a.1, a.2),
-            fa1: Type::new(fa1::Afferents::new(&fa1, b.1.len()), array, b.0, &b.1, b.2),
+            fa1: Type::new(fa1::Afferents::new(&fa1), array, b.0, &b.1, b.2),
             sa2: Type::new(ByTaxel::new(sa2.filter(), sa2.firing(), range, c.1.len()), array, c.0, &c.1, c.2),
             fa2: Type::new(ByTaxel::new(fa2.filter(), fa2.firing(), range, d.1.len()), array, d.0, &d.1, d.2),
-            trains: placed.len(),
         }
     }
 }
 
 impl Rule for Afferents {
-    fn trains(&self) -> usize {
-        self.trains
-    }
-
-    fn signed(&self) -> bool {
-        false
-    }
-
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         self.sa1.begin(t, held, out);
         self.fa1.begin(t, held, out);

@@ -175,7 +175,7 @@ macro_rules! slowly_adapting {
             fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
                 let channels = Channels::new(array).len();
                 let afferents = ByTaxel::new(self.filter(), self.firing(), self.range, channels);
-                let sampled = Sampled::new(afferents, array, self.period_ms, 0.0)?;
+                let sampled = Sampled::new(self, afferents, array, self.period_ms)?;
                 Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
             }
 

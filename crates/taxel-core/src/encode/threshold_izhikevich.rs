@@ -95,7 +95,7 @@ impl Law for ThresholdIzhikevich {
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         self.check()?;
         let pairs = Pairs::new(self, Channels::new(array).len());
-        Ok(Box::new(Sampled::new(pairs, array, self.period_ms, self.latency_ms())?))
+        Ok(Box::new(Sampled::new(self, pairs, array, self.period_ms)?))
     }
 
     fn trains(&self, array: &Array) -> usize {
@@ -304,10 +304,6 @@ impl Pairs {
 }
 
 impl Rule for Pairs {
-    fn trains(&self) -> usize {
-        self.channels * self.levels.len()
-    }
-
     fn begin(&mut self, t: i64, held: &[Block], _out: &mut Vec<Spike>) {
         self.next = t;
         for falls in &mut self.falls {
@@ -317,7 +313,7 @@ impl Rule for Pairs {
             self.hear(channel, held[channel / BLOCK][channel % BLOCK]);
         }
         // Lanes beyond the last train receive no input and stay at rest.
-        let used = self.trains() % LANES;
+        let used = self.channels * self.levels.len() % LANES;
         if used > 0
             && let Some(last) = self.falls.last_mut()
         {
