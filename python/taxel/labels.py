@@ -139,7 +139,7 @@ def ahead_us(row: Label, recording: Path, clock: Clock | None, table: Path) -> i
             f"{table}: {row.label} at {row.t_us} us and {row.host_ns} ns is of another run than "
             f"{recording}: board's and host's time do not fit together"
         )
-    return round(turns) * TURN_US
+    return int(round(turns) * TURN_US)
 
 
 def beside(recording: str | os.PathLike[str]) -> Path:

@@ -136,17 +136,17 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 
 
 class Told(NamedTuple):
-    """What each taxel did, and what is known to be held; int64, shape (rows, columns)."""
+    """What each taxel did, and what is known to be held; whole numbers, shape (rows, columns)."""
 
     activity: NDArray[np.int64]
     """Events."""
     moved: NDArray[np.int64]
     """Events that go the way of the taxel's event before."""
-    values: NDArray[np.int64] | None = None
+    values: NDArray[np.signedinteger] | None = None
     """How many different intensities its events showed: 0, 1, or 2 and more; None where events have none."""
-    least: NDArray[np.int64] | None = None
+    least: NDArray[np.signedinteger] | None = None
     """The least that it is known to have held, ticks; -1 where it was not heard of."""
-    greatest: NDArray[np.int64] | None = None
+    greatest: NDArray[np.signedinteger] | None = None
     """The greatest, likewise."""
 
 
