@@ -34,13 +34,15 @@ STEPS = {
     "to .npz": "taxel.convert(taxel.open(path).between(0, 1e5), folder + '/copy.npz', overwrite=True)",
 }
 MEASURED = """
-import resource, sys, time
+import pathlib, sys, time
 import taxel
+taxel.open
 path, folder = sys.argv[1:]
 cpu, wall = time.process_time(), time.perf_counter()
 {step}
-use = resource.getrusage(resource.RUSAGE_SELF)
-print(time.process_time() - cpu, time.perf_counter() - wall, use.ru_maxrss / 1024)
+done = time.process_time() - cpu, time.perf_counter() - wall
+peak = pathlib.Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0]
+print(*done, int(peak) / 1024)
 """
 
 

@@ -1,6 +1,6 @@
 """Reads a .h5 in a process of its own, run by its path (`taxel._base.h5_file`): it knows nothing of taxel.
 
-It answers in lines of JSON on its standard output. First that it runs, then what the file holds; then, for each order
+It answers in lines of JSON on its standard output: first that it runs, then what the file holds; then, for each order
 on its standard input, a line for each piece that it has read into the shared memory, and one when it is done.
 """
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from taxel._core import ProblemError
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
 
-__all__ = ["between"]
+__all__ = ["Apart", "between"]
 
 
 def between(of: Contents, start: float, stop: float) -> Contents:
@@ -36,14 +37,30 @@ def between(of: Contents, start: float, stop: float) -> Contents:
     )
 
 
+class Apart(Mapping[str, Contents]):
+    """Hold the names of sources of which a part by one clock says nothing, as each has its own."""
+
+    def __init__(self, path: Path, names: Iterable[str]) -> None:
+        self._path, self._names = path, tuple(names)
+
+    def __getitem__(self, name: str) -> Contents:
+        raise ProblemError(
+            f"{self._path}: a slice by one clock, and its sources ({', '.join(self._names)}) have each its own; say "
+            "on_clock(name) before between"
+        )
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
 def _sources(of: Contents, start: float, stop: float) -> Mapping[str, Contents]:
     """Return the same part of all sources of a file, which have one clock only where they were put on it."""
     sources = of.sources
     if len(sources) > 1 and of.clock_of is None:
-        raise ProblemError(
-            f"{of.path}: a slice by one clock, and its sources ({', '.join(sources)}) have each its own; say "
-            "on_clock(name) before between"
-        )
+        return Apart(of.path, sources)
     parts: dict[str, Contents] = {}
     for name, one in sources.items():
         parts[name] = between(one.but(sources={}), start, stop).but(sources=parts)

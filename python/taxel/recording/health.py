@@ -142,11 +142,11 @@ class Told(NamedTuple):
     """Events."""
     moved: NDArray[np.int64]
     """Events that go the way of the taxel's event before."""
-    values: NDArray[np.integer[Any]] | None = None
+    values: NDArray[np.signedinteger] | None = None
     """How many different intensities its events showed: 0, 1, or 2 and more; None where events have none."""
-    least: NDArray[np.integer[Any]] | None = None
+    least: NDArray[np.signedinteger] | None = None
     """The least that it is known to have held, ticks; -1 where it was not heard of."""
-    greatest: NDArray[np.integer[Any]] | None = None
+    greatest: NDArray[np.signedinteger] | None = None
     """The greatest, likewise."""
 
 

@@ -34,13 +34,13 @@ def on_clock(of: Contents, name: str) -> Contents:
     ------
     ProblemError : no such source, one without arrival times, or a part by another clock
     """
+    if of.is_slice and of.clock_of is None:
+        raise ProblemError(f"{of.path}: a slice by its own clock; say on_clock({name!r}) before between")
     sources = of.sources or {of.label: of}
     if name not in (*sources, HOST):
         raise ProblemError(f"{of.path}: has no clock {name!r}; there are {', '.join((*sources, HOST))}")
     if of.clock_of is not None:
         raise ProblemError(f"{of.path}: is on the clock of {of.clock_of} already")
-    if of.is_slice:
-        raise ProblemError(f"{of.path}: a slice by its own clock; say on_clock({name!r}) before between")
     to = None if name == HOST else _clock(sources[name])
     moved: dict[str, Contents] = {}
     for label, one in sources.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.between import between
+from taxel.recording.between import Apart, between
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
 from taxel.recording.kinds import kind_of_file, verdict_of
@@ -373,7 +373,9 @@ class Recording:
 def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:
     """Return the same contents with further notes."""
 
-    def sources() -> dict[str, Contents]:
+    def sources() -> Mapping[str, Contents]:
+        if isinstance(of.sources, Apart):
+            return of.sources
         every = dict(of.sources)
         if of.label in every:
             every[of.label] = every[of.label].but(notes=once(lambda: of.notes + more), sources=every)
