@@ -1,4 +1,4 @@
-"""A neuron in continuous time, simulated apart from the package: potentials summed by kernels, crossings bracketed.
+"""A neuron in continuous time, simulated apart from the package: kernels are summed, crossings bracketed.
 
 Slow and plain. An input counts from its own time on and an output spike takes effect at its own time. An input within
 1e-6 ms of the end of a refractory time counts as at it; nothing else is rounded.

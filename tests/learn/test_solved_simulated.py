@@ -14,7 +14,7 @@ from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX
 
 #: Further problems are tried by `pytest -m slow`.
-QUICK, ALL = 25, 2000
+QUICK, ALL = 6, 2000
 
 
 def before_targets(seed):
