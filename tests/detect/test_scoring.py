@@ -14,7 +14,7 @@ TIMES = st.lists(st.integers(-(10**6), 10**6), max_size=12)
 
 
 def some() -> taxel.Detections:
-    return taxel.Detections(["b", "a", "b"], [3000, 1000, 2000], [3400, 1200, 2100], [0.5, 1.5, math.nan])
+    return taxel.Detections(["b", "a", "b"], [3000, 1000, 2000], [3400, 1200, 2100], [0.5, 1.5, None])
 
 
 def brute_force(found: list[int], truth: list[int], window: int) -> tuple[int, int]:
