@@ -1,6 +1,6 @@
 //! Simulated touch: what a ball on foam does to the taxels beneath, frame by frame.
 //!
-//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], [`trajectory`]), pushed back by a law that is tabulated once
+//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], [`trajectory`], [`track`]), pushed back by a law that is tabulated once
 //! ([`push`]). The foam under them has one of two models, which a scene chooses: `layer`, foam bonded to the
 //! board, for any bodies ([`bonded`]); `columns`, independent columns whose pressure the layer smooths, for one ball that
 //! moves straight up and down on foam that hardly widens (Poisson ratio up to 0.1): there it lies within a few per cent
@@ -25,6 +25,7 @@ pub mod sensor;
 pub mod shape;
 pub mod stage;
 pub mod touch;
+pub mod track;
 mod trajectory;
 mod waves;
 
@@ -33,7 +34,7 @@ pub use body::{Along, Body, Ending, Material, Move, Press};
 pub use bonded::Bonded;
 pub use foam::Foam;
 pub use footprint::Footprint;
-pub use motion::{Motion, Track};
+pub use motion::Motion;
 pub use narrow::Narrow;
 pub use push::Push;
 pub use scene::{Scene, Surface};
@@ -41,6 +42,7 @@ pub use sensor::{Sensor, Taxels};
 pub use shape::Shape;
 pub use stage::{Prepared, Stage};
 pub use touch::{Contact, TouchKind};
+pub use track::Track;
 
 /// Refuses a value of a scene that lies outside its range; `place` names its owner.
 fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range: Range) -> Result<()> {

@@ -1,6 +1,8 @@
 //! Events or frames to spikes, live or whole: the same spikes either way.
 
+mod blocks;
 mod bracket;
+mod channels;
 mod fields;
 mod law;
 mod loaded;

@@ -10,15 +10,17 @@ mod kernel;
 mod model;
 mod points;
 mod population;
+mod rounding;
 mod running;
 mod streaming;
 mod threshold;
 
 pub(crate) use crossing::peak;
 pub use kernel::{Kernel, KernelSum, Shape, Step};
-pub(crate) use model::{AT_EDGE, rounding_ms};
+pub(crate) use model::AT_EDGE;
 pub use model::{AfterSpike, FirstThreshold, Neuron, Time};
 pub(crate) use points::{Grid, MOST_LAID_OUT, Place, check_points, points_between};
 pub use population::Weight;
+pub(crate) use rounding::rounding_ms;
 pub use streaming::NeuronStream;
 pub use threshold::OutputSpike;

@@ -10,6 +10,7 @@ use super::layer::{base_stress, surface_compliance};
 use super::waves::Waves;
 use crate::{Array, Result, Stop};
 
+mod cell;
 mod descent;
 mod plan;
 mod spread;
@@ -17,6 +18,7 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
+pub use cell::Cell;
 use descent::{Descent, Plane};
 use plan::Plan;
 pub use plan::{check_cells, most_cells};
@@ -28,17 +30,6 @@ use sweep::{Influence, Sweep};
 pub const MOST_SWEPT: usize = 600;
 /// Sweeps and iterations end here at the latest; what a frame misses, the next one, which begins there, catches up.
 const MOST_TURNS: usize = 400;
-
-/// A cell that a body may touch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cell {
-    /// Column and row of the grid.
-    pub x: u32,
-    /// Row.
-    pub y: u32,
-    /// How far the body has sunk below the face of the layer at rest, mm; below 0 where it is still above.
-    pub sunk_mm: f64,
-}
 
 /// The layer over an array, and around it as far as its influence reaches.
 #[derive(Debug)]

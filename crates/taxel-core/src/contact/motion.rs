@@ -1,24 +1,10 @@
 //! A scene worked out: each body's trajectory at even steps, and all touches.
 
+use super::track::{MOST_STEPS, Track, too_many};
 use super::trajectory::Trajectory;
 use super::{Bonded, Contact, Narrow, Push, Scene, Surface};
 use crate::spikes::us;
 use crate::{Array, Error, Result, Stop};
-
-/// The most steps of a scene: 16 minutes in quarters of a frame of 5208 Hz, and 320 MB for each body.
-pub(super) const MOST_STEPS: usize = 20_000_000;
-/// A body's trajectory, sampled at even steps.
-#[derive(Debug, Clone, Default)]
-pub struct Track {
-    /// Where its middle is, mm right of the first taxel.
-    pub x_mm: Vec<f32>,
-    /// Where, mm below the first taxel.
-    pub y_mm: Vec<f32>,
-    /// Depth of its lowest point below the foam's face, mm; negative above it.
-    pub depth_mm: Vec<f32>,
-    /// Force on the foam, N.
-    pub force_n: Vec<f32>,
-}
 
 /// A scene, worked out.
 #[derive(Debug, Clone, Default)]
@@ -123,8 +109,4 @@ fn check_step(scene: &Scene, step_us: f64) -> Result<()> {
     }
     let least_us = us(scene.least_ms());
     if least_us / step_us > MOST_STEPS as f64 { Err(too_many(step_us)) } else { Ok(()) }
-}
-
-pub(super) fn too_many(step_us: f64) -> Error {
-    Error::Scene(format!("step is {step_us} us: must be longer, the scene has more than {MOST_STEPS} of them"))
 }

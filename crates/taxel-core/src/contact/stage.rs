@@ -5,16 +5,12 @@ use crate::spikes::us;
 use crate::{Array, Error, Result, Stop};
 
 mod columns;
+mod groups;
 mod layer;
 
 use columns::Columns;
+use groups::GROUPS;
 use layer::Layer;
-
-/// The board's lines are read in four groups a frame, each as the touch then is.
-const GROUPS: usize = 4;
-
-/// The fabric answers so much later, us (thesis 4.4.1).
-const FABRIC_US: f64 = 50.0;
 
 /// The most frames whose forces are listed: 10 hours of the preset "5.2 kHz", and 800 MB.
 const MOST_FORCES: usize = 200_000_000;
@@ -219,12 +215,6 @@ impl Stage {
         self.taxels.convert(&self.clean, ticks);
         Ok(true)
     }
-}
-
-/// When a group of lines is read that shows the touch of `GROUPS` steps a frame.
-fn place(frame: usize, group: usize, frame_us: f64) -> f64 {
-    let lag = FABRIC_US / (frame_us / GROUPS as f64) - 0.5;
-    ((GROUPS * frame + group) as f64 - lag).max(0.0)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The trajectory of one body: it waits, falls, bounces, is pressed, rolls or slides, and is lifted.
 
 use super::body::{Along, Body, Ending, Move, Press};
-use super::motion::{MOST_STEPS, too_many};
+use super::track::{MOST_STEPS, too_many};
 use super::{Contact, Push, Scene, TouchKind, Track};
 use crate::spikes::us;
 use crate::{Array, Error, Result, Stop};

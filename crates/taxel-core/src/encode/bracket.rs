@@ -1,6 +1,6 @@
 //! Levels, and between which values a channel crosses none of them, so that most channels need no closer look.
 
-use super::sampled::{BLOCK, Block};
+use super::blocks::{BLOCK, Block};
 use crate::{Result, problem};
 
 /// For each channel the values `low <= value < high` that change nothing.

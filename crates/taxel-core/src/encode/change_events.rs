@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::{BLOCK, Block, Next};
 use super::law::Law;
-use super::sampled::{BLOCK, Block, Next, Rule, Sampled};
+use super::sampled::{Rule, Sampled};
 use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 pub use crate::board::Previous;

@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::{BLOCK, Block, Next, blocks};
+use super::channels::Channels;
 use super::law::Law;
 use super::loaded::Loaded;
-use super::sampled::{BLOCK, Block, Channels, Next, Source, blocks};
+use super::sampled::Source;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};

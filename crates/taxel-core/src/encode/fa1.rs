@@ -16,9 +16,10 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::{BLOCK, Block, Next};
 use super::law::Law;
 use super::power::power;
-use super::sampled::{BLOCK, Block, Next, Rule, Sampled};
+use super::sampled::{Rule, Sampled};
 use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;

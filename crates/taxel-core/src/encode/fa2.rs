@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::BLOCK;
+use super::channels::Channels;
 use super::law::Law;
 use super::receptor::{ByTaxel, Filter, Firing, Lanes, LowPass};
-use super::sampled::{BLOCK, Channels, Sampled};
+use super::sampled::Sampled;
 use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;

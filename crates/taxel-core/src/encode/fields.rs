@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::sampled::{BLOCK, Block, blocks};
+use super::blocks::{BLOCK, Block, blocks};
 use crate::vectors::{Instructions, OnLine, ROW, WIDE, Windows, by_width};
 
 /// Channels that a window of a small field holds: what weighs nothing need not come from memory for every sample.

@@ -1,6 +1,6 @@
 //! The interface of every encoder in the registry.
 
-use super::sampled::Channels;
+use super::channels::Channels;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::parameters::Described;

@@ -4,11 +4,13 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::{BLOCK, Block, Next, blocks};
 use super::bracket::{Bracket, check_levels};
+use super::channels::Channels;
 use super::law::Law;
 use super::periods::micros;
 use super::running_range::{RunningRange, Window};
-use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled, blocks};
+use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;

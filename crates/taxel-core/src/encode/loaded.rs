@@ -1,6 +1,6 @@
 //! Which taxels are loaded, and how many: what encoders without a place in them read.
 
-use super::sampled::{BLOCK, Block, blocks};
+use super::blocks::{BLOCK, Block, blocks};
 use super::tare::Tare;
 use crate::vectors::wide;
 use crate::{Array, Result, problem};

@@ -5,10 +5,11 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::{BLOCK, Block, Next};
 use super::law::Law;
 use super::loaded::Loaded;
 use super::periods::micros;
-use super::sampled::{BLOCK, Block, Next, Rule, Sampled};
+use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};

@@ -6,7 +6,7 @@
 
 use std::f64::consts::{LN_2, SQRT_2};
 
-use super::sampled::{BLOCK, Block};
+use super::blocks::{BLOCK, Block};
 
 /// Added and taken away again, it rounds to a whole number.
 const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52

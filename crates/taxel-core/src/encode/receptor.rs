@@ -8,7 +8,8 @@
 //! the threshold was reached is found on a straight line as well, and what the spike leaves behind decays from there. So
 //! rates do not depend on the sampling period as long as it is short beside the filter.
 
-use super::sampled::{BLOCK, Block, Next, Rule, blocks};
+use super::blocks::{BLOCK, Block, Next, blocks};
+use super::sampled::Rule;
 use crate::Spike;
 use crate::spikes::ms;
 

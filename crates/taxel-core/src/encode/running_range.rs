@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::blocks::{BLOCK, Block};
 use super::periods::micros;
-use super::sampled::{BLOCK, Block};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};

@@ -4,6 +4,8 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
+use super::blocks::{BLOCK, Block, Next, blocks};
+use super::channels::Channels;
 use super::fa1::{self, Decay, Fa1};
 use super::fa2::{Fa2, Fast};
 use super::fields::Fields;
@@ -11,7 +13,7 @@ use super::law::Law;
 use super::receptor::ByTaxel;
 use super::sa1::Sa1;
 use super::sa2::Sa2;
-use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled, blocks};
+use super::sampled::{Rule, Sampled};
 use super::slow::Slow;
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;

@@ -66,9 +66,10 @@ impl Filter for Slow {
 /// Declares a slowly adapting afferent: its words, its name, and the defaults of what differs.
 macro_rules! slowly_adapting {
     ($(#[$about:meta])* $Kind:ident, threshold: $threshold:expr, onset: $onset:expr, loss: $loss:expr) => {
+        use super::channels::Channels;
         use super::law::Law;
         use super::receptor::{ByTaxel, Firing};
-        use super::sampled::{Channels, Sampled};
+        use super::sampled::Sampled;
         use super::slow::Slow;
         use super::stream::Stream;
         use super::tare::Tare;

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kernel::{Kernel, Shape};
 use super::points::{Grid, MOST_LAID_OUT, check_points, points_between};
+use super::rounding::rounding_ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};
@@ -81,18 +82,9 @@ pub struct Neuron {
 /// An input so near an end of a refractory time counts as at it, ms: trained neurons fire within 1e-6 ms of their targets, and
 /// inputs at whole ms often lie just there.
 pub(crate) const AT_EDGE: f64 = 1e-6;
-/// Rounding of a time that is the sum of others, on the very edge of a refractory time, ms, and in neighbouring numbers: from
-/// some 20 minutes on these lie farther apart.
-const ROUNDING_MS: f64 = 1e-9;
-const ROUNDINGS: f64 = 4.0;
 /// How far below the threshold a potential may end and still count as reaching it, mV where `theta_0` is 0.3 mV and in
 /// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
 const TOUCH: f64 = 1e-12;
-
-/// How far apart two sums of times may lie at `t` and count as equal, ms.
-pub(crate) fn rounding_ms(t: f64) -> f64 {
-    (ROUNDINGS * f64::EPSILON * t.abs()).max(ROUNDING_MS)
-}
 
 /// What is left at `t` of a rise of `plus` mV that set in `recovering` ms ago, mV (6.8).
 ///

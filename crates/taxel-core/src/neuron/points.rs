@@ -4,7 +4,7 @@
 //! be off. So the state of a neuron and the ages of its inputs are both reckoned from the number of a step, never from the
 //! difference of two rounded times.
 
-use super::model::rounding_ms;
+use super::rounding::rounding_ms;
 use crate::{Result, problem};
 
 /// So many points are laid out at most (some GB), and so many stepped through (some ten seconds).

@@ -1,6 +1,7 @@
 //! The threshold after a spike, and the spike that crossed it.
 
-use super::model::{FirstThreshold, Neuron, left_of_rise, rounding_ms};
+use super::model::{FirstThreshold, Neuron, left_of_rise};
+use super::rounding::rounding_ms;
 
 /// A spike of the neuron.
 #[derive(Debug, Clone, Copy, PartialEq)]

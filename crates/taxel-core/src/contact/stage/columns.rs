@@ -1,7 +1,7 @@
 //! One ball that moves straight up and down on columns, as the taxels sense it.
 
 use super::super::{Footprint, Scene, Shape, Taxels, Track};
-use super::{GROUPS, place};
+use super::groups::{GROUPS, place};
 use crate::{Array, Result};
 
 /// The ball's track, where its force arrives, and which taxels it can reach, by group of lines.

@@ -3,7 +3,7 @@
 use super::super::bonded::MOST_SWEPT;
 use super::super::push::Sinking;
 use super::super::{Bonded, Motion, Scene, Shape, Taxels};
-use super::{GROUPS, place};
+use super::groups::{GROUPS, place};
 use crate::{Array, Result, Stop};
 
 /// Stress that no taxel senses, MPa: a millionth of a newton on it, a hundred-thousandth of what the thesis could detect.

@@ -1,0 +1,134 @@
+//! The existing taxels of an array as the channels of an encoder, which of them a picture changes, and which events they take.
+
+use super::blocks::{BLOCK, Block, Next};
+use crate::vectors::wide;
+use crate::{Array, EventsView, Result, problem};
+
+/// Times beyond this, us (36 000 years), are refused, so that no sum of times can overflow.
+pub(super) const FARTHEST: u64 = 1 << 60;
+
+wide! {
+    /// Takes blocks of a picture where they differ from those held.
+    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool], next: &mut Next) -> Result<()> {
+        /// All exponent bits: infinite or not a number.
+        const NOT_FINITE: u32 = 0x7f80_0000;
+        for ((new, held), changed) in new.iter().zip(held).zip(changed) {
+            next.fetch();
+            let (mut other, mut bad) = (0, 0);
+            for (new, held) in new.iter().zip(held.iter()) {
+                other |= new.to_bits() ^ held.to_bits();
+                bad |= u32::from(new.to_bits() & NOT_FINITE == NOT_FINITE);
+            }
+            if bad != 0 {
+                let bad = new.iter().find(|v| !v.is_finite()).unwrap_or(&f32::NAN);
+                return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
+            }
+            if other != 0 {
+                *held = *new;
+                *changed = true;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Which taxels are channels.
+#[derive(Clone)]
+pub(super) struct Channels {
+    rows: u16,
+    columns: u16,
+    name: String,
+    /// The place of each channel in a picture; `None` where every place is a channel.
+    places: Option<Vec<u32>>,
+    /// The channel of each place, [`NONE`] where no taxel exists; `None` as above.
+    of_place: Option<Vec<u32>>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Channels {
+    pub(super) fn new(array: &Array) -> Self {
+        let (mut places, mut of_place) = (None, None);
+        if let Some(exists) = &array.exists {
+            let there: Vec<u32> = (0..).zip(exists).filter(|&(_, &e)| e).map(|(place, _)| place).collect();
+            let mut channels = vec![NONE; exists.len()];
+            for (channel, &place) in (0..).zip(&there) {
+                channels[place as usize] = channel;
+            }
+            (places, of_place) = (Some(there), Some(channels));
+        }
+        Self { rows: array.rows, columns: array.columns, name: array.name.clone(), places, of_place }
+    }
+
+    /// How many taxels exist.
+    pub(super) fn len(&self) -> usize {
+        self.places.as_ref().map_or(self.grid(), Vec::len)
+    }
+
+    fn grid(&self) -> usize {
+        usize::from(self.rows) * usize::from(self.columns)
+    }
+
+    /// The place of a column and a row.
+    pub(super) fn place(&self, x: u16, y: u16) -> usize {
+        usize::from(y) * usize::from(self.columns) + usize::from(x)
+    }
+
+    /// The channel of a place; `None` where no taxel exists.
+    pub(super) fn of_place(&self, place: usize) -> Option<usize> {
+        match &self.of_place {
+            None => Some(place),
+            Some(of) => (of[place] != NONE).then_some(of[place] as usize),
+        }
+    }
+
+    /// Copies a picture into blocks and marks those that changed.
+    pub(super) fn load(
+        &self,
+        t: i64,
+        values: &[f32],
+        held: &mut [Block],
+        changed: &mut [bool],
+        next: &mut Next,
+    ) -> Result<()> {
+        if values.len() != self.grid() {
+            let (rows, columns) = (self.rows, self.columns);
+            return Err(problem!("frame at {t} us: {} values, must be {rows} x {columns}", values.len()));
+        }
+        let Some(places) = &self.places else {
+            let (whole, rest) = values.as_chunks::<BLOCK>();
+            take(t, whole, held, changed, next)?;
+            if !rest.is_empty() {
+                let mut new = [0.0; BLOCK];
+                new[..rest.len()].copy_from_slice(rest);
+                take(t, &[new], &mut held[whole.len()..], &mut changed[whole.len()..], next)?;
+            }
+            return Ok(());
+        };
+        for (block, places) in places.chunks(BLOCK).enumerate() {
+            let mut new = [0.0; BLOCK];
+            for (value, &place) in new.iter_mut().zip(places) {
+                *value = values[place as usize];
+            }
+            take(t, &[new], &mut held[block..], &mut changed[block..], next)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses events of another sensor, or columns that make no sense.
+    pub(super) fn check(&self, events: EventsView<'_>) -> Result<()> {
+        let (rows, columns) = (events.array.rows, events.array.columns);
+        if (rows, columns) != (self.rows, self.columns) {
+            let (name, wanted) = (&self.name, (self.rows, self.columns));
+            return Err(problem!(
+                "events of {rows} x {columns} taxels: the encoder was begun for {name}, {} x {}",
+                wanted.0,
+                wanted.1
+            ));
+        }
+        if let Some(&t) = events.t.iter().find(|t| t.unsigned_abs() > FARTHEST) {
+            return Err(problem!("event at {t} us: lies too far from 0"));
+        }
+        events.check()
+    }
+}
