@@ -104,7 +104,7 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
         (("info", "WALK", "--array", "6 by 6"), "--array 6 by 6: must be rows x columns, as 64x64, or with the pitch"),
         (("convert", "WALK", "nowhere/a.csv"), "nowhere: no such folder"),
         (("convert", "WALK", "a.mcap", "--compression", "gzip"), "compression is 'gzip'"),
-        (("convert", "WALK", "a.csv", "--frames", "-3"), "rate_hz is -3.0"),
+        (("convert", "WALK", "a.csv", "--frames", "-3"), "frames_hz is -3.0"),
     ],
 )
 def test_wrong_input_ends_in_one_line_and_exit_code_2(
