@@ -69,7 +69,8 @@ class Detections(Columns):
     known : int64, shape (n,), us
         When it could first be said: the end of the frame in which the potential crosses.
     slope : float, shape (n,), mV/ms, optional
-        How steeply the potential rose above its threshold, as a measure of how sure; NaN where it is left out.
+        How steeply the potential rose above its threshold, as a measure of how sure; None for one that has none. Read
+        back as NaN, also where it is left out.
     said : int64, shape (n,), us, optional
         When it was said, by the host's clock less the estimated offset.
     repaired : bool, shape (n,), optional
@@ -104,12 +105,7 @@ class Detections(Columns):
         said: ArrayLike | None = None,
         repaired: ArrayLike | None = None,
     ) -> None:
-        if slope is not None:
-            slopes = column("slope", slope, np.float64)
-            if not np.isfinite(slopes).all():
-                k = int(np.flatnonzero(~np.isfinite(slopes))[0])
-                raise ProblemError(f"slope[{k}] is {slopes[k]}: must be finite; leave slope out where it is not known")
-        self._hold(label, t, known, slope, said, repaired)
+        self._hold(label, t, known, None if slope is None else _slopes(slope), said, repaired)
 
     @classmethod
     def _of(
@@ -362,3 +358,18 @@ class Detections(Columns):
             return "Detections(none)"
         counts = ", ".join(f"{name} {np.count_nonzero(self.label == name)}" for name in self.labels)
         return f"Detections({len(self)}: {counts}; {self.t.min()} to {self.t.max()} us)"
+
+
+def _slopes(slope: ArrayLike) -> NDArray[np.float64]:
+    """Return slopes given by a caller, finite each; None becomes NaN."""
+    if isinstance(slope, list | tuple):
+        none = np.array([one is None for one in slope], bool)
+        values = np.full(len(slope), np.nan)
+        values[~none] = column("slope", [one for one in slope if one is not None], np.float64)
+    else:
+        values, none = column("slope", slope, np.float64), np.zeros(np.shape(slope), bool)
+    wrong = np.flatnonzero(~np.isfinite(values) & ~none)
+    if len(wrong):
+        k = int(wrong[0])
+        raise ProblemError(f"slope[{k}] is {values[k]}: must be finite, or None where it is not known")
+    return values

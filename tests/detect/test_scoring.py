@@ -14,7 +14,7 @@ TIMES = st.lists(st.integers(-(10**6), 10**6), max_size=12)
 
 
 def some() -> taxel.Detections:
-    return taxel.Detections(["b", "a", "b"], [3000, 1000, 2000], [3400, 1200, 2100], [0.5, 1.5, math.nan])
+    return taxel.Detections(["b", "a", "b"], [3000, 1000, 2000], [3400, 1200, 2100], [0.5, 1.5, None])
 
 
 def brute_force(found: list[int], truth: list[int], window: int) -> tuple[int, int]:
@@ -129,7 +129,7 @@ def test_a_score_takes_detections_only(found: object) -> None:
 
 def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
     found = some()
-    with_said = taxel.Detections(found.label, found.t, found.known, found.slope, said=[9, 8, 7])
+    with_said = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], said=[9, 8, 7])
     for one in (found, with_said, found[:0]):
         assert taxel.Detections.from_numpy(one.to_numpy()) == one
         path = tmp_path / f"{len(list(tmp_path.iterdir()))}.csv"
@@ -144,7 +144,7 @@ def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
 
 def test_detections_come_back_from_neo() -> None:
     found = some()
-    with_said = taxel.Detections(found.label, found.t, found.known, found.slope, said=[9, 8, 7])
+    with_said = taxel.Detections(found.label, found.t, found.known, [0.5, 1.5, None], said=[9, 8, 7])
     for one in (found, with_said):
         event = one.to_neo()
         assert taxel.Detections.from_neo(event) == one

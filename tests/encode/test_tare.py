@@ -82,7 +82,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
         (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), "without intensities"),
         (lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])), "values must be finite"),
         (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must lie before stop|no event came"),
-        (Tare, "is taken"),
+        (Tare, "is measured"),
         (lambda: Tare.from_json(5), "must be JSON text"),
         (lambda: Tare.from_json("[1"), "tare: "),
         (lambda: Tare.from_json('{"rest": []}'), "tare: array is missing"),

@@ -57,7 +57,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
         "taxel-python",
         &[
             &["errors"],
-            &["enter", "thread_state", "convert", "parameters"],
+            &["enter", "instructions", "thread_state", "convert", "parameters"],
             &["threaded"],
             &["bridge"],
             &[

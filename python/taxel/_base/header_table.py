@@ -26,13 +26,13 @@ class HeaderTable:
         What errors call the file.
     header : tuple of str
         The names of its columns, without space around them; () of a table without a line.
-    rows : tuple of (int, tuple of str)
+    lines : tuple of (int, tuple of str)
         The line of each row, counted from 1, and its cells as they stand there; empty lines are no rows.
     """
 
     place: str
     header: tuple[str, ...]
-    rows: tuple[tuple[int, tuple[str, ...]], ...]
+    lines: tuple[tuple[int, tuple[str, ...]], ...]
 
     @classmethod
     def read(cls, place: str | Path, lines: Iterable[str]) -> HeaderTable:
@@ -46,8 +46,7 @@ class HeaderTable:
 
         Raises
         ------
-        FormatError : a column that stands there twice, a row of another length than the header, a quote that does not
-            close (names the line)
+        FormatError : a column that stands there twice, a quote that does not close (names the line)
 
         Examples
         --------
@@ -70,10 +69,22 @@ class HeaderTable:
         repeated = [name for name in header if name and header.count(name) > 1]
         if repeated:
             raise FormatError(f"{place}, line {found[0][0]}: column {shown(repeated[0])} stands there twice")
-        for line, row in found[1:]:
-            if len(row) != len(header):
-                raise FormatError(f"{place}, line {line}: {len(row)} cells, must have {len(header)}")
         return cls(str(place), header, tuple(found[1:]))
+
+    @property
+    def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
+        """The line of each row and its cells, as many as there are columns.
+
+        Read after the header was checked: a file of another kind is named by its first line.
+
+        Raises
+        ------
+        FormatError : a row of another length than the header (names the line)
+        """
+        for line, row in self.lines:
+            if len(row) != len(self.header):
+                raise FormatError(f"{self.place}, line {line}: {len(row)} cells, must have {len(self.header)}")
+        return self.lines
 
     def has(self, wanted: Sequence[str], others: Sequence[str] | None = None) -> None:
         """Check the names of the columns.
@@ -109,7 +120,7 @@ class HeaderTable:
 
 
 def text_of(path: Path) -> list[str]:
-    """Read the lines of a text in UTF-8, with or without its mark.
+    """Read the lines of a text in UTF-8, with or without its mark, each with its end: a quoted cell may contain one.
 
     Raises
     ------
@@ -117,6 +128,6 @@ def text_of(path: Path) -> list[str]:
     OSError : the file is not there, or cannot be read
     """
     try:
-        return path.read_bytes().decode("utf-8-sig").splitlines()
+        return path.read_bytes().decode("utf-8-sig").splitlines(keepends=True)
     except UnicodeDecodeError as error:
         raise FormatError(f"{path}: not a table of text: {error}") from None
