@@ -38,6 +38,11 @@ impl Error {
         move |source| Self::File { path: path.to_owned(), source }
     }
 
+    /// An error about the content of a file.
+    pub(crate) fn format(path: &Path, text: &str) -> Self {
+        taxel_core::Error::Format(format!("{}: {text}", path.display())).into()
+    }
+
     /// Names the address in an error of the operating system.
     pub fn socket(place: impl ToString) -> impl FnOnce(std::io::Error) -> Self {
         let place = place.to_string();

@@ -12,6 +12,7 @@ mod limits;
 mod lsa;
 mod mcap_reader;
 mod mcap_writer;
+mod metadata;
 mod output;
 mod picture;
 mod pictures;

@@ -149,12 +149,12 @@ fn wire_rows(version: u8, length: usize) -> usize {
     }
 }
 
+/// Offsets of datagrams, and their times, us.
+type CutOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
+
 /// Where datagrams begin into which bytes of version 1 are cut, and where the last one ends; the board's time of each, us.
 #[pyfunction]
-fn wire_cut<'py>(
-    py: Python<'py>,
-    data: PyReadonlyArray1<'_, u8>,
-) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>)> {
+fn wire_cut<'py>(py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResult<CutOut<'py>> {
     let data = slice("data", &data)?;
     let Cut { offsets, times } = enter(py, |_| Ok::<_, Error>(wire::cut(data)))?;
     Ok((array(py, offsets.into_iter().map(|at| at as i64).collect()), array(py, times)))

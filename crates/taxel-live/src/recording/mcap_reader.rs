@@ -5,6 +5,8 @@
 //! Where a record makes no sense the walk goes on at the next chunk that does; what lies between is counted.
 
 mod blocks;
+mod condition;
+mod message;
 mod remarks;
 mod walk;
 
@@ -14,7 +16,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mcap::records::Record;
-use serde::Serialize;
 use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Events, Stop, problem};
 
@@ -23,6 +24,8 @@ use super::{BoardChange, Change, Counts, Header, Samples, Topic, limits};
 use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
+pub use condition::{Ending, Rebuilt};
+pub use message::Message;
 pub use remarks::{Remarks, begin_with};
 use walk::Walk;
 
@@ -36,21 +39,6 @@ pub struct Reader {
     ending: Option<Ending>,
     ends: Arc<BTreeMap<String, Counts>>,
     rebuilt: Rebuilt,
-}
-
-/// How a recording ended, as it states.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Ending {
-    /// As planned, with what was lost.
-    Finished {
-        /// What was received and lost.
-        counts: Counts,
-        /// The writer's line about it.
-        verdict: String,
-    },
-    /// Writing failed: the operating system's error.
-    Stopped(String),
 }
 
 /// What reading some blocks leaves for the next: the file's own channels, where numbers have come to.
@@ -68,34 +56,6 @@ impl Place {
     pub fn kept(&self) -> Self {
         Self { bytes: vec![], topics: self.topics.clone(), ..*self }
     }
-}
-
-/// What had to be left out of a damaged file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Rebuilt {
-    /// Whether the file lacks its end: writing was killed, or the file was cut.
-    pub unfinished: bool,
-    /// Bytes at the end of the file that belong to a record which is not whole.
-    pub torn_bytes: u64,
-    /// Places where the walk lost its way and found it again.
-    pub gaps: u64,
-    /// Bytes skipped there.
-    pub skipped_bytes: u64,
-    /// Chunks left out because they state that they unpack to more than a chunk may.
-    pub large_chunks: u64,
-}
-
-/// One message as it stands in the file.
-#[derive(Debug, Clone, Copy)]
-pub struct Message<'a> {
-    /// Its channel.
-    pub topic: Topic,
-    /// Our arrival number, of datagrams.
-    pub number: u64,
-    /// The host's clock, ns since 1970.
-    pub at_ns: i64,
-    /// The content.
-    pub data: &'a [u8],
 }
 
 /// A recording's datagrams as they came, one after the other.
@@ -178,12 +138,12 @@ impl Reader {
         let blocks = Blocks { path: path.to_owned(), file, length, places: blocks };
         // The copy beside the datagrams' channel has a checksum, the others have not.
         let Some(header) = blocks.header()?.or(end).or(begin) else {
-            return Err(format(
+            return Err(Error::format(
                 path,
                 "an MCAP file without the header of a taxel recording (metadata record \"taxel\")",
             ));
         };
-        header.check().map_err(|error| format(path, &format!("header: {error}")))?;
+        header.check().map_err(|error| Error::format(path, &format!("header: {error}")))?;
         let (blocks, header, ends) = (Arc::new(blocks), Arc::new(header), Arc::new(ends));
         Ok(Self { blocks, header, source: 0, ending, ends, rebuilt })
     }
@@ -280,7 +240,7 @@ impl Reader {
                             *last = number;
                             *in_datagrams += data.len() as u64;
                             if *in_datagrams > most {
-                                wrong = Some(format(
+                                wrong = Some(Error::format(
                                     &self.blocks.path,
                                     &format!(
                                         "chunk at byte {}: the datagrams up to here unpack to more than {most} bytes \
@@ -407,11 +367,6 @@ fn unwrap(last: u64, low: u32) -> u64 {
     #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
     let step = i64::from(low.wrapping_sub(last as u32) as i32);
     last.checked_add_signed(step).unwrap_or(u64::from(low))
-}
-
-/// An error about the content of a file.
-fn format(path: &Path, said: &str) -> Error {
-    taxel_core::Error::Format(format!("{}: {said}", path.display())).into()
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! into chunks ([`chunk_writer`]) and writes those to the file ([`record_file`]).
 
 mod chunk_writer;
+mod queue;
 mod record_file;
 mod write_queue;
 
@@ -23,9 +24,6 @@ use crate::Result;
 use crate::locked::lock;
 use write_queue::{Plan, WriteQueue};
 
-/// A chunk is closed when it is this large, or when the queue is empty.
-const CHUNK_BYTES: usize = 1 << 20;
-
 /// How much may wait in memory when the disk stalls; then callers wait too (0.6 s of the sensor's worst case).
 const QUEUE_BYTES: usize = 64 << 20;
 
@@ -34,11 +32,6 @@ const BULK_BYTES: usize = 4 << 20;
 
 /// The largest datagram that UDP can carry.
 const DATAGRAM_BYTES: usize = 65_507;
-
-/// Name of the metadata record at the beginning of a recording.
-pub(super) const BEGIN: &str = "taxel";
-/// Name of the metadata record at its end.
-pub(super) const END: &str = "taxel.end";
 
 /// A recording being written; one may be fed from several threads.
 ///

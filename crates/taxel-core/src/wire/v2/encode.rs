@@ -63,12 +63,12 @@ pub fn encode(events: EventsView<'_>, held: Option<&[u16]>, promised: bool) -> R
         from_here.fill(NEVER);
     }
     let mut markers = events.markers.iter().peekable();
-    for (k, &t) in events.t.iter().enumerate() {
+    for (k, (&t, &earliest)) in events.t.iter().zip(&from_here).enumerate() {
         while let Some(marker) = markers.next_if(|marker| marker.t <= t) {
-            writer.flush(from_here[k]);
+            writer.flush(earliest);
             writer.marker(marker.t, marker.start);
         }
-        writer.event(k, from_here[k]);
+        writer.event(k, earliest);
     }
     writer.flush(from_here[events.t.len()]);
     for marker in markers {

@@ -6,7 +6,7 @@ use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 use taxel_core::wire::{self, Registers};
 
-use super::Message;
+use super::message::Message;
 use crate::recording::base64::unbase64;
 use crate::recording::{BoardChange, Counts, Note, Topic};
 

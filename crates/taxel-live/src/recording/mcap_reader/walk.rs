@@ -9,8 +9,8 @@ use mcap::records::{Record, op};
 use mcap::{MAGIC, parse_record};
 
 use super::blocks::{Block, texts_fit};
-use super::{Ending, Rebuilt, format};
-use crate::recording::mcap_writer::{BEGIN, END};
+use super::condition::{Ending, Rebuilt};
+use crate::recording::metadata::{BEGIN, END};
 use crate::recording::{Counts, Header, limits};
 use crate::{Error, Result};
 
@@ -65,10 +65,16 @@ impl<'a> Walk<'a> {
         }
         if MAGIC.starts_with(&start) {
             let n = start.len();
-            return Err(format(self.path, &format!("byte {n}: the file ends inside the MCAP magic, it holds nothing")));
+            return Err(Error::format(
+                self.path,
+                &format!("byte {n}: the file ends inside the MCAP magic, it holds nothing"),
+            ));
         }
         let hex: Vec<String> = start.iter().take(4).map(|b| format!("{b:02X}")).collect();
-        Err(format(self.path, &format!("byte 0: starts with {}, not with the MCAP magic (89 4D 43 41)", hex.join(" "))))
+        Err(Error::format(
+            self.path,
+            &format!("byte 0: starts with {}, not with the MCAP magic (89 4D 43 41)", hex.join(" ")),
+        ))
     }
 
     pub(super) fn records(&mut self) -> Result<()> {
@@ -100,7 +106,7 @@ impl<'a> Walk<'a> {
                     let most = limits::unpacked(self.length);
                     if self.unpacked > most {
                         let said = "bytes (1000 times the file and 256 MiB)";
-                        return Err(format(
+                        return Err(Error::format(
                             self.path,
                             &format!(
                                 "chunk at byte {at}: the chunks up to here say that they unpack to more than {most} {said}"

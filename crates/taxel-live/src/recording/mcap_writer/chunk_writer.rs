@@ -12,10 +12,13 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions};
 use serde_json::json;
 
+use super::queue::Queue;
 use super::record_file::RecordFile;
-use super::write_queue::Queue;
-use super::{BEGIN, CHUNK_BYTES, END};
+use crate::recording::metadata::{BEGIN, END};
 use crate::recording::{Compression, Counts, Header, OutputFile, Topic, now_ns};
+
+/// A chunk is closed when it is this large, or when the queue is empty.
+pub(super) const CHUNK_BYTES: usize = 1 << 20;
 
 /// Bytes of a message record besides its content.
 const MESSAGE_BYTES: usize = 31;

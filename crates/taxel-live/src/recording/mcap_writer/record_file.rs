@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use mcap::records::op;
 
-use super::END;
 use crate::recording::OutputFile;
+use crate::recording::metadata::END;
 
 /// The file behind a small buffer that, unlike the standard library's, is thrown away when a write failed.
 pub(super) struct RecordFile {

@@ -1,7 +1,7 @@
 //! Messages that wait in memory, and the thread that writes them, so that no recording thread waits for the disk.
 //!
 //! The thread empties the queue when it fills a chunk, at the latest every [`FLUSH_EVERY`]. On a busy machine it may get no
-//! processor for seconds, and a kill would lose all that waits for it. So a caller who finds the queue [`LATE`] writes it itself:
+//! processor for seconds, and a kill would lose all that waits for it. So a caller who finds the queue [late](Queue::is_late) writes it itself:
 //! a thread that has something to record has a processor to write it with. Only while the writing thread waits for the disk do
 //! callers go on without it, as long as there is room.
 
@@ -16,11 +16,11 @@ use std::time::Instant;
 use mcap::McapError;
 use taxel_core::problem;
 
-use super::CHUNK_BYTES;
-use super::chunk_writer::ChunkWriter;
+use super::chunk_writer::{CHUNK_BYTES, ChunkWriter};
+use super::queue::{Queue, Queued};
 use super::record_file::RecordFile;
 use crate::locked::lock;
-use crate::recording::{Compression, Counts, FLUSH_EVERY, Header, LATE, OutputFile, Topic};
+use crate::recording::{Compression, Counts, FLUSH_EVERY, Header, OutputFile, Topic};
 use crate::{Error, Result};
 
 /// How much may wait in memory for the clock of a recording whose file is not begun yet, bytes: heartbeats of a board of version 2
@@ -73,39 +73,6 @@ pub(super) struct Pending {
 struct WriteFailure {
     code: Option<i32>,
     text: String,
-}
-
-/// Messages in the order in which they came.
-#[derive(Default)]
-pub(super) struct Queue {
-    pub(super) messages: Vec<Queued>,
-    pub(super) bytes: Vec<u8>,
-    /// When the first of them came.
-    since: Option<Instant>,
-}
-
-/// A message whose content is the next `bytes` bytes of the queue.
-pub(super) struct Queued {
-    pub(super) channel: u16,
-    pub(super) number: u32,
-    pub(super) at_ns: u64,
-    pub(super) bytes: usize,
-}
-
-impl Queue {
-    fn is_empty(&self) -> bool {
-        self.messages.is_empty()
-    }
-
-    fn is_late(&self) -> bool {
-        self.since.is_some_and(|since| since.elapsed() >= LATE)
-    }
-
-    pub(super) fn clear(&mut self) {
-        self.messages.clear();
-        self.bytes.clear();
-        self.since = None;
-    }
 }
 
 impl WriteQueue {

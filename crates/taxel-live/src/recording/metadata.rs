@@ -1,0 +1,6 @@
+//! Names of a recording's metadata records, which the writer writes and the reader looks for.
+
+/// Name of the metadata record at the beginning of a recording.
+pub(super) const BEGIN: &str = "taxel";
+/// Name of the metadata record at its end.
+pub(super) const END: &str = "taxel.end";
