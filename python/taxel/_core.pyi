@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol, Self, final
+from typing import Any, Protocol, Self, final, type_check_only
 
 import numpy as np
 from numpy.typing import NDArray
@@ -529,6 +529,7 @@ class ConeXProblem:
 
 # panel: its server, what that asks of Python, and the files of its page by their names below crates/taxel-panel/web
 
+@type_check_only
 class PanelRequests(Protocol):
     def command(self, register: int, value: int) -> int: ...
     def channels(self) -> int: ...
