@@ -71,6 +71,8 @@ def copy(tmp_path: Path) -> Path:
     for room in ("formats", "learn"):
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    # Pages that studies name.
+    shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("_build", "pictures"))
     return tmp_path
 
 

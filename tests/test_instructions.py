@@ -18,7 +18,8 @@ from taxel import _core
 random = np.random.default_rng(5)
 t = np.sort(random.integers(0, 200_000, 5000)) // 100 * 100
 x, y = random.integers(0, 64, (2, 5000))
-events = taxel.Events(t, x, y, random.random(5000) < .5, intensity=random.integers(0, 800, 5000))
+more = {"intensity": random.integers(0, 800, 5000), "array": taxel.Array.thesis()}
+events = taxel.Events(t, x, y, random.random(5000) < .5, **more)
 data = taxel.wire.encode(events)
 again = taxel.wire.decode(data)
 spikes = taxel.encode.FA1().encode(events)

@@ -1013,6 +1013,8 @@ LEFT_OUT = {
     "taxel.live.Panel.listen": "begins a Live, which checks",
     "taxel.live.Bridge": "needs a wheel of its own; tried in tests/bridge",
     "taxel.live.Remote": "needs a wheel of its own; tried in tests/bridge",
+    "taxel.live.PanelClient": "connects to a panel; tried in tests/live/test_client.py",
+    "taxel.live.PanelClient.play": "asks a panel; tried in tests/live/test_client.py",
     "taxel.live.Viewer": "needs an extra and begins a process; tried in tests/live",
     "taxel.live.Viewing": "a result",
     "taxel.live.Viewer.wait": "waits",

@@ -81,10 +81,12 @@ class HeaderTable:
         ------
         FormatError : a row of another length than the header (names the line)
         """
-        for line, row in self.lines:
-            if len(row) != len(self.header):
-                raise FormatError(f"{self.place}, line {line}: {len(row)} cells, must have {len(self.header)}")
-        return self.lines
+        return tuple((line, self._row(line, cells)) for line, cells in self.lines)
+
+    def _row(self, line: int, cells: tuple[str, ...]) -> tuple[str, ...]:
+        if len(cells) != len(self.header):
+            raise FormatError(f"{self.place}, line {line}: {len(cells)} cells, must have {len(self.header)}")
+        return cells
 
     def has(self, wanted: Sequence[str], others: Sequence[str] | None = None) -> None:
         """Check the names of the columns.
@@ -115,8 +117,8 @@ class HeaderTable:
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:
         """Give the line of each row, and its cells by the names of their columns."""
-        for line, cells in self.rows:
-            yield line, dict(zip(self.header, cells, strict=True))
+        for line, cells in self.lines:
+            yield line, dict(zip(self.header, self._row(line, cells), strict=True))
 
 
 def text_of(path: Path) -> list[str]:

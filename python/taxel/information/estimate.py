@@ -340,14 +340,15 @@ def _redrawn(random: np.random.Generator, units: int, count: int) -> NDArray[np.
     found = np.zeros((count, units), np.int64)
     for row in found:
         left = units
-        for first in range(0, units, _DRAWN):
-            some = chance[first : first + _DRAWN]
+        for first in range(0, units - 2, _DRAWN):
+            some = chance[first : min(first + _DRAWN, units - 2)]
             open_before = np.cumprod(np.concatenate([[1.0], 1 - some]))
-            last = first + _DRAWN >= units
-            each = some * open_before[:-1]
-            pieces = random.multinomial(left, each if last else np.append(each, open_before[-1]))
-            row[first : first + len(some)] = pieces[: len(some)]
-            left -= int(pieces[: len(some)].sum())
+            pieces = random.multinomial(left, np.append(some * open_before[:-1], open_before[-1]))
+            row[first : first + len(some)] = pieces[:-1]
+            left = int(pieces[-1])
+        # At a chance of one half a binomial is drawn the other way round, so the last two units take it as it was.
+        row[-2] = random.binomial(left, chance[-2])
+        row[-1] = left - row[-2]
     return found
 
 
