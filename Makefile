@@ -33,7 +33,6 @@ $(VENV)/.installed: pyproject.toml studies/pyproject.toml | check
 	@$(PYTHON) -m venv $(VENV)
 	@$(wanted) > $(VENV)/wanted.txt
 	@$(install) "maturin>=1.16,<2" -r $(VENV)/wanted.txt
-	@$(install) --no-deps --editable studies
 	@touch $@
 
 # One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-dist.
@@ -53,11 +52,13 @@ develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VE
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building: minutes the first time"
 	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.package.taxel-core.codegen-units=256'
+	@$(install) --no-deps --editable studies
 	@rm -f $(VENV)/.released && touch $@
 
 $(VENV)/.released: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building as it is released: minutes"
 	@$(develop)
+	@$(install) --no-deps --editable studies
 	@rm -f $(VENV)/.built && touch $@
 
 # Outside the workspace: 260 crates for those only who have more than one computer.
