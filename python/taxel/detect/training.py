@@ -223,6 +223,7 @@ def train(
 
     Examples
     --------
+    >>> from taxel import Frames
     >>> from taxel.encode import LevelCrossing
     >>> frames = Frames([[[v]] for v in (0.0, 0.0, 9.0, 9.0, 0.0, 0.0)], range(0, 60_000, 10_000), unit="N")
     >>> recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})

@@ -45,6 +45,7 @@ class Columns:
 
     Examples
     --------
+    >>> from taxel.wire import Decoder
     >>> columns, decoder = Columns(1000), Decoder()
     >>> decoder.push_into(columns, bytes.fromhex("c000050304 c000060304"))
     Events(1 events, 500 to 500 us, 64 x 64 taxels, no intensities)

@@ -32,6 +32,7 @@ def encode(events: Events) -> bytes:
 
     Examples
     --------
+    >>> from taxel import Array
     >>> events = Events([500], [3], [4], [True], array=Array(64, 64), intensity=[40])
     >>> encode(events).hex(" ", 5)
     'c000050304 e000280304'
