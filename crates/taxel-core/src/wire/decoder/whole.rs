@@ -7,7 +7,7 @@ use crate::{Marker, Result, Stop, problem};
 
 impl Decoder {
     /// As [`Self::push`], into columns that the caller lays out, from their first row on; where these bytes are the `last`,
-    /// the stream ends behind them. Gives the markers too. With [`Pairing::Taxel`] all events wait for [`Self::finish`].
+    /// the stream ends behind them. Gives the markers too. With `Pairing::Taxel` all events wait for [`Self::finish`].
     ///
     /// # Errors
     ///
