@@ -1,7 +1,7 @@
 //! Datagrams to detections, as they come.
 //!
-//! The stages are *receive*, *decode*, *record* and *read out* ([`stages`]). One thread runs them all, and gives them to another
-//! one before it calls a sink ([`threads`]). While something is recorded, which a disk may hold up, receiving ([`crate::capture`]),
+//! The stages are *receive*, *decode*, *record* and *read out* (`stages`). One thread runs them all, and gives them to another
+//! one before it calls a sink (`threads`). While something is recorded, which a disk may hold up, receiving ([`crate::capture`]),
 //! decoding with recording, and reading out have a thread each; reading out also has one where it is slower than what comes. The
 //! queues between them are bounded, and what finds no room is counted where it was lost. Viewers get copies ([`Live::counters`],
 //! [`Live::picture`]) and cannot slow the pipeline.

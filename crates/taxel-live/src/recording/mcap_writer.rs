@@ -89,7 +89,7 @@ impl Writer {
         Self { track, header: header.clone() }
     }
 
-    /// Begins the file of [`Writer::plan`] with what is added to decoded times, us ([`Header::origin_us`]); returns whether that
+    /// Begins the file of `Writer::plan` with what is added to decoded times, us ([`Header::origin_us`]); returns whether that
     /// came in time, before it was begun with the header's.
     ///
     /// # Errors
