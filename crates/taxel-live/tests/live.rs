@@ -395,8 +395,8 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_w
     let neuron = Neuron { tau: 0.5, refractory: 15.0, ..Neuron::default() };
     let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, weights });
     let path = Scratch::new("tare.mcap");
-    let ear = Listener::Taring(1_000_000, Box::new(readout.clone()));
-    let live = Live::start(ANY, options(Some(&path)), ear, vec![]).expect("a port");
+    let listener = Listener::Taring(1_000_000, Box::new(readout.clone()));
+    let live = Live::start(ANY, options(Some(&path)), listener, vec![]).expect("a port");
     wait_for(&live, |live| live.counters().taring);
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");

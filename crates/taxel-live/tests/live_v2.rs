@@ -144,8 +144,8 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), one)].into(),
     };
-    let ear = Listener::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
-    let live = Live::start(ANY, options(&array, registers, None), ear, vec![]).expect("a port");
+    let listener = Listener::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
+    let live = Live::start(ANY, options(&array, registers, None), listener, vec![]).expect("a port");
     let mut board = Board::new(registers, &array).expect("sound registers");
     let socket = UdpSocket::bind(ANY).expect("a socket");
     // Two frames with events, then nothing but heartbeats; the potential crosses some ms later.

@@ -24,7 +24,7 @@ pub enum Read {
     Changes,
     /// Changes are missing; these are the values held after the gap, and the number of events up to there.
     Held(Vec<u16>, u64),
-    /// No more changes for now.
+    /// No further change is indexed yet.
     End,
 }
 
