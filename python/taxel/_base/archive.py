@@ -71,7 +71,7 @@ def read_arrays(
             return _arrays(Path(path), file, tuple(wanted), frozenset(texts))
         except (FormatError, MemoryError):
             raise
-        # What numpy and zipfile raise on damage is no closed list: zlib.error, NotImplementedError, TokenError,
+        # NumPy and zipfile raise many kinds of errors on damage: zlib.error, NotImplementedError, TokenError,
         # struct.error, OSError where an archive says that it goes on before its beginning ...
         except Exception as error:
             said = str(error).split("\n", maxsplit=1)[0][:200] or type(error).__name__
