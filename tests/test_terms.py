@@ -54,6 +54,15 @@ def test_every_public_name_has_its_line() -> None:
     assert not said - known, f"docs/terms.md: {', '.join(sorted(said - known))} is no public name"
 
 
+def test_every_place_is_there() -> None:
+    """The last column names files and folders of `python/taxel`."""
+    rows = [line.split("|")[4] for line in NAMES.splitlines() if line.startswith("| `")]
+    roots = Path(taxel.__file__).parent, Path(__file__).parents[1]
+    places = {place for row in rows for place in re.findall(r"`([^`]+)`", row)}
+    gone = sorted(place for place in places if not any((root / place).exists() for root in roots))
+    assert not gone, f"docs/terms.md: {', '.join(gone)} is no file or folder of taxel or taxel_studies"
+
+
 def test_every_option_has_its_line() -> None:
     known, said = options(typer.main.get_command(app)), first_cells(OPTIONS)
     assert not known - said, f"docs/terms.md: add what {', '.join(sorted(known - said))} says"

@@ -7,7 +7,7 @@ import pytest
 
 from taxel import SpikeTrains
 from taxel_studies import stdp_touch
-from taxel_studies.stdp_touch import Heard
+from taxel_studies.stdp_touch import Play
 
 
 @pytest.fixture(scope="module")
@@ -20,9 +20,9 @@ def test_a_spike_belongs_to_the_touch_before_it_for_a_while():
     times = np.array([50.0, 99.8, 130.0, 290.0, 305.0, 310.0])
     np.testing.assert_allclose(stdp_touch.latencies(times, contacts), [-0.2, 5.0, np.inf])
     nothing = SpikeTrains.from_lists([[]], stop=600.0)
-    said = stdp_touch.judged(times, Heard(nothing, contacts, np.array([True, False, False])), 0.0)
+    said = stdp_touch.judged(times, Play(nothing, contacts, np.array([True, False, False])), 0.0)
     assert said == {"same": 1.0, "other": 0.5, "latency_ms": 2.4, "beside": 2}
-    late = stdp_touch.judged(times, Heard(nothing, contacts, np.array([True, False, True])), 200.0)
+    late = stdp_touch.judged(times, Play(nothing, contacts, np.array([True, False, True])), 200.0)
     assert (late["same"], late["other"], late["latency_ms"]) == (0.0, 1.0, 5.0)
 
 
