@@ -8,10 +8,11 @@ use super::statement::Parts;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// The objective is proven to lie within `tolerance` of its least value; what must be met is met, in continuous time by the
-    /// neuron itself, run on the patterns.
+    /// CONE-X: the weights meet all rows, and in continuous time the neuron, run on the patterns, fires at its targets alone;
+    /// `gap` bounds the objective. CONE-R, which has no rows that must be met: the objective is proven to lie within
+    /// `tolerance` of its least value.
     Solved,
-    /// No weights meet what must be met; a certificate proves it. (In 6.14 nothing must be.)
+    /// No weights meet all rows of CONE-X; a certificate proves it.
     Infeasible,
     /// Neither is known: the weights are the best so far.
     Stopped,

@@ -195,7 +195,7 @@ pub struct ConeXFit {
     pub margin: Margin,
     /// The margin that was asked for at last: smaller than the first where nobody fixed it and no weights keep that.
     pub asked: Margin,
-    /// Why a fit is stopped.
+    /// Why a fit is stopped, or why the objective of a solved one is not proven to lie within the tolerance.
     pub reason: Option<String>,
     /// The rows that bind, with their multipliers: a start for a similar problem.
     pub held: Vec<(Row, f64)>,
@@ -429,13 +429,13 @@ impl Exact {
         let nothing = NOTHING * self.objective.b * lifts.sum::<f64>();
         let known = gap <= self.tolerance || objective - least <= nothing;
         let unmet = self.unmet(&weights)?;
+        let status = if unmet.is_none() { Status::Solved } else { Status::Stopped };
         let open = || format!("the objective is only proven to lie within {gap:.1e} of its least value");
         let reason = match (cut_short, unmet.or_else(|| (!known).then(open))) {
             (Some(why), Some(what)) => Some(format!("{why}; {what}")),
             (_, what) => what,
         };
         let violation = largest([self.missed(&weights), self.worst(&weights), 0.0]);
-        let status = if reason.is_none() { Status::Solved } else { Status::Stopped };
         Ok(ConeXFit {
             margin: self.kept_margin(&weights),
             fit: Fit { status, weights, objective, parts, gap, rounds, engine },

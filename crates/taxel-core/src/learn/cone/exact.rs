@@ -6,7 +6,7 @@ use crate::learn::fit::Engine;
 use crate::learn::statement::{
     Margin, Objective, Parts, Peak, Row, Silence, Stated, Statement, Targets, exceeds, largest,
 };
-use crate::neuron::{AT_EDGE, Time};
+use crate::neuron::{AT_EDGE, Grid, Time};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -93,10 +93,10 @@ impl Exact {
         least.max(BROKEN_SHARE * weights.iter().map(|w| w.abs()).sum::<f64>())
     }
 
-    /// What these weights do not meet, with its pattern and time: silence with half its margin; in continuous time the spikes
-    /// of the neuron itself, run on the patterns; on the grid the target rows.
+    /// The first condition that these weights violate, with its pattern and time: silence with half its margin; the target
+    /// rows on the grid; the spikes of the neuron itself, run on the patterns.
     ///
-    /// On the grid the neuron is not run: without a margin it may fire where a silent row is met with equality.
+    /// On the grid without a margin the neuron is not run: it fires where a silent row holds with equality.
     pub(super) fn unmet(&self, weights: &[f64]) -> Result<Option<String>> {
         let unit = self.statement.unit;
         let worst = self.silence.broken(weights, KEPT_SHARE, self.rounding(weights)).into_iter();
@@ -104,29 +104,31 @@ impl Exact {
             let excess = excess * unit;
             return Ok(Some(format!("pattern {pattern}: silence is broken by {excess:.1e} mV at {t} ms")));
         }
-        if !self.is_grid() {
-            return self.misfire(weights);
-        }
         let misses = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         let worst = misses.enumerate().filter(|(_, miss)| exceeds(*miss, MET)).max_by(|a, b| a.1.total_cmp(&b.1));
-        Ok(worst.map(|(k, miss)| {
+        if let Some((k, miss)) = worst.filter(|_| self.is_grid()) {
             let ((pattern, target), t, miss) = (self.targets.names[k], self.targets.times[k], miss * unit);
-            format!("pattern {pattern}: target {target} ({t} ms) is missed by {miss:.1e} mV")
-        }))
+            return Ok(Some(format!("pattern {pattern}: target {target} ({t} ms) is missed by {miss:.1e} mV")));
+        }
+        if self.is_grid() && self.statement.margin.height == 0.0 { Ok(None) } else { self.misfire(weights) }
     }
 
-    /// Where the neuron itself, run on the patterns, does not fire at a target, or fires elsewhere.
+    /// The first target at which the neuron itself, run on the patterns, does not fire, or the first spike elsewhere. On the grid
+    /// a neuron fires at a target at the first point that is not before it.
     fn misfire(&self, weights: &[f64]) -> Result<Option<String>> {
         for (p, sheet) in self.statement.sheets.iter().enumerate() {
+            let grid = Grid::new(sheet.start, self.statement.neuron.step_ms);
+            let due = |&target: &f64| if self.is_grid() { grid.time(grid.place(target).from()) } else { target };
+            let wanted: Vec<f64> = sheet.targets.iter().map(due).collect();
             let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, sheet.start)?);
             for &(t, train) in sheet.inputs.iter().take_while(|input| input.0 <= sheet.end) {
                 stream.push(t, train, &mut fired)?;
             }
-            stream.advance(sheet.end, &mut fired);
-            let asked = sheet.targets.iter().map(Some).chain(std::iter::repeat(None));
+            stream.advance(largest(wanted.last().copied().into_iter().chain([sheet.end])), &mut fired);
+            let wanted = wanted.into_iter().map(Some).chain(std::iter::repeat(None));
             let fired = fired.iter().map(|spike| Some(spike.t)).chain(std::iter::repeat(None));
             let most = sheet.targets.len() + 1;
-            for (target, spike) in asked.zip(fired).take(most) {
+            for (target, spike) in wanted.zip(fired).take(most) {
                 let reason = match (target, spike) {
                     (Some(target), Some(t))
                         if (t - target).abs() <= AT_EDGE + ROUNDINGS * (target.next_up() - target) =>
