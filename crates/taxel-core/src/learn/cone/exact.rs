@@ -1,4 +1,4 @@
-//! The problem of 6.11 at one margin: what must be met, what is minimised, and how far weights are from meeting it.
+//! The problem of 6.11 at one margin: its rows, its objective, and by how much weights violate the rows.
 
 use std::sync::Arc;
 
@@ -12,17 +12,17 @@ use crate::{Result, Stop};
 
 /// How far a target may be missed, mV.
 pub(super) const MET: f64 = 1e-12;
-/// Silence counts as broken from this on, mV, and by this share of the sum of absolute weights: rounding of the sweep.
+/// Silence counts as violated from this on, mV, and from this share of the sum of absolute weights on: rounding of the sweep.
 const BROKEN: f64 = 1e-13;
 const BROKEN_SHARE: f64 = 2e-16;
 /// The share of the margin that weights must keep to count as a solution.
 const KEPT_SHARE: f64 = 0.5;
-/// A spike may lie so many neighbouring times beside its target.
+/// A spike at its target may differ from it by so many distances of neighbouring times.
 const ROUNDINGS: f64 = 4.0;
 /// Rounds end without a verdict after so many.
 pub(super) const MOST_ROUNDS: usize = 1000;
 
-/// A stated problem whose targets and silence must be met.
+/// A stated problem whose rows of targets and silence are hard constraints.
 #[derive(Debug, Clone)]
 pub(super) struct Exact {
     pub(super) statement: Statement,
@@ -82,7 +82,7 @@ impl Exact {
         self.silence.broken(weights, share, tolerance)
     }
 
-    /// By how much silence is broken at worst where it keeps what it must of the margin, mV; below 0 where it is kept.
+    /// The worst violation of silence with the share of the margin that a solution must keep, mV; negative where there is none.
     pub(super) fn worst(&self, weights: &[f64]) -> f64 {
         self.silence.worst(weights, KEPT_SHARE)
     }
@@ -116,18 +116,18 @@ impl Exact {
     /// The first target at which the neuron itself, run on the patterns, does not fire, or the first spike elsewhere. On the grid
     /// a neuron fires at a target at the first point that is not before it.
     fn misfire(&self, weights: &[f64]) -> Result<Option<String>> {
-        for (p, sheet) in self.statement.sheets.iter().enumerate() {
-            let grid = Grid::new(sheet.start, self.statement.neuron.step_ms);
+        for (p, example) in self.statement.examples.iter().enumerate() {
+            let grid = Grid::new(example.start, self.statement.neuron.step_ms);
             let due = |&target: &f64| if self.is_grid() { grid.time(grid.place(target).from()) } else { target };
-            let wanted: Vec<f64> = sheet.targets.iter().map(due).collect();
-            let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, sheet.start)?);
-            for &(t, train) in sheet.inputs.iter().take_while(|input| input.0 <= sheet.end) {
+            let wanted: Vec<f64> = example.targets.iter().map(due).collect();
+            let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, example.start)?);
+            for &(t, train) in example.inputs.iter().take_while(|input| input.0 <= example.end) {
                 stream.push(t, train, &mut fired)?;
             }
-            stream.advance(largest(wanted.last().copied().into_iter().chain([sheet.end])), &mut fired);
+            stream.advance(largest(wanted.last().copied().into_iter().chain([example.end])), &mut fired);
             let wanted = wanted.into_iter().map(Some).chain(std::iter::repeat(None));
             let fired = fired.iter().map(|spike| Some(spike.t)).chain(std::iter::repeat(None));
-            let most = sheet.targets.len() + 1;
+            let most = example.targets.len() + 1;
             for (target, spike) in wanted.zip(fired).take(most) {
                 let reason = match (target, spike) {
                     (Some(target), Some(t))

@@ -31,7 +31,7 @@ const STEPS: usize = 12;
 const ROUNDS: usize = 60;
 /// Steps of a round beyond its accuracy, where bounds far wider than what targets need ask for more.
 const FINER: usize = 3;
-/// Bounds beyond so many times the weights that targets need say nothing about the scale of the weights.
+/// Bounds wider than so many times the weights that targets need do not set the scale of the weights.
 const FAR: f64 = 30.0;
 
 /// Where to begin: weights of a similar fit, and its multipliers as shares of their range.

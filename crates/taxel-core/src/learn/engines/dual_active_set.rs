@@ -1,13 +1,13 @@
 //! The shortest weights under linear rows and bounds: the dual active set of Goldfarb and Idnani on a working set.
 //!
-//! `min |w|^2 / 2` under `a.w = value`, `a.w <= limit` and `lower <= w <= upper`. With multipliers u of the rows A that
-//! are held, `w = -A'u`, so everything happens in the Gram matrix `A A'` of the working set and the Cholesky factor of
-//! its active part. Each state is optimal for the rows that it holds; the dual objective only rises, hence it ends.
+//! `min |w|^2 / 2` under `a.w = value`, `a.w <= limit` and `lower <= w <= upper`. With multipliers u of the active
+//! rows A, `w = -A'u`, so all is computed in the Gram matrix `A A'` of the working set and the Cholesky factor of
+//! its active part. Each state is optimal for its active rows; the dual objective only rises, hence it ends.
 //!
-//! Goldfarb and Idnani (1983), Mathematical Programming 27:1, take in one violated row after another. Here all violated
+//! Goldfarb and Idnani (1983), Mathematical Programming 27:1, activate one violated row after another. Here all violated
 //! rows enter at once, and those whose multiplier would turn negative leave again, as long as that raises the dual
-//! objective; single steps do the rest, and decide what cannot be met. A new row that hardly differs from one that is held
-//! takes its place before all that.
+//! objective; single steps do the rest, and detect infeasibility. Before all that, a new row that hardly differs from an
+//! active one replaces it.
 
 mod certificate;
 mod entering;
@@ -25,7 +25,7 @@ use self::working_set::{Kind, Row};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, Stop, problem};
 
-/// Rows count as met within this, as they were stated or scaled to length 1, whichever asks for more.
+/// Rows count as satisfied within this, as they were stated or scaled to length 1, whichever asks for more.
 const TOLERANCE: f64 = 5e-13;
 /// Squared pivots at which a row counts as dependent: the next one where no proof comes of it.
 const DEPENDENT: [f64; 4] = [1e-16, 1e-20, 1e-24, 1e-28];
@@ -33,16 +33,16 @@ const DEPENDENT: [f64; 4] = [1e-16, 1e-20, 1e-24, 1e-28];
 const BLOCK: usize = 64;
 /// Rows that enter at once when each step must raise the dual.
 const FEW: usize = 32;
-/// Rows that enter for each that could still be held, beyond which each step must raise the dual.
+/// Beyond so many violated rows for each that could still be activated, each step must raise the dual.
 const CROWD: usize = 2;
-/// Candidates for single steps between two looks at all rows.
+/// Candidates for single steps between two evaluations of all rows.
 const QUEUE: usize = 16;
-/// Block exchanges in one call of `solve`, after which single steps go on.
+/// Block exchanges in one call of `solve`, after which single steps follow.
 const EXCHANGES: usize = 60;
-/// Looks at all rows in one call of `solve`, of each row and bound: each raises the dual, unless rounding is in the way.
+/// Evaluations of all rows in one call of `solve`, for each row and bound: each raises the dual, unless rounding prevents it.
 const MOST_ROUNDS: usize = 10;
-/// How many of them in a row may leave the dual below its best before they look where they step.
-const BOLD: usize = 3;
+/// How many exchanges in succession may leave the dual below its best before each must raise it.
+const MOST_FALLS: usize = 3;
 
 /// Names an inequality, in the order in which they were added; never given twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -59,12 +59,12 @@ impl RowId {
 /// How a call of [`DualActiveSet::solve`] ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
-    /// All rows and bounds are met, and no shorter weights do so.
+    /// The weights satisfy all rows and bounds, and no shorter weights do.
     Optimal,
     /// No weights within the bounds meet all rows; checked.
     Infeasible(Ray),
-    /// The caller asked to stop, or rows that double precision cannot tell from dependent ones are neither met nor
-    /// refuted; the weights are optimal for the rows that are held.
+    /// The caller requested a stop, or rows that double precision cannot tell from dependent ones are neither satisfied nor
+    /// refuted; the weights are optimal for the active rows.
     Stopped,
 }
 
@@ -73,12 +73,12 @@ pub enum Verdict {
 pub struct DualActiveSet {
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// By slot; slots of rows that were dropped are taken again.
+    /// By slot; slots of dropped rows are reused.
     rows: Vec<Row>,
     /// Coefficients by slot, `stride` numbers each.
     coefficients: Aligned,
     stride: usize,
-    /// Slots in use, ascending, and those free to be taken.
+    /// Slots in use, ascending, and free slots.
     live: Vec<usize>,
     free: Vec<usize>,
     /// Rows whose products are still to be computed.
@@ -98,7 +98,7 @@ pub struct DualActiveSet {
     equalities: Vec<usize>,
     inequalities: usize,
     dependent: usize,
-    /// Slots by synapse of the bounds that are held.
+    /// Slots by synapse of the bounds in the working set.
     bounds: Vec<[Option<usize>; 2]>,
 }
 
@@ -165,7 +165,7 @@ impl DualActiveSet {
         Ok(id)
     }
 
-    /// The weights, optimal for the rows that are held.
+    /// The weights, optimal for the active rows.
     #[must_use]
     pub fn weights(&self) -> &[f64] {
         &self.weights[..self.lower.len()]
@@ -177,7 +177,7 @@ impl DualActiveSet {
         self.stated(&self.multipliers)
     }
 
-    /// Takes every inequality that is not held out of the working set; gives what was taken out.
+    /// Removes the inactive inequalities from the working set; returns their names.
     pub fn drop_inactive(&mut self) -> Vec<RowId> {
         let mut dropped = Vec::new();
         for at in (0..self.live.len()).rev() {
@@ -230,8 +230,8 @@ impl DualActiveSet {
             }
         }
         self.extend_gram();
-        self.release();
-        self.take(&wanted);
+        self.deactivate_all();
+        self.activate(&wanted);
         for k in 0..self.active.len() {
             let slot = self.active[k];
             let u = match self.rows[slot].kind {
@@ -241,19 +241,19 @@ impl DualActiveSet {
             };
             self.multipliers[slot] = u * self.rows[slot].length;
         }
-        self.settle();
+        self.ascend();
         Ok(())
     }
 
-    /// Goes on from the rows that are held until all are met, or proven to be beyond reach.
+    /// Continues from the active rows until all rows are satisfied, or proven infeasible.
     ///
     /// # Errors
     ///
     /// None so far; a stop is a verdict.
     pub fn solve(&mut self, stop: Stop<'_>) -> Result<Verdict> {
         let fresh = self.extend_gram();
-        self.exchange(&fresh);
-        let (mut exchanges, mut bold) = (EXCHANGES, BOLD);
+        self.replace_similar(&fresh);
+        let (mut exchanges, mut falls_left) = (EXCHANGES, MOST_FALLS);
         let mut best: Option<(f64, Vec<usize>, Vec<f64>)> = None;
         let mut undecided: Vec<usize> = Vec::new();
         let mut rounds = MOST_ROUNDS * (self.live.len() + self.lower.len());
@@ -262,11 +262,11 @@ impl DualActiveSet {
                 return Ok(Verdict::Stopped);
             }
             rounds -= 1;
-            self.measure(false);
+            self.update_weights(false);
             let mut candidates = self.violated();
             candidates.retain(|c| !undecided.contains(&c.0));
             if candidates.is_empty() {
-                self.measure(true);
+                self.update_weights(true);
                 return Ok(if undecided.iter().any(|&slot| !self.is_met(slot)) {
                     Verdict::Stopped
                 } else {
@@ -281,29 +281,29 @@ impl DualActiveSet {
                 let slots: Vec<usize> = candidates.iter().map(|c| c.0).collect();
                 let (held, here) = (self.active.len(), self.dual(&self.weights));
                 if slots.len() > CROWD * self.lower.len().saturating_sub(held) {
-                    bold = 0;
+                    falls_left = 0;
                 }
-                if bold > 0 {
+                if falls_left > 0 {
                     if best.as_ref().is_none_or(|b| here < b.0) {
                         best = Some((here, self.active.clone(), self.multipliers.clone()));
-                        bold = BOLD;
+                        falls_left = MOST_FALLS;
                     } else {
-                        bold -= 1;
+                        falls_left -= 1;
                     }
-                    if bold == 0
+                    if falls_left == 0
                         && let Some((_, active, multipliers)) = best.take()
                     {
-                        self.release();
-                        self.hold(&active, &multipliers);
+                        self.deactivate_all();
+                        self.restore(&active, &multipliers);
                         continue;
                     }
                 }
-                self.take(&slots[..if bold > 0 { slots.len() } else { slots.len().min(FEW) }]);
+                self.activate(&slots[..if falls_left > 0 { slots.len() } else { slots.len().min(FEW) }]);
                 if self.active.len() > held {
-                    if bold > 0 {
-                        self.project();
+                    if falls_left > 0 {
+                        self.drop_negative();
                     } else {
-                        self.settle();
+                        self.ascend();
                     }
                     continue;
                 }
@@ -330,9 +330,9 @@ impl DualActiveSet {
                     if self.dependent + 1 < DEPENDENT.len() {
                         self.dependent += 1;
                         let (active, multipliers) = (self.active.clone(), self.multipliers.clone());
-                        self.release();
-                        self.hold(&active, &multipliers);
-                        self.settle();
+                        self.deactivate_all();
+                        self.restore(&active, &multipliers);
+                        self.ascend();
                     } else {
                         undecided.push(slot);
                     }

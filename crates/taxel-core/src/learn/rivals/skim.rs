@@ -15,7 +15,7 @@ use crate::parameters::Described;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// Rows that are laid out at once: few enough for the cache, many enough to be worth a reflection each.
+/// Rows of a block: few enough for the cache, many enough to amortise a reflection.
 const BLOCK: usize = 512;
 
 /// What compresses what comes out of a branch's kernel.
@@ -145,7 +145,7 @@ impl Normal {
 
     /// Adds rows, columns first, the wanted output as the last column, by Householder reflections of each column.
     ///
-    /// Squares of the entries are never formed, so half of the digits that normal equations lose are kept.
+    /// Squares of the entries are never formed, so that no digits are lost as by normal equations.
     fn add_rows(&mut self, block: &mut [Vec<f64>]) {
         let width = self.columns + 1;
         self.rows += block[0].len();
@@ -303,14 +303,14 @@ impl Skim {
         Ok(normal)
     }
 
-    /// The rows of one pattern as they stand in the problem, row after row: for tests and for looking at.
+    /// The rows of one pattern as they stand in the problem, row after row.
     ///
     /// # Errors
     ///
     /// `Problem` for parameters or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn rows(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::statement::check_heard(pattern)?;
+        crate::learn::statement::check_untargeted(pattern)?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {
             for row in 0..block[0].len() {
@@ -327,7 +327,7 @@ impl Skim {
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn output(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::statement::check_heard(pattern)?;
+        crate::learn::statement::check_untargeted(pattern)?;
         one_weight_a_train(weights, self.columns(pattern.len()))?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {

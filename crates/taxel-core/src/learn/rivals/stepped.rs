@@ -25,7 +25,7 @@ pub enum Current {
     },
 }
 
-/// What an output spike does to the potential. Three names, three neurons.
+/// The effect of an output spike on the potential.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reset {
@@ -37,7 +37,7 @@ pub enum Reset {
     Reset,
 }
 
-/// A leaky membrane that is looked at every `step_ms`; inputs keep their true times.
+/// A leaky membrane, compared with its threshold every `step_ms`; inputs keep their true times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SteppedNeuron {
@@ -200,7 +200,7 @@ impl SteppedNeuron {
         Kernels { tau, slow, fast, peak: peak_factor(slow, fast), twice }
     }
 
-    /// Lays a pattern out: inputs by time, each with what it brings at its first grid point.
+    /// Sorts the inputs of a pattern by time, each with its contribution at its first grid point.
     ///
     /// # Errors
     ///

@@ -5,7 +5,7 @@ use crate::learn::statement::{Norm, Point, Tangents};
 use crate::vectors::{add, dot};
 
 impl Lagrangian<'_> {
-    /// What the multipliers found prove.
+    /// The bound that the present multipliers prove.
     pub(super) fn bound(&mut self) -> f64 {
         self.multipliers();
         let pull = self.pull();
@@ -23,7 +23,7 @@ impl Lagrangian<'_> {
         self.problem.bound(self.objective, &at, self.most)
     }
 
-    /// What no weights at all prove: the subgradient of the norm that lies nearest to all other slopes there.
+    /// The bound from weights of 0, with the subgradient of the norm nearest to the sum of all other slopes there.
     pub(super) fn bound_at_zero(&self, zero: &Point) -> f64 {
         let (problem, o) = (self.problem, self.objective);
         let silent = problem.silent.len();

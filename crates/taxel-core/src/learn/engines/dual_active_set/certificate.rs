@@ -4,12 +4,12 @@ use super::kernels::add_rows;
 use super::working_set::Kind;
 use super::{DualActiveSet, RowId};
 
-/// Multipliers of the rows that are held, as they were stated (not scaled).
+/// Multipliers of the active rows, as they were stated (not scaled).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Multipliers {
     /// One an equality, in the order in which they were added; any sign.
     pub equalities: Vec<f64>,
-    /// Of the inequalities that are held, 0 or more; of all others it is 0.
+    /// Of the active inequalities, 0 or more; of all others it is 0.
     pub inequalities: Vec<(RowId, f64)>,
 }
 
@@ -41,7 +41,7 @@ impl DualActiveSet {
         out
     }
 
-    /// The ray as a proof, if it is one: bounds are left out, the box pays for that and for rounding.
+    /// The ray as a proof, if it is one: multipliers of bounds are left out, and the gap must exceed rounding.
     pub(super) fn proof(&self, by_slot: Vec<f64>) -> Option<Ray> {
         let bounds = |slot: usize| matches!(self.rows[slot].kind, Kind::Lower(_) | Kind::Upper(_));
         let slots: Vec<usize> = self.live.iter().copied().filter(|&s| by_slot[s] != 0.0 && !bounds(s)).collect();

@@ -10,11 +10,11 @@ const DOUBTFUL: f64 = 1e-5;
 const ALIKE: f64 = 0.999;
 
 impl DualActiveSet {
-    /// Holds fresh rows in the place of held ones that they hardly differ from.
+    /// Replaces active rows by fresh ones that hardly differ from them.
     ///
-    /// Cuts at a peak that moves a little from round to round would enter and leave by turns before they are told apart.
-    /// The dual may fall, but no row is lost by it: `solve` ends above where it began.
-    pub(super) fn exchange(&mut self, fresh: &[usize]) {
+    /// Cuts at a peak that moves a little from round to round would else enter and leave in turns. The dual may fall, but no
+    /// row is lost: `solve` ends above where it began.
+    pub(super) fn replace_similar(&mut self, fresh: &[usize]) {
         let mut entering = Vec::new();
         let mut leaves = vec![false; self.active.len()];
         for &slot in fresh.iter().filter(|slot| !self.is_equality(**slot)) {
@@ -30,9 +30,9 @@ impl DualActiveSet {
             return;
         }
         let leaving: Vec<usize> = (0..leaves.len()).filter(|&k| leaves[k]).collect();
-        self.leave(&leaving, None);
-        self.take(&entering);
-        self.project();
+        self.deactivate(&leaving, None);
+        self.activate(&entering);
+        self.drop_negative();
     }
 
     /// Products of a row with the active ones, in their order, to the end of the line.
@@ -45,8 +45,8 @@ impl DualActiveSet {
         out
     }
 
-    /// Holds these rows with multiplier 0, but not those that (nearly) depend on others.
-    pub(super) fn take(&mut self, slots: &[usize]) {
+    /// Activates these rows with multiplier 0, except those that (nearly) depend on others.
+    pub(super) fn activate(&mut self, slots: &[usize]) {
         for block in slots.chunks(BLOCK) {
             let block: Vec<usize> = block.iter().copied().filter(|&slot| self.place[slot].is_none()).collect();
             let stride = self.factor.padded();
@@ -69,9 +69,9 @@ impl DualActiveSet {
         }
     }
 
-    /// Holds these rows with their multipliers: in blocks, then one by one, with exact pivots, those that nearly depend.
-    pub(super) fn hold(&mut self, slots: &[usize], multipliers: &[f64]) {
-        self.take(slots);
+    /// Activates these rows with their multipliers: in blocks, then one by one, with exact pivots, those that nearly depend.
+    pub(super) fn restore(&mut self, slots: &[usize], multipliers: &[f64]) {
+        self.activate(slots);
         for &slot in slots {
             if self.place[slot].is_none() {
                 let mut d = self.products(slot);
@@ -118,9 +118,9 @@ impl DualActiveSet {
         (dot(&z, &z), r)
     }
 
-    /// One step of Goldfarb and Idnani: takes in a violated row, lets go of those that stand against it.
+    /// One step of Goldfarb and Idnani: activates a violated row, and deactivates rows whose multiplier reaches 0 on the way.
     ///
-    /// Gives a ray by slot where neither is possible.
+    /// Returns a ray by slot where neither is possible.
     pub(super) fn step(&mut self, slot: usize, sign: f64, mut violation: f64) -> Option<Vec<f64>> {
         let mut d = self.products(slot);
         self.factor.forward(&mut d);
@@ -158,7 +158,7 @@ impl DualActiveSet {
                 return None;
             };
             violation -= length * pivot;
-            self.leave(&[place], Some(&mut d));
+            self.deactivate(&[place], Some(&mut d));
         }
     }
 }

@@ -3,8 +3,8 @@
 use super::DualActiveSet;
 
 impl DualActiveSet {
-    /// Lets go of every row.
-    pub(super) fn release(&mut self) {
+    /// Deactivates every row.
+    pub(super) fn deactivate_all(&mut self) {
         for slot in std::mem::take(&mut self.active) {
             self.place[slot] = None;
             self.multipliers[slot] = 0.0;
@@ -12,8 +12,8 @@ impl DualActiveSet {
         self.factor.clear();
     }
 
-    /// Lets go of the rows at these places (ascending).
-    pub(super) fn leave(&mut self, places: &[usize], d: Option<&mut Vec<f64>>) {
+    /// Deactivates the rows at these places (ascending).
+    pub(super) fn deactivate(&mut self, places: &[usize], d: Option<&mut Vec<f64>>) {
         self.factor.remove(places, d);
         for &place in places {
             let slot = self.active[place];
@@ -27,8 +27,8 @@ impl DualActiveSet {
         }
     }
 
-    /// Finds an optimum of some of the active rows: lets go of all whose multiplier would turn negative, again and again.
-    pub(super) fn project(&mut self) {
+    /// Finds an optimum of some of the active rows: deactivates all whose multiplier would turn negative, again and again.
+    pub(super) fn drop_negative(&mut self) {
         loop {
             let optimum = self.factor.optimum();
             let negative = |&k: &usize| optimum[k] < 0.0 && !self.is_equality(self.active[k]);
@@ -39,12 +39,12 @@ impl DualActiveSet {
                 }
                 return;
             }
-            self.leave(&negative, None);
+            self.deactivate(&negative, None);
         }
     }
 
-    /// As `project`, but no further at a time than to where the first multiplier turns 0, so that the dual only rises.
-    pub(super) fn settle(&mut self) {
+    /// As `drop_negative`, but each time only up to where the first multiplier turns 0, so that the dual only rises.
+    pub(super) fn ascend(&mut self) {
         loop {
             let optimum = self.factor.optimum();
             let mut length: f64 = 1.0;
@@ -65,7 +65,7 @@ impl DualActiveSet {
             if falling.is_empty() {
                 return;
             }
-            self.leave(&falling, None);
+            self.deactivate(&falling, None);
         }
     }
 }

@@ -4,7 +4,7 @@ use super::kernels::{add_rows, rows_times};
 use super::working_set::Kind;
 use super::{DualActiveSet, TOLERANCE};
 
-/// Active rows are refined until they are met to this, as they were stated or scaled to length 1.
+/// Active rows are refined until they are satisfied to this, as they were stated or scaled to length 1.
 const REFINED: f64 = 2e-14;
 
 impl DualActiveSet {
@@ -39,12 +39,12 @@ impl DualActiveSet {
     }
 
     /// Computes weights and every row's excess; refines the active rows where they need it, or to the end.
-    pub(super) fn measure(&mut self, last: bool) {
+    pub(super) fn update_weights(&mut self, last: bool) {
         let enough = if last { REFINED } else { 0.1 * TOLERANCE };
         let mut worst = f64::INFINITY;
         for round in 0..4 {
             self.weights = self.combined();
-            self.price();
+            self.update_excess();
             let off = |&slot: &usize| self.excess[slot].abs() * self.rows[slot].length.max(1.0);
             let now = self.active.iter().map(off).fold(0.0, f64::max);
             if now <= enough || now > 0.5 * worst || round == 3 {
@@ -58,7 +58,7 @@ impl DualActiveSet {
         }
     }
 
-    /// Moves the weights onto the active rows: with large multipliers their sum is rounded to more than the rows allow.
+    /// Moves the weights onto the active rows, as large multipliers round their sum by more than the tolerance of the rows.
     pub(super) fn project_weights(&mut self) {
         let lengths: Vec<f64> = self.active.iter().map(|&slot| self.rows[slot].length.max(1.0)).collect();
         let off = |residuals: &[f64]| residuals.iter().zip(&lengths).map(|(r, l)| r.abs() * l).fold(0.0, f64::max);
@@ -80,11 +80,11 @@ impl DualActiveSet {
             }
             (self.weights, now) = (weights, then);
         }
-        self.price();
+        self.update_excess();
     }
 
     /// Computes every row's excess.
-    pub(super) fn price(&mut self) {
+    pub(super) fn update_excess(&mut self) {
         let mut values = vec![0.0; self.live.len()];
         rows_times(&self.coefficients, self.stride, &self.live, &self.weights, &mut values);
         for (value, &slot) in values.iter().zip(&self.live) {
@@ -92,7 +92,7 @@ impl DualActiveSet {
         }
     }
 
-    /// Rows and bounds that are not met, with their excess, worst first.
+    /// Violated rows and bounds with their excess, worst first.
     pub(super) fn violated(&mut self) -> Vec<(usize, f64)> {
         let mut found: Vec<(usize, f64)> = Vec::new();
         for n in 0..self.lower.len() {
@@ -112,7 +112,7 @@ impl DualActiveSet {
         found
     }
 
-    /// Corrects the active multipliers by what the active rows are off, and lets go of those that turn negative.
+    /// Corrects the active multipliers by the residuals of the active rows, and deactivates rows whose multiplier turns negative.
     pub(super) fn refine(&mut self) {
         let mut change = self.residuals(&self.weights);
         self.factor.forward(&mut change);
@@ -122,6 +122,6 @@ impl DualActiveSet {
         }
         let negative = |&k: &usize| self.multipliers[self.active[k]] < 0.0 && !self.is_equality(self.active[k]);
         let negative: Vec<usize> = (0..self.active.len()).filter(negative).collect();
-        self.leave(&negative, None);
+        self.deactivate(&negative, None);
     }
 }

@@ -5,9 +5,9 @@ use super::{BLOCK, DualActiveSet, RowId, TOLERANCE};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, problem};
 
-/// What is asked of a long row, scaled to length 1, at most.
+/// The least tolerance of a long row, scaled to length 1.
 const FINEST: f64 = 4e-14;
-/// Rows that memory is laid out for at first, where so many could be held: more of them move what is there.
+/// The rows that memory is allocated for at first, where so many could be active; more rows move what is there.
 const AT_FIRST: usize = 1024;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +28,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// How far off it may be and still count as met.
+    /// The violation up to which the row counts as satisfied.
     pub(super) fn tolerance(&self) -> f64 {
         (TOLERANCE / self.length).clamp(FINEST, TOLERANCE)
     }
@@ -52,7 +52,7 @@ impl DualActiveSet {
         Ok(slot)
     }
 
-    /// Takes a slot for a row; its coefficients are 0.
+    /// Puts a row into a free slot; its coefficients are 0.
     pub(super) fn slot(&mut self, row: Row) -> usize {
         let slot = self.free.pop().unwrap_or(self.rows.len());
         if slot == self.rows.len() {
@@ -61,7 +61,7 @@ impl DualActiveSet {
             self.multipliers.push(0.0);
             self.excess.push(0.0);
             if self.coefficients.len() < self.rows.len() * self.stride {
-                let mut coefficients = Aligned::zeros(self.roomy(self.rows.len()) * self.stride);
+                let mut coefficients = Aligned::zeros(self.capacity(self.rows.len()) * self.stride);
                 coefficients[..self.coefficients.len()].copy_from_slice(&self.coefficients);
                 self.coefficients = coefficients;
             }
@@ -74,18 +74,18 @@ impl DualActiveSet {
         slot
     }
 
-    /// How many slots to lay out memory for where so many are in use.
-    pub(super) fn roomy(&self, slots: usize) -> usize {
+    /// The number of slots to allocate where so many are in use.
+    pub(super) fn capacity(&self, slots: usize) -> usize {
         (slots + slots / 2 + 64).max(self.lower.len().min(AT_FIRST))
     }
 
-    /// Makes room in the Gram matrix for every slot.
-    pub(super) fn room(&mut self) {
+    /// Enlarges the Gram matrix to all slots.
+    pub(super) fn enlarge_gram(&mut self) {
         let slots = self.rows.len();
         if slots <= self.gram_stride {
             return;
         }
-        let stride = self.roomy(slots).next_multiple_of(LANES);
+        let stride = self.capacity(slots).next_multiple_of(LANES);
         let stride = if stride.is_multiple_of(64) { stride + LANES } else { stride };
         let mut gram = Aligned::zeros(stride * stride);
         for (new, old) in gram.chunks_exact_mut(stride).zip(self.gram.chunks_exact(self.gram_stride.max(1))) {
@@ -94,9 +94,9 @@ impl DualActiveSet {
         (self.gram, self.gram_stride) = (gram, stride);
     }
 
-    /// Computes the products of the fresh rows with all others, in one matrix product; gives those rows.
+    /// Computes the products of the fresh rows with all others, in one matrix product; returns those rows.
     pub(super) fn extend_gram(&mut self) -> Vec<usize> {
-        self.room();
+        self.enlarge_gram();
         let fresh = std::mem::take(&mut self.fresh);
         let (slots, stride) = (self.rows.len(), self.stride);
         for fresh in fresh.chunks(4 * BLOCK) {
@@ -118,7 +118,7 @@ impl DualActiveSet {
         fresh
     }
 
-    /// The slot of a bound's row, taken if it has none yet.
+    /// The slot of a bound's row, added if it has none yet.
     pub(super) fn bound(&mut self, n: usize, upper: bool) -> usize {
         if let Some(slot) = self.bounds[n][usize::from(upper)] {
             return slot;
@@ -128,7 +128,7 @@ impl DualActiveSet {
         let slot = self.slot(Row { kind, length: 1.0, limit });
         self.bounds[n][usize::from(upper)] = Some(slot);
         self.coefficients[slot * self.stride + n] = sign;
-        self.room();
+        self.enlarge_gram();
         for other in 0..self.rows.len() {
             let product = sign * self.coefficients[other * self.stride + n];
             self.gram[slot * self.gram_stride + other] = product;

@@ -34,7 +34,7 @@ const NOTHING: f64 = 1e-10;
 /// Corrections of a step towards equal products, as long as they lengthen it.
 const MOST_CORRECTIONS: usize = 2;
 
-/// One weight's way up or down from its base.
+/// The part of a weight above or below its base.
 struct Part {
     synapse: usize,
     sign: f64,
@@ -70,7 +70,7 @@ struct Step {
 }
 
 impl PrimalDual {
-    /// Forgets the rows that are not kept.
+    /// Removes the rows that `keep` does not mark.
     pub(super) fn retain(&mut self, keep: &[bool]) {
         retain(&mut self.slack, keep);
         retain(&mut self.inequality, keep);

@@ -15,13 +15,13 @@ const MOST_REFINEMENTS: usize = 3;
 /// Curvature of a weight that cannot move.
 const FIXED: f64 = 1e30;
 
-/// Memory that every iteration needs anew.
+/// Memory that iterations reuse.
 pub(super) struct Room {
     pub(super) matrix: Mat<f64>,
     pub(super) scaled: Vec<f64>,
 }
 
-/// What a factored Newton matrix needs to solve for a direction.
+/// A factored Newton matrix with what it needs to solve for a direction.
 pub(super) struct Newton<'a> {
     pub(super) inner: &'a Interior<'a>,
     pub(super) state: &'a PrimalDual,
