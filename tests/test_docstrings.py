@@ -20,6 +20,11 @@ ROOMS = (
     "taxel.simulate.Flaws",
     "taxel.simulate.Faults",
     "taxel.simulate.circuit.Converter",
+    "taxel.Neuron",
+    "taxel.SpikeTrains",
+    "taxel.learn",
+    "taxel.metrics",
+    "taxel.spikes",
 )
 
 READINGS = Path(__file__).parents[1] / "docs" / "readings.md"
