@@ -20,8 +20,7 @@ from typing import Any
 
 from _rounds import processor, version
 
-from taxel.report import write_whole
-from taxel.report.provenance import Sources
+from taxel.report import Sources, write_whole
 
 #: Set where peers that need minutes are waited for.
 PATIENT = "TAXEL_BENCH_PEERS"
