@@ -19,8 +19,7 @@ from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.information import NearestNeighbours
-from taxel.report import write_whole
-from taxel.report import installed_sources
+from taxel.report import installed_sources, write_whole
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US, Registers
