@@ -96,6 +96,7 @@ LEFT_OUT: dict[str, str] = {
     "taxel.detect.Score": "a result",
     "taxel.detect.Spread": "a result",
     "taxel.detect.Example": "checked by train",
+    "taxel.detect.Outcome": "a result",
     "taxel.detect.TrainedNeuron": "checked by Readout",
     "taxel.detect.Learner": "a protocol",
 }

@@ -68,7 +68,6 @@ SOUND: dict[str, Sound] = {
 #: What is not tried, and why.
 LEFT_OUT: dict[str, str] = {
     "taxel.live.Live.expect_version": "tried with version 2's own tests",
-    "taxel.live.Said": "a result",
     "taxel.live.Summary": "a result",
     "taxel.live.heard": "takes what Live said",
     "taxel.live.Panel.listen": "begins a Live, which checks",

@@ -71,6 +71,7 @@ SOUND: dict[str, Sound] = {
 
 #: What is not tried, and why.
 LEFT_OUT: dict[str, str] = {
+    "taxel.Detection": "one of Detections",
     "taxel.Error": "raised, not called",
     "taxel.FormatError": "raised, not called",
     "taxel.ProblemError": "raised, not called",
@@ -79,6 +80,5 @@ LEFT_OUT: dict[str, str] = {
     "taxel.Clock": "of a recording",
     "taxel.Clock.host_ns": "of a recording",
     "taxel.Clock.board_us_at": "of a recording",
-    "taxel.Label": "a row of Labels",
     "taxel.NotFittedError": "raised, not called",
 }
