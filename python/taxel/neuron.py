@@ -107,6 +107,13 @@ class Neuron(Value):
         Notes
         -----
         In continuous time each crossing is the root of the potential less threshold, to rounding. Cost: O(1) a spike.
+
+        Examples
+        --------
+        >>> from taxel.spikes import SpikeTrains
+        >>> trains = SpikeTrains.from_lists([[10.0], [12.0]], stop=50.0)
+        >>> len(Neuron(tau=5.0).run([1.0, 1.0], trains))
+        4
         """
         return self._run(weights, trains, threshold)[0]
 
@@ -169,7 +176,7 @@ class Neuron(Value):
         weights : float64, shape (trains,), mV
         trains : SpikeTrains
         times : float64, shape (n,), ms, ascending
-        spikes : float64, ms, ascending
+        spikes : float64, shape (spikes,), ms, ascending
             When the neuron fired; without any, the linear sum 6.4. With them 6.7: 0 in the refractory time, then what
             `after_spike` leaves; at a spike itself, what the potential came up to.
 
@@ -180,6 +187,13 @@ class Neuron(Value):
         Raises
         ------
         ProblemError : times that do not ascend, or not one weight a train
+
+        Examples
+        --------
+        >>> from taxel.spikes import SpikeTrains
+        >>> trains = SpikeTrains.from_lists([[10.0]], stop=50.0)
+        >>> Neuron(tau=5.0).potential([1.0], trains, [5.0, 10.0])
+        array([0., 0.])
         """
         return _core.neuron_potential(
             self._json(),

@@ -28,17 +28,17 @@ __all__ = ["SpikeTrains"]
 
 
 class SpikeTrains(Columns):
-    """Hold spike times by train, with the window that was listened to.
+    """Hold spike times by train, with the window in which spikes were looked for.
 
     Parameters
     ----------
     times : float64, shape (spikes,), ms
         All times, train after train, ascending in each.
-    offsets : int64, shape (trains + 1,)
+    offsets : int64, shape (trains + 1,), indices
         Where each train begins in `times`, and at last where all end.
     start, stop : float, ms
         The window: without it an empty train could not say "silent".
-    values : float32, shape (spikes,), optional
+    values : float32, shape (spikes,), -1 to 1 or bits, optional
         A signed value a spike (polarity, bits), where the encoder has one.
 
     Raises
@@ -91,7 +91,7 @@ class SpikeTrains(Columns):
         start : float, ms
         stop : float, ms, optional
             The last spike's time where it is left out.
-        values : sequence of float sequences, optional
+        values : sequence of float sequences, -1 to 1 or bits, optional
             A signed value a spike.
 
         Returns
@@ -101,6 +101,11 @@ class SpikeTrains(Columns):
         Raises
         ------
         ProblemError : times that make no sense (names train and spike)
+
+        Examples
+        --------
+        >>> SpikeTrains.from_lists([[1.0, 5.0], []], stop=10.0)
+        SpikeTrains(2 trains, 2 spikes, 0 to 10 ms)
         """
         flat, counts = _by_train("times", bare("times", times, "ms"), np.float64)
         signed = None
@@ -167,7 +172,21 @@ class SpikeTrains(Columns):
         return self._from_parts(_core.split_by_sign(self._parts()))
 
     def between(self, start: float, stop: float) -> SpikeTrains:
-        """Return the spikes of ``start <= t < stop`` (ms), with that window; times stay as they are."""
+        """Return the spikes of ``start <= t < stop`` (ms), with that window; times stay as they are.
+
+        Parameters
+        ----------
+        start, stop : float, ms
+
+        Raises
+        ------
+        ProblemError : a start that lies after the stop, or is no number
+
+        Examples
+        --------
+        >>> SpikeTrains.from_lists([[1.0, 5.0]], stop=10.0).between(2.0, 8.0).times
+        array([5.])
+        """
         start, stop = window("ms", start, stop)
         return self._where((self.times >= start) & (self.times < stop), start, stop)
 
@@ -176,12 +195,17 @@ class SpikeTrains(Columns):
 
         Parameters
         ----------
-        trains : int or bool array
-            Numbers of trains, or a mask over all of them.
+        trains : int or bool, shape (n,), numbers of trains or a mask over all of them
+            A number below 0 is none.
 
         Raises
         ------
         ProblemError : a number outside the trains
+
+        Examples
+        --------
+        >>> SpikeTrains.from_lists([[1.0], [2.0], [3.0]]).select([2, 0]).times
+        array([3., 1.])
         """
         try:
             chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
@@ -267,6 +291,14 @@ class SpikeTrains(Columns):
         """Build spike trains from ``neo.SpikeTrain`` objects of any time unit.
 
         The window is the widest of theirs.
+
+        Parameters
+        ----------
+        trains : sequence of neo.SpikeTrain
+
+        Raises
+        ------
+        ProblemError : no such trains
         """
         try:
             foreign = next(([train] for train in trains if not hasattr(train, "rescale")), [])
@@ -363,6 +395,16 @@ class SpikeTrains(Columns):
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the trains to a .npz (``times offsets start stop``, and ``values`` of signed ones); return its path.
 
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
+
         Raises
         ------
         FileExistsError : the file is there already and `overwrite` is false
@@ -376,10 +418,21 @@ class SpikeTrains(Columns):
     def load(cls, path: str | os.PathLike[str]) -> SpikeTrains:
         """Read the trains from the file that `save` wrote.
 
+        Parameters
+        ----------
+        path : path
+
         Raises
         ------
         FormatError : another file (names it)
         FileNotFoundError : no such file
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> place = SpikeTrains.from_lists([[1.0, 5.0]]).save(Path(tempfile.mkdtemp()) / "trains.npz")
+        >>> SpikeTrains.load(place).times
+        array([1., 5.])
         """
         place = checked_path("path", path)
         try:
