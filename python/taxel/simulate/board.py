@@ -130,6 +130,12 @@ class Board:
     ------
     ProblemError, DeviceError : arguments or registers that make no sense
 
+    Notes
+    -----
+    +
+
+    What a new value is compared with (`previous`) is open in thesis 4.3; the board's own rule stands in `docs/wire.md`.
+
     Examples
     --------
     >>> board = Board()
