@@ -30,9 +30,9 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "fast.py").write_text(BENCHMARK.replace("distance_of", "victor_purpura"))
     (tmp_path / "other.py").write_text(BENCHMARK.replace("distance_of", "van_rossum"))
     (tmp_path / "_shared.py").write_text("def often(run):\n    return 3  # times\n")
-    from taxel.report.provenance import installed
+    from taxel.report import installed_sources
 
-    parts = installed(*sorted(tmp_path.glob("*.py"))).parts("fast")
+    parts = installed_sources(*sorted(tmp_path.glob("*.py"))).parts("fast")
     assert {"fast", "_shared", "taxel.metrics.victor_purpura"} <= parts.keys()
     (tmp_path / "results" / "fast.json").write_text(json.dumps({"made_of": parts}))
     return tmp_path

@@ -19,8 +19,7 @@ from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.information import NearestNeighbours
-from taxel.report import write_whole
-from taxel.report.provenance import installed
+from taxel.report import installed_sources, write_whole
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US, Registers
@@ -172,7 +171,7 @@ def told(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS)
 
 def played(p: Mapping[str, Any], condition: Condition, seed: int, folder: Path, rig: Rig = IMPACTS) -> Drops:
     """Return a condition's drops from the folder, or drop the ball and keep them there."""
-    code = installed("taxel_studies").digest(__name__)
+    code = installed_sources("taxel_studies").digest(__name__)
     made_by = json.dumps([named(p), condition, rig, seed, code], sort_keys=True)
     digest = hashlib.sha256(made_by.encode()).hexdigest()[:16]
     b, h, s = condition

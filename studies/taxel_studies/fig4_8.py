@@ -88,11 +88,11 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
     asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
     one = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses, TENNIS).ticks[:1]
     frame_ms = TENNIS.frame_us / 1000
-    shown = dropped.pictures(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
+    whole = dropped.pictures(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
     shown = dropped.pictures(one, PICTURE_MS, np.zeros(1), TENNIS, (PICTURES + 1) * PICTURE_MS)[0]
     x = np.arange(TENNIS.region**2) % TENNIS.region - TENNIS.region // 2
     y = np.arange(TENNIS.region**2) // TENNIS.region - TENNIS.region // 2
-    most = np.clip(shown[int(shown.sum(1).argmax())], 0, None)
+    most = np.clip(whole[int(whole.sum(1).argmax())], 0, None)
     return {
         "lines": [
             {
@@ -103,7 +103,7 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
             for period in sorted(p["periods_ms"])
         ],
         "conditions": len(dropped.conditions(p)),
-        "sum": [[round(frame_ms * k, 3), round(float(total))] for k, total in enumerate(shown.sum(1))],
+        "sum": [[round(frame_ms * k, 3), round(float(total))] for k, total in enumerate(whole.sum(1))],
         "middle": [round(float(np.average(of, weights=most)), 2) for of in (x, y)],
         "full": int(one.max()),
         "pictures": shown.round().astype(int).tolist(),

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from taxel import FormatError, ProblemError, __version__
-from taxel.report import write_whole
-from taxel.report.provenance import installed
+from taxel.report import installed_sources, write_whole
 from taxel_studies.runner import HERE, Results, Task, Workers, one_of, run, whole
 
 if TYPE_CHECKING:
@@ -184,12 +183,12 @@ class Study:
     @property
     def code(self) -> str:
         """The digest of what a realisation is computed by: when it changes, results are computed anew."""
-        return installed("taxel_studies").digest(self.realise.__module__)
+        return installed_sources("taxel_studies").digest(self.realise.__module__)
 
     @property
     def made_of(self) -> dict[str, str]:
         """The digest of every source that what it shows is computed from, by name."""
-        return installed("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
+        return installed_sources("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
 
     @property
     def lacks(self) -> str | None:

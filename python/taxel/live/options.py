@@ -21,7 +21,7 @@ from taxel.tare import Tare
 from taxel.wire import PRESETS, Registers
 
 if TYPE_CHECKING:
-    from taxel.live.said import Said
+    from taxel.detections import Detection
 
 __all__ = ["QUOTED_PRESETS", "LiveOptions", "about", "takes"]
 
@@ -79,7 +79,7 @@ class LiveOptions:
         5.0, "How far, in frames, a readout stays behind the host's clock while no events come.", least=0.0
     )
     gap_frames: float = _option(1.0, "At a gap in version 2, frames to wait for what may only be late.", least=0.0)
-    say: Callable[[Said], object] | None = _option(None, "Called with each detection.")
+    say: Callable[[Detection], object] | None = _option(None, "Called with each detection.")
     lines: bool = _option(False, "Print one line of JSON for each detection, and nothing else.")
     send: str | Sequence[str] = _option(
         (),
@@ -105,7 +105,7 @@ class LiveOptions:
         if array is None and readout is not None:
             array = readout.array
         if self.say is not None and not callable(self.say):
-            raise ProblemError(f"say is {shown(self.say)}: must be a function of a Said")
+            raise ProblemError(f"say is {shown(self.say)}: must be a function of a Detection")
         if readout is None and self.tare is not None:
             raise ProblemError("tare without a readout: nothing would use it")
         array = Array._of(array)
