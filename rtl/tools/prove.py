@@ -39,7 +39,11 @@ PROOFS = (
             (FIFO, "(PLACES + 1)'(DEPTH);", "(PLACES + 1)'(DEPTH - 1);"),
             (FIFO, "waiting == 0 && !fetched_valid && !ready", "waiting == 0 && !ready"),
             (FIFO, "write <= write == PLACES'(DEPTH - 1) ? '0", "write <= write == PLACES'(DEPTH - 2) ? '0"),
-            (FIFO, "if (push) begin\n      ring[write] <= entered;", "if (push) begin\n      if (!fetch) ring[write] <= entered;"),
+            (
+                FIFO,
+                "if (push) begin\n      ring[write] <= entered;",
+                "if (push) begin\n      if (!fetch) ring[write] <= entered;",
+            ),
             (FIFO, "else if (pop) ready <= 1'b0;", ""),
         ),
     ),
