@@ -16,6 +16,12 @@ PREVIOUS = {"last_sent": {}, "last_sample": {"PREVIOUS_SAMPLE": 1}}
 INTENSITY = {"value": {}, "difference": {"DIFFERENCE": 1}, "nothing": {"VALUED": 0}}
 
 
+def answers(serial: str) -> str:
+    """Return the whole lines that are no lines of faults."""
+    lines = serial.splitlines(keepends=True)
+    return "".join(line for line in lines if line.endswith("\n") and not line.startswith("fault"))
+
+
 class Pair:
     """The logic and the emulated board, both at the start of a frame.
 
@@ -71,10 +77,16 @@ class Pair:
         self.received += self.logic.datagrams()
         self.serial += self.logic.serial()
 
+    @property
+    def answered(self) -> bool:
+        """Whether no command is on its way, nor an answer."""
+        return not self.waits and self.answers == answers(self.serial)
+
     def finish(self) -> None:
         """Scan quiet frames until everything was sent."""
         still = np.zeros(self.array.shape, np.uint16)
-        for _ in range(3):
+        self.frame(still)
+        while not self.answered:
             self.frame(still)
         self.logic.edge()
         self.received += self.logic.datagrams()
