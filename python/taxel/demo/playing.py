@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import taxel
 from taxel._core import DeviceError
-from taxel.demo.hearing import Hearing, listen
+from taxel.demo.outcome import Outcome, evaluate_events
 from taxel.demo.script import script
 from taxel.detect import Readout, run
 from taxel.live import Live, Said, heard
@@ -40,13 +40,13 @@ class Screen(Protocol):
 class Playing:
     """A play in real time, and what was counted."""
 
-    hearing: Hearing
+    outcome: Outcome
     counters: dict[str, Any]
     emulator: dict[str, Any]
     verdicts: list[str]
     recording: Path
     agrees: bool
-    """Whether the recording, read again, says what was said live."""
+    """Whether the recording, read again, gives the detections that were made live."""
 
 
 def play_live(
@@ -94,7 +94,7 @@ def play_live(
                 if time.monotonic() > drawn + _DRAW_EVERY_S:
                     drawn = time.monotonic()
                     shown.draw(live.counters, live.picture, said)
-            told, complaint = board.communicate()
+            printed, complaint = board.communicate()
         finally:
             if board.poll() is None:
                 board.terminate()
@@ -105,13 +105,13 @@ def play_live(
             said.append(one)
         tare = live.tare
         summary = live.stop()
-    emulator = json.loads(told)
+    emulator = json.loads(printed)
     found = heard(said)
     events = taxel.open(recording).events
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
-    hearing = listen(events, acts, readout, found)
-    again = again[again.t >= hearing.start_us]
-    mine = hearing.found
+    outcome = evaluate_events(events, acts, readout, found)
+    again = again[again.t >= outcome.start_us]
+    mine = outcome.found
     agrees = len(again) == len(mine) and bool(
         (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
     )
@@ -119,6 +119,6 @@ def play_live(
     if summary.counters["late"]:
         verdicts.append(
             f"{summary.counters['late']} events came after the readout's time had moved on, 5 frames behind the host's "
-            f"clock: this machine was too busy, and what they told was known later than it could have been"
+            f"clock: this machine was too busy, and their detections were known later than it could have been"
         )
-    return Playing(hearing, summary.counters, emulator, verdicts, recording, agrees)
+    return Playing(outcome, summary.counters, emulator, verdicts, recording, agrees)
