@@ -20,6 +20,7 @@ ROOMS = (
     "taxel.simulate.Flaws",
     "taxel.simulate.Faults",
     "taxel.simulate.circuit.Converter",
+    "taxel.plot",
 )
 
 READINGS = Path(__file__).parents[1] / "docs" / "readings.md"
