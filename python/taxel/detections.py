@@ -1,9 +1,10 @@
-"""What a readout said, and when it could have said it."""
+"""Detections of a readout: what, when, and when it could first be known."""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,36 +25,49 @@ from taxel._core import FormatError, ProblemError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Detections"]
+__all__ = ["Detection", "Detections"]
 
 _CSV = ("label", "t_us", "known_us", "slope_mv_per_ms")
 _SAID, _REPAIRED = "said_us", "repaired"
 
 
 class Detection(NamedTuple):
-    """Hold one thing that a readout said.
+    """Hold one detection of a readout, live or from a recording.
 
-    Attributes
+    Parameters
     ----------
     label : str
     t : int, us
-        When the event was.
+        When the event was, by the board's clock: the crossing less the encoder's latency and the trained delay.
     known : int, us
-        When it could first be said.
+        When it could first be detected: the end of the board's frame in which the potential crosses.
     slope : float, mV/ms
-        How steeply the potential rose above its threshold; NaN where that is not known.
-    said : int, us, or None
-        When it was said, where that is known.
+        How steeply the potential crossed its threshold, as a measure of how sure; NaN where that is not known.
+    said : int, us, optional
+        When it was reported, by the host's clock less the estimated offset between the clocks.
+    said_ns : int, ns since 1970, optional
+        The same by the host's clock; of a detection that is reported live.
     repaired : bool
-        Whether it may rest on values that states repaired after a loss.
+        Whether it may rest on values that states of wire version 2 repaired after a loss.
+
+    Examples
+    --------
+    >>> Detection("contact", 1000, 1344, 0.8, said=1500).latency
+    156
     """
 
     label: str
     t: int
     known: int
-    slope: float
-    said: int | None
+    slope: float = math.nan
+    said: int | None = None
+    said_ns: int | None = None
     repaired: bool = False
+
+    @property
+    def latency(self) -> int | None:
+        """How long after `known` it was reported, us; None where that is not known."""
+        return None if self.said is None else self.said - self.known
 
 
 class Detections(Columns):
@@ -161,7 +175,9 @@ class Detections(Columns):
     def __iter__(self) -> Iterator[Detection]:
         said = [None] * len(self) if self.said is None else self.said.tolist()
         columns = (self.label, self.t, self.known, self.slope)
-        return map(Detection, *(column.tolist() for column in columns), said, self.repaired.tolist())
+        return map(
+            Detection, *(column.tolist() for column in columns), said, [None] * len(self), self.repaired.tolist()
+        )
 
     @overload
     def __getitem__(self, chosen: int) -> Detection: ...

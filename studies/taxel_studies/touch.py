@@ -12,7 +12,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -78,28 +78,29 @@ RIDGES = (0.1, 1.0, 10.0, 100.0)
 MOST_FRAMES = 1500
 
 
-class Trial:
-    """One recording, read back from its file as `taxel train` reads it, and what really happened in it."""
+class Drop(NamedTuple):
+    """A recording as `taxel train` reads it, and what the simulation knows of it besides."""
 
-    def __init__(self, path: Path, table: Labels, contacts: list[Contact], kind: int) -> None:
-        recording = open_recording(path)
-        self.events: Events = recording.events
-        self.labels = table.of(recording)
-        started = next(t for t, start in self.events.markers if start)
-        self.tare = Tare.take(self.events, stop_us=started)
-        self.contacts, self.kind = contacts, kind
-
-    @property
-    def example(self) -> Example:
-        """What the training is given."""
-        return Example(self.events, self.labels, self.tare)
+    example: Example
+    events: Events
+    tare: Tare
+    contacts: list[Contact]
+    kind: int
 
     def frames(self, period_us: int, start: float, stop: float) -> Frames:
-        """Pictures of what stands above rest, us."""
+        """Return what stands above rest as pictures, us."""
         return self.tare.off(Frames.from_events(self.events, period_us, round(start), round(stop)))
 
 
-def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[Trial]:
+def _opened(path: Path, table: Labels, contacts: list[Contact], kind: int) -> Drop:
+    recording = open_recording(path)
+    events = recording.events
+    started = next(t for t, start in events.markers if start)
+    tare = Tare.take(events, stop_us=started)
+    return Drop(Example(events, table.of(recording), tare), events, tare, contacts, kind)
+
+
+def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[Drop]:
     """Draw scenes by seed, play them, write recordings and a table of labels, and read them back."""
     rng = np.random.default_rng([seed, 56])
     happened: list[tuple[list[Contact], int]] = []
@@ -125,7 +126,7 @@ def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[
     with (folder / "labels.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([("recording", "label", "t_us"), *rows])
     table = Labels(folder / "labels.csv")
-    return [Trial(folder / f"{k:03d}.npz", table, *one) for k, one in enumerate(happened)]
+    return [_opened(folder / f"{k:03d}.npz", table, *one) for k, one in enumerate(happened)]
 
 
 def tasks(p: Parameters) -> list[Task]:
@@ -151,27 +152,27 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         names = KINDS if params["question"] == "kind" else EVENTS
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # targets out of reach are counted below as missed
-            readout = train_readout([trial.example for trial in sets["train"]], Recipe.load("touch", labels=names))
+            readout = train_readout([drop.example for drop in sets["train"]], Recipe.load("touch", labels=names))
         judge = _kinds if params["question"] == "kind" else _contacts
         return judge(params, readout, sets["train"], sets["test"])
 
 
-def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Trial], test: list[Trial]) -> dict[str, Any]:
+def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Drop], test: list[Drop]) -> dict[str, Any]:
     """Say which sphere fell, by time since contact."""
     times = params["times_ms"]
     right: dict[str, Any] = {"neuron": [], "said_ms": [], "silent": 0}
-    for trial in test:
-        contact_us = trial.contacts[0].start_us
-        detected = [d for d in run(readout, trial.events, tare=trial.tare) if d.known >= contact_us]
+    for drop in test:
+        contact_us = drop.contacts[0].start_us
+        detected = [d for d in run(readout, drop.events, tare=drop.tare) if d.known >= contact_us]
         first = min(detected, key=lambda d: d.known, default=None)
         if first is None:
             right["silent"] += 1
         else:
             right["said_ms"].append(to_ms(first.known - contact_us))
-        good = first is not None and first.label == KINDS[trial.kind]
+        good = first is not None and first.label == KINDS[drop.kind]
         right["neuron"].append([good and right["said_ms"][-1] <= t for t in times])
-    truths = [np.array([trial.kind for trial in which]) for which in (train, test)]
-    by_moment = [[_since_contact(trial, times) for trial in which] for which in (train, test)]
+    truths = [np.array([drop.kind for drop in which]) for which in (train, test)]
+    by_moment = [[_since_contact(drop, times) for drop in which] for which in (train, test)]
     names = []
     shares: dict[str, list[float]] = {"rule": [], "numbers": [], "lda": []}
     for k in range(len(times)):
@@ -194,11 +195,11 @@ def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Trial], 
     }
 
 
-def _since_contact(trial: Trial, times: Sequence[float]) -> list[Frames]:
+def _since_contact(drop: Drop, times: Sequence[float]) -> list[Frames]:
     """Return the picture above rest at times (ms) since the touch really began."""
-    contact = trial.contacts[0].start_us
+    contact = drop.contacts[0].start_us
     at = [round(contact + to_us(t)) for t in times]
-    return [trial.frames(1, t, t + 1) for t in at]
+    return [drop.frames(1, t, t + 1) for t in at]
 
 
 def _best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
@@ -275,7 +276,7 @@ def _lda(values: ArrayLike, classes: NDArray[Any]) -> Callable[[ArrayLike], NDAr
     return LDA(ridge=RIDGES[int(np.argmax(right))]).fit(x, classes).predict
 
 
-def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Trial], test: list[Trial]) -> dict[str, Any]:
+def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Drop], test: list[Drop]) -> dict[str, Any]:
     """Say when touches begin and end."""
     window = params["window_ms"]
     levels = {level: _tally([_by_area(t, level) for t in train], train, window) for level in (1, 2, 4, 8)}
@@ -291,13 +292,15 @@ def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Trial
     }
 
 
-def _tally(found: list[Detections], trials: list[Trial], window_ms: float) -> dict[str, Any]:
+def _tally(found: list[Detections], drops: list[Drop], window_ms: float) -> dict[str, Any]:
     """Return found, missed, false, the error of its time, and its delay until it was known (ms)."""
     tallies: dict[str, Any] = {
         label: {"found": 0, "missed": 0, "false": 0, "error_ms": [], "later_ms": []} for label in EVENTS
     }
-    for detected, trial in zip(found, trials, strict=True):
-        judged = score(detected, {label: trial.labels[label] for label in EVENTS}, window_ms).to_dict()["by_label"]
+    for detected, drop in zip(found, drops, strict=True):
+        judged = score(detected, {label: drop.example.labels[label] for label in EVENTS}, window_ms).to_dict()[
+            "by_label"
+        ]
         for label, one in judged.items():
             for name in ("found", "missed", "false"):
                 tallies[label][name] += one[name]
@@ -307,9 +310,9 @@ def _tally(found: list[Detections], trials: list[Trial], window_ms: float) -> di
     return tallies
 
 
-def _by_area(trial: Trial, level: int) -> Detections:
+def _by_area(drop: Drop, level: int) -> Detections:
     """Say contact where so many taxels are loaded, and lift where fewer are."""
-    spikes = ContactArea(levels=[level], tare=trial.tare).encode(trial.events)
+    spikes = ContactArea(levels=[level], tare=drop.tare).encode(drop.events)
     times = [np.rint(to_us(train)).astype(np.int64) for train in spikes]
     return detections_at(times[0]) + detections_at(times[1], "lift")
 
@@ -318,12 +321,12 @@ def detections_at(t: NDArray[np.int64], label: str = "contact") -> Detections:
     return Detections(np.full(len(t), label), t, t)
 
 
-def _touched(train: list[Trial]) -> Callable[[ArrayLike], NDArray[Any]]:
+def _touched(train: list[Drop]) -> Callable[[ArrayLike], NDArray[Any]]:
     """Return an LDA that separates pictures of a touch from pictures of none."""
     pictures, there = [], []
-    for trial in train:
-        for contact in trial.contacts:
-            frames = trial.frames(2000, contact.start_us - 20_000, contact.stop_us + 20_000)
+    for drop in train:
+        for contact in drop.contacts:
+            frames = drop.frames(2000, contact.start_us - 20_000, contact.stop_us + 20_000)
             pictures.append(_around([frames]))
             there.append((frames.t >= contact.start_us) & (frames.t < contact.stop_us))
     values, classes = np.concatenate(pictures), np.concatenate(there)
@@ -331,9 +334,9 @@ def _touched(train: list[Trial]) -> Callable[[ArrayLike], NDArray[Any]]:
     return _lda(values[chosen], classes[chosen].astype(np.int64))
 
 
-def _by_frames(trial: Trial, touched: Callable[[ArrayLike], NDArray[Any]]) -> Detections:
+def _by_frames(drop: Drop, touched: Callable[[ArrayLike], NDArray[Any]]) -> Detections:
     """Say contact and lift where the LDA changes its mind from one picture to the next, 1 ms apart."""
-    frames = trial.frames(1000, trial.events.markers[0][0], trial.contacts[-1].stop_us + AFTER_US)
+    frames = drop.frames(1000, drop.events.markers[0][0], drop.contacts[-1].stop_us + AFTER_US)
     change = np.diff(touched(_around([frames])), prepend=0)
     return detections_at(frames.t[change > 0]) + detections_at(frames.t[change < 0], "lift")
 

@@ -16,7 +16,8 @@ from taxel._core import DeviceError
 from taxel.demo.outcome import Outcome, evaluate_events
 from taxel.demo.script import script
 from taxel.detect import Readout, run
-from taxel.live import Live, Said, heard
+from taxel.detections import Detection
+from taxel.live import Live, heard
 from taxel.simulate import Contact, truth
 from taxel.wire import FRAME_US
 
@@ -32,7 +33,7 @@ _LISTEN_ON_S = 0.3
 class Screen(Protocol):
     """What is drawn while it runs."""
 
-    def draw(self, counters: dict[str, Any], picture: Any, said: list[Said]) -> None:
+    def draw(self, counters: dict[str, Any], picture: Any, said: list[Detection]) -> None:
         """Draw what came up to now."""
 
 
@@ -76,7 +77,7 @@ def play_live(
     contacts, force = truth(acts)
     shown = screen(contacts, len(force) * FRAME_US * 1e-6)
     recording = folder / "recording.mcap"
-    said: list[Said] = []
+    said: list[Detection] = []
     # The tare ends where the board marks its start, well before a second is over.
     with Live(0, host="127.0.0.1", readout=readout, tare=1.0, record=recording) as live:
         command = [sys.executable, "-m", "taxel", "emulate", "--json", "--port", str(live.address[1])]

@@ -15,7 +15,8 @@ from rich.table import Table
 from rich.text import Text
 
 from taxel.demo.judging import LABELS
-from taxel.live import Said, delays
+from taxel.detections import Detection
+from taxel.live import delays
 from taxel.simulate import Contact
 from taxel.spikes import to_ms
 
@@ -40,7 +41,7 @@ class Screen:
         self._before: tuple[float, int] = (0.0, 0)
         self._rate = 0.0
 
-    def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], said: list[Said]) -> None:
+    def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], said: list[Detection]) -> None:
         """Draw what came up to now."""
         now = (counters["board_us"] or 0) * 1e-6
         then, events = self._before
@@ -78,7 +79,7 @@ class Screen:
             )
         )
 
-    def _newest(self, said: list[Said], width: int, rows: int) -> list[Text]:
+    def _newest(self, said: list[Detection], width: int, rows: int) -> list[Text]:
         """Return the last lines that find room, the newest last; a long one takes more than one row."""
         lines: list[Text] = []
         for one in reversed(said):
@@ -89,7 +90,7 @@ class Screen:
             lines.insert(0, line)
         return lines
 
-    def _line(self, said: Said) -> Text:
+    def _line(self, said: Detection) -> Text:
         true = self._true[said.label]
         colour = "red" if said.label == "contact" else "blue"
         line = Text(f"{said.t * 1e-6:8.3f} s  ").append(f"{said.label:<8}", style=f"bold {colour}")

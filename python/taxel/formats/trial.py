@@ -21,7 +21,9 @@ MARGIN_US = 100_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trial:
-    """Hold one recording of one sensor: its pictures or events, and the reference times of what happened.
+    """Hold one recording of a published data set: its pictures or events, its subject, and reference times.
+
+    `taxel.open` makes a `Recording` of it; a `taxel.detect.Example` has labels and no subject, group or condition.
 
     Parameters
     ----------

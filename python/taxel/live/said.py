@@ -3,49 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any
 
-from taxel.detections import Detections
+from taxel.detections import Detection, Detections
 
-__all__ = ["Said", "heard"]
-
-
-class Said(NamedTuple):
-    """Report what was detected, and when: all times but the last in us of the board's clock.
-
-    Attributes
-    ----------
-    label : str
-    t : int, us
-        When the event was: the crossing less the encoder's latency and the trained delay.
-    known : int, us
-        When it could first be known: the end of the board's frame in which the potential crosses.
-    slope : float, mV/ms
-        How steeply the potential crossed its threshold, as a measure of how sure.
-    said : int, us
-        When it was output, by the host's clock less the estimated offset between the clocks.
-    said_ns : int, ns since 1970
-        The same by the host's clock.
-    repaired : bool
-        Whether it may rest on values that states of wire version 2 repaired after a loss.
-    """
-
-    label: str
-    t: int
-    known: int
-    slope: float
-    said: int
-    said_ns: int
-    repaired: bool = False
+__all__ = ["heard"]
 
 
-def heard(said: Sequence[Said]) -> Detections:
+def heard(said: Sequence[Detection]) -> Detections:
     """Return detections of a `Live` as `Detections`."""
+    reported: Any = [one.said for one in said]
     return Detections._of(
-        [s.label for s in said],
-        [s.t for s in said],
-        [s.known for s in said],
-        [s.slope for s in said],
-        [s.said for s in said],
-        [s.repaired for s in said],
+        [one.label for one in said],
+        [one.t for one in said],
+        [one.known for one in said],
+        [one.slope for one in said],
+        reported,
+        [one.repaired for one in said],
     )

@@ -1,4 +1,4 @@
-"""What stands in a recording beside its events: notes, zeroed taxels, changes of the board, raw bytes and lines."""
+"""What stands in a recording beside its events and notes: zeroed taxels, changes of the board, raw bytes and lines."""
 
 from __future__ import annotations
 
@@ -9,25 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BoardChange", "Datagrams", "Note", "Samples", "Zeroing"]
-
-
-@dataclass(frozen=True)
-class Note:
-    """Hold what a person wrote down while recording.
-
-    Parameters
-    ----------
-    text : str
-    t : int, us, optional
-        The board's time, where it was known.
-    at_ns : int, ns since 1970
-        The host's time.
-    """
-
-    text: str
-    t: int | None
-    at_ns: int
+__all__ = ["BoardChange", "Datagrams", "Samples", "Zeroing"]
 
 
 @dataclass(frozen=True)

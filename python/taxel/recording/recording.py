@@ -18,11 +18,12 @@ from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.labels import Note
 from taxel.recording.between import Apart, between
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
 from taxel.recording.kinds import kind_of_file, verdict_of
-from taxel.recording.notes import BoardChange, Datagrams, Note, Zeroing
+from taxel.recording.notes import BoardChange, Datagrams, Zeroing
 from taxel.recording.on_clock import on_clock
 from taxel.recording.pictures import calibrated, pictures
 from taxel.tare import Tare
@@ -333,7 +334,9 @@ class Recording:
         return dict(self._contents.rebuilt)
 
     def between(self, start: float, stop: float) -> Recording:
-        """Return the part of ``start <= t < stop`` (us of the board's clock); notes without a time are left out.
+        """Return the part of ``start <= t < stop`` (us of the board's clock).
+
+        Notes without a time are left out, and stand in its `lost`.
 
         Raises
         ------

@@ -20,6 +20,9 @@ CLEAR_MS = 100.0
 class Piece:
     """Hold the spikes of one foot for a while, and what happened.
 
+    No `taxel.detect.Example`, which counts labels in whole us of a recording: pieces are put into rows, so their times
+    are ms as float64 from their own start, and the plain rules need sums over the sensors, which spikes do not hold.
+
     Attributes
     ----------
     name : str
