@@ -42,6 +42,17 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
     ------
     ProblemError : no recording; no figure of matplotlib
     FormatError : the recording's file is damaged
+
+    Examples
+    --------
+    >>> import os, tempfile, taxel
+    >>> events = taxel.Events([0, 2500], [1, 1], [0, 0], [True, False], array=taxel.Array(2, 3))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "touch.npz")
+    ...     lost = taxel.convert(events, path)
+    ...     figure = overview(taxel.open(path))
+    >>> figure.axes[0].get_title(), figure.axes[0].get_ylabel()
+    ('touch.npz', 'events/s')
     """
     instance("recording", recording, Recording)
 
@@ -142,6 +153,14 @@ def health_map(health: Health, ax: Axes | None = None) -> Axes:
     Raises
     ------
     ProblemError : no health of a recording; no axes of matplotlib
+
+    Examples
+    --------
+    >>> import taxel
+    >>> from taxel.recording import health
+    >>> events = taxel.Events([0, 2500], [1, 1], [0, 0], [True, False], array=taxel.Array(2, 3))
+    >>> health_map(health(events)).get_xlabel()
+    'x (column)'
     """
     instance("health", health, Health)
     ax = axes(ax, (5, 4.4))
