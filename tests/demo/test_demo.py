@@ -13,8 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from taxel.cli import app
+from taxel.demo.evaluation import evaluate_acts
 from taxel.demo.judging import GOALS, LABELS
-from taxel.demo.outcome import evaluate_acts
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.demo.shipped import shipped
 from taxel.simulate import Scene, Silence
@@ -80,16 +80,16 @@ def test_the_demo_never_plays_what_the_readout_was_trained_on():
 
 
 def test_the_parts_of_a_delay_sum_to_it():
-    outcome = evaluate_acts(script(3, 2), shipped(), seed=3)
-    row = outcome.judged.row("first", "contact")
+    evaluation = evaluate_acts(script(3, 2), shipped(), seed=3)
+    row = evaluation.judged.row("first", "contact")
     for (place, said), delay in zip(row.places, row.delays_ms, strict=True):
-        contact = outcome.contacts[place]
-        stamp = outcome.first_input(contact, "contact")
+        contact = evaluation.contacts[place]
+        stamp = evaluation.first_input(contact, "contact")
         assert stamp is not None
         begin = math.ceil(stamp / FRAME_US) * FRAME_US
         physics = (begin - contact.start_us) / 1000
         assert -0.2 < physics < delay
-        assert outcome.found.known[outcome.found.label == "contact"][said] >= begin + FRAME_US - 1
+        assert evaluation.found.known[evaluation.found.label == "contact"][said] >= begin + FRAME_US - 1
 
 
 def test_noise_alone_says_nothing():

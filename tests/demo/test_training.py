@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taxel.demo.outcome import evaluate_acts
+from taxel.demo.evaluation import evaluate_acts
 from taxel.demo.script import script
 from taxel.demo.shipped import described, shipped, trained
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.files import write_whole
-from taxel.demo.outcome import Outcome
+from taxel.demo.evaluation import Evaluation
 from taxel.demo.script import SLANTS_DEG, TRAINING_SEED, drawn, fall_ms
 from taxel.encode import ContactArea
 from taxel.events import Events
@@ -194,12 +194,12 @@ def shipped_drops() -> Drops:
     return Drops(table[:, 0], table[:, 1], table[:, 2], pictures)
 
 
-def named(outcome: Outcome, scenes: Sequence[Scene]) -> dict[str, Any]:
+def named(evaluation: Evaluation, scenes: Sequence[Scene]) -> dict[str, Any]:
     """Estimate which ball fell first in each scene, from how high on which slant, by time since the first event.
 
     Parameters
     ----------
-    outcome : Outcome
+    evaluation : Evaluation
         Of these scenes.
     scenes : sequence of Scene
 
@@ -211,16 +211,16 @@ def named(outcome: Outcome, scenes: Sequence[Scene]) -> dict[str, Any]:
         of all drops, by question and time; ``chance``, the share of the answer that the shipped drops have most of.
     """
     known = shipped_drops()
-    firsts = [contact for contact in outcome.contacts if contact.kind == "first"]
+    firsts = [contact for contact in evaluation.contacts if contact.kind == "first"]
     drops: list[dict[str, Any]] = []
     pictures = []
     for scene, contact in zip(scenes, firsts, strict=True):
-        first_us = outcome.first_input(contact, "contact")
+        first_us = evaluation.first_input(contact, "contact")
         true = dict(zip(QUESTIONS, _truth(scene), strict=True))
         late = None if first_us is None else to_ms(first_us - contact.start_us)
         drops.append({"true": true, "felt_ms": late, "said": {}})
         if first_us is not None:
-            pictures.append(look(outcome.events, outcome.tare, first_us))
+            pictures.append(look(evaluation.events, evaluation.tare, first_us))
     answered = [one for one in drops if one["felt_ms"] is not None]
     for name, question in QUESTIONS.items() if answered else ():
         for t in ANSWERED_MS:

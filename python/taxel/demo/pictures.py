@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from taxel.demo.evaluation import Evaluation
 from taxel.demo.judging import LABELS, Judged
-from taxel.demo.outcome import Outcome
 from taxel.events import Events
 from taxel.report.charts import INK
 from taxel.simulate import Contact
@@ -32,7 +32,7 @@ def _figure(rows: int, columns: int, size: tuple[float, float], **kwargs: Any) -
     return plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **kwargs)
 
 
-def scene_picture(outcome: Outcome, start_us: float, stop_us: float) -> Figure:
+def scene_picture(evaluation: Evaluation, start_us: float, stop_us: float) -> Figure:
     """Draw force with truth, both potentials and the detections, from one time to another."""
     figure, axes = _figure(3, 1, (9.5, 5.4), sharex=True, height_ratios=[2, 1, 1])
     first, last = int(start_us / FRAME_US), int(stop_us / FRAME_US)
@@ -40,9 +40,9 @@ def scene_picture(outcome: Outcome, start_us: float, stop_us: float) -> Figure:
     top = axes[0, 0]
     # Presses of half a newton and impacts of twenty in one picture.
     top.set_yscale("function", functions=(lambda v: np.sqrt(np.maximum(v, 0.0)), np.square))
-    top.plot(t, outcome.force_n[first:last], color=INK, linewidth=1.2, label="force on the foam")
+    top.plot(t, evaluation.force_n[first:last], color=INK, linewidth=1.2, label="force on the foam")
     top.set(ylabel="force (N, root scale)", title="Force on the foam")
-    shown = [c for c in outcome.contacts if c.start_us < stop_us and c.stop_us > start_us]
+    shown = [c for c in evaluation.contacts if c.start_us < stop_us and c.stop_us > start_us]
     for axis in axes[:, 0]:
         for contact in shown:
             edges = contact.start_us * 1e-6, contact.stop_us * 1e-6
@@ -50,10 +50,10 @@ def scene_picture(outcome: Outcome, start_us: float, stop_us: float) -> Figure:
     times = to_ms(np.arange(start_us, stop_us, FRAME_US))
     for axis, label in zip(axes[1:, 0], LABELS, strict=True):
         colour = _COLOURS[label]
-        threshold = outcome.readout.neurons[label].neuron.theta_0 * outcome.readout.run_threshold
-        axis.plot(times * 1e-3, outcome.potential(label, times), color=colour, linewidth=0.9, label="potential")
+        threshold = evaluation.readout.neurons[label].neuron.theta_0 * evaluation.readout.run_threshold
+        axis.plot(times * 1e-3, evaluation.potential(label, times), color=colour, linewidth=0.9, label="potential")
         axis.axhline(threshold, color=_QUIET, linewidth=0.8, linestyle="--", label="its threshold")
-        found = outcome.found[label].between(start_us, stop_us)
+        found = evaluation.found[label].between(start_us, stop_us)
         for place in (axis, top):
             for k, at in enumerate(found.known):
                 name = f"{label} detected" * (k == 0)
@@ -65,23 +65,23 @@ def scene_picture(outcome: Outcome, start_us: float, stop_us: float) -> Figure:
     return figure
 
 
-def close_up(outcome: Outcome, contact: Contact, reach_us: float = 5_000.0) -> Figure:
+def close_up(evaluation: Evaluation, contact: Contact, reach_us: float = 5_000.0) -> Figure:
     """Draw force, every event and the contact area's spikes around a touch and around its end."""
     figure, axes = _figure(3, 2, (9.5, 6.2), sharex="col", height_ratios=[1, 2.2, 1.4])
     for column, (label, at) in enumerate((("contact", contact.start_us), ("lift", contact.stop_us))):
         begin, end = at - reach_us, at + reach_us
-        frames = np.arange(max(0, int(begin / FRAME_US)), min(len(outcome.force_n), int(end / FRAME_US) + 1))
+        frames = np.arange(max(0, int(begin / FRAME_US)), min(len(evaluation.force_n), int(end / FRAME_US) + 1))
         force, raster, area = axes[:, column]
-        force.plot(to_ms(frames * FRAME_US - at), outcome.force_n[frames], color=INK, linewidth=1.2)
+        force.plot(to_ms(frames * FRAME_US - at), evaluation.force_n[frames], color=INK, linewidth=1.2)
         force.set(ylabel="force (N)", title=f"{label}, {contact.kind}, {contact.speed_m_s:.2f} m/s")
-        near = outcome.events.between(begin, end)
+        near = evaluation.events.between(begin, end)
         index = near.y.astype(int) * near.array.columns + near.x
         for on, colour in ((True, "#c44e52"), (False, "#4c72b0")):
             mine = near.p == on
             name = f"{'more' if on else 'less'} pressure ({int(mine.sum())})"
             raster.plot(to_ms(near.t[mine] - at), index[mine], ".", color=colour, markersize=2.5, label=name)
         raster.set(ylabel="taxel (row by row)")
-        spikes = outcome.area.between(to_ms(begin), to_ms(end))
+        spikes = evaluation.area.between(to_ms(begin), to_ms(end))
         for train in range(len(spikes)):
             colour = _COLOURS["contact"] if train < 5 else _COLOURS["lift"]
             ms = spikes[train] - to_ms(at)
@@ -91,20 +91,20 @@ def close_up(outcome: Outcome, contact: Contact, reach_us: float = 5_000.0) -> F
         area.set_ylabel("taxels loaded")
         for axis in (force, raster, area):
             axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0, label="true moment")
-            for k, known in enumerate(outcome.found[label].between(begin, end).known):
+            for k, known in enumerate(evaluation.found[label].between(begin, end).known):
                 name = f"{label} known" * (k == 0)
                 axis.axvline(to_ms(known - at), color=_COLOURS[label], linewidth=1.0, label=name)
             axis.legend()
     return figure
 
 
-def maps(outcome: Outcome, contact: Contact) -> Figure:
+def maps(evaluation: Evaluation, contact: Contact) -> Figure:
     """Draw what the host holds of the taxels, above their rest, around a touch and where it is."""
     moments = (-0.4, 0.4, 1.0, 3.0, 8.0, 1e-3 * (contact.stop_us - contact.start_us) + 1.0)
     figure, axes = _figure(1, len(moments), (9.5, 1.9))
-    rest = np.nan_to_num(outcome.tare.rest)
-    held = [_held(outcome.events, contact.start_us + to_us(after), rest) for after in moments]
-    touched = outcome.events.between(contact.start_us, contact.start_us + 3_000.0)
+    rest = np.nan_to_num(evaluation.tare.rest)
+    held = [_held(evaluation.events, contact.start_us + to_us(after), rest) for after in moments]
+    touched = evaluation.events.between(contact.start_us, contact.start_us + 3_000.0)
     middle = [float(np.median(v)) if len(v) else 31.5 for v in (touched.y, touched.x)]
     top, left = (int(np.clip(m - _CROP / 2, 0, n - _CROP)) for m, n in zip(middle, rest.shape, strict=True))
     seen = [h[top : top + _CROP, left : left + _CROP] for h in held]
@@ -129,10 +129,10 @@ def _held(events: Events, until_us: float, rest: NDArray[np.float64]) -> NDArray
     return held - rest
 
 
-def rates(outcome: Outcome, bits: int = 9) -> Figure:
+def rates(evaluation: Evaluation, bits: int = 9) -> Figure:
     """Draw the data rate of impacts as events beside that of frames, as figure 5.14."""
-    impacts = [c for c in outcome.contacts if c.kind == "first"]
-    spans = [outcome.events.between(c.start_us - 500.0, c.stop_us + 1_000.0) for c in impacts]
+    impacts = [c for c in evaluation.contacts if c.kind == "first"]
+    spans = [evaluation.events.between(c.start_us - 500.0, c.stop_us + 1_000.0) for c in impacts]
     each = np.array([len(s) / max(1, int(s.t[-1] - s.t[0])) * 1e6 for s in spans if len(s) > 1])
     figure, axes = _figure(1, 1, (9.5, 2.6))
     axis = axes[0, 0]
@@ -142,8 +142,8 @@ def rates(outcome: Outcome, bits: int = 9) -> Figure:
             each * bits, bins, color=_COLOURS["contact"], label=f"events in a first impact, {bits} bits each (as 5.14)"
         )
         axis.hist(each * 80, bins, color=_COLOURS["lift"], label="the same on the wire, 80 bits with intensity")
-    whole = len(outcome.events) / max(1.0, outcome.stop_us - outcome.start_us) * 1e6
-    taxels, hz = outcome.events.array.rows * outcome.events.array.columns, 1e6 / FRAME_US
+    whole = len(evaluation.events) / max(1.0, evaluation.stop_us - evaluation.start_us) * 1e6
+    taxels, hz = evaluation.events.array.rows * evaluation.events.array.columns, 1e6 / FRAME_US
     for value, colour, name in (
         (whole * 80, "#4b8f4b", "the whole play on the wire"),
         (taxels * hz * 2, _QUIET, "frames, 2 bits a taxel"),
@@ -206,18 +206,18 @@ def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
     return figure
 
 
-def noise(outcome: Outcome) -> Figure:
+def noise(evaluation: Evaluation) -> Figure:
     """Draw a stretch in which nothing touches: events a second, and detections."""
     figure, axes = _figure(1, 1, (9.5, 1.8))
     axis: Axes = axes[0, 0]
-    seconds = np.arange(0.0, (outcome.stop_us - outcome.start_us) * 1e-6, 1.0)
-    each = np.histogram((outcome.events.t - outcome.start_us) * 1e-6, np.append(seconds, seconds[-1] + 1.0))[0]
+    seconds = np.arange(0.0, (evaluation.stop_us - evaluation.start_us) * 1e-6, 1.0)
+    each = np.histogram((evaluation.events.t - evaluation.start_us) * 1e-6, np.append(seconds, seconds[-1] + 1.0))[0]
     axis.bar(seconds + 0.5, each, width=0.9, color=_QUIET, label="events")
     for label in LABELS:
-        for k, at in enumerate(outcome.found[label].t):
-            axis.axvline((at - outcome.start_us) * 1e-6, color=_COLOURS[label], label=f"{label} detected" * (k == 0))
+        for k, at in enumerate(evaluation.found[label].t):
+            axis.axvline((at - evaluation.start_us) * 1e-6, color=_COLOURS[label], label=f"{label} detected" * (k == 0))
     axis.legend()
-    counts: Sequence[str] = [f"{len(outcome.found[label])} times {label}" for label in LABELS]
+    counts: Sequence[str] = [f"{len(evaluation.found[label])} times {label}" for label in LABELS]
     axis.set_xlim(0.0, seconds[-1] + 1.0)
     axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: detected {' and '.join(counts)}")
     return figure

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import taxel
 from taxel._core import DeviceError
-from taxel.demo.outcome import Outcome, evaluate_events
+from taxel.demo.evaluation import Evaluation, evaluate_events
 from taxel.demo.script import script
 from taxel.detect import Readout, run
 from taxel.detections import Detection
@@ -41,7 +41,7 @@ class Screen(Protocol):
 class Playing:
     """A play in real time, and what was counted."""
 
-    outcome: Outcome
+    evaluation: Evaluation
     counters: dict[str, Any]
     emulator: dict[str, Any]
     verdicts: list[str]
@@ -110,9 +110,9 @@ def play_live(
     found = heard(said)
     events = taxel.open(recording).events
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
-    outcome = evaluate_events(events, acts, readout, found)
-    again = again[again.t >= outcome.start_us]
-    mine = outcome.found
+    evaluation = evaluate_events(events, acts, readout, found)
+    again = again[again.t >= evaluation.start_us]
+    mine = evaluation.found
     agrees = len(again) == len(mine) and bool(
         (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
     )
@@ -122,4 +122,4 @@ def play_live(
             f"{summary.counters['late']} events came after the readout's time had moved on, 5 frames behind the host's "
             f"clock: this machine was too busy, and their detections were known later than it could have been"
         )
-    return Playing(outcome, summary.counters, emulator, verdicts, recording, agrees)
+    return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)

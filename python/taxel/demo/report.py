@@ -17,9 +17,9 @@ import numpy as np
 
 import taxel
 from taxel.demo import pictures
+from taxel.demo.evaluation import Evaluation
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
 from taxel.demo.naming import ANSWERED_MS, QUESTIONS, named
-from taxel.demo.outcome import Outcome
 from taxel.demo.script import script
 from taxel.live import delays
 from taxel.report.charts import STYLE, chart
@@ -55,11 +55,11 @@ class Material:
     seed: int
     scenes: int
     live: bool
-    outcome: Outcome
-    noise: Outcome
-    dashpots: dict[float, Outcome]
+    evaluation: Evaluation
+    noise: Evaluation
+    dashpots: dict[float, Evaluation]
     """By the dashpot's time, ms: the same scenes with another foam."""
-    footfalls: Outcome | None = None
+    footfalls: Evaluation | None = None
     footfall_note: str = ""
     counters: dict[str, Any] | None = None
     """What the host counted while it ran."""
@@ -75,15 +75,16 @@ class Material:
 
 def figures(material: Material) -> dict[str, Any]:
     """Return all figures of a report as plain values."""
-    outcome = material.outcome
+    evaluation = material.evaluation
     noise_s = (material.noise.stop_us - material.noise.start_us) * 1e-6
-    every = outcome.events
-    seconds = (outcome.stop_us - outcome.start_us) * 1e-6
+    every = evaluation.events
+    seconds = (evaluation.stop_us - evaluation.start_us) * 1e-6
     impacts = [
-        len(outcome.events.between(c.start_us - 500.0, c.stop_us + 1_000.0)) / (c.stop_us - c.start_us + 1_500.0) * 1e6
-        for c in outcome.contacts
+        1e6 * len(every.between(c.start_us - 500.0, c.stop_us + 1_000.0)) / (c.stop_us - c.start_us + 1_500.0)
+        for c in evaluation.contacts
         if c.kind == "first"
     ]
+    scenes = [act for act in script(material.seed, material.scenes) if isinstance(act, Scene)]
     return {
         "what": "taxel demo",
         "seed": material.seed,
@@ -93,10 +94,10 @@ def figures(material: Material) -> dict[str, Any]:
         else "without the clock: board time as fast as it goes, no socket",
         "board_seconds": seconds,
         "machine": _machine(),
-        "neuron": outcome.judged.to_dict(),
-        "plain_rule": outcome.judged_plain.to_dict(),
-        "delay_split_ms": _split(outcome),
-        "which_drop": named(outcome, [act for act in script(material.seed, material.scenes) if isinstance(act, Scene)]),
+        "neuron": evaluation.judged.to_dict(),
+        "plain_rule": evaluation.judged_plain.to_dict(),
+        "delay_split_ms": _split(evaluation),
+        "which_drop": named(evaluation, scenes),
         "events": len(every),
         "events_per_s": len(every) / seconds,
         "events_per_s_in_first_impacts": _quantiles(impacts),
@@ -141,7 +142,7 @@ def _new(path: Path, text: str) -> None:
 
 
 def _page(material: Material, values: Mapping[str, Any]) -> str:
-    outcome = material.outcome
+    evaluation = material.evaluation
     with mpl.rc_context(STYLE):
         figures_of = _figures(material, values)
         drawn = {name: chart(figure) for name, figure in figures_of.items()}
@@ -152,18 +153,18 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
         values=values,
         pictures=drawn,
         tables={
-            "neuron": _table(outcome.judged),
-            "plain": _table(outcome.judged_plain),
+            "neuron": _table(evaluation.judged),
+            "plain": _table(evaluation.judged_plain),
             "footfalls": None if material.footfalls is None else _table(material.footfalls.judged),
         },
         answered_ms=ANSWERED_MS,
         which_drop=_which_drop(values["which_drop"]),
-        dashpots=_dashpots({1.0: outcome, **material.dashpots}),
+        dashpots=_dashpots({1.0: evaluation, **material.dashpots}),
         goals=GOALS,
-        firsts={label: outcome.judged.row("first", label).touches for label in LABELS},
-        detections=sum(len(outcome.found[label]) for label in LABELS),
-        rest_s=outcome.start_us * 1e-6,
-        within={label: _share(outcome.judged.within_goal(label)) for label in LABELS},
+        firsts={label: evaluation.judged.row("first", label).touches for label in LABELS},
+        detections=sum(len(evaluation.found[label]) for label in LABELS),
+        rest_s=evaluation.start_us * 1e-6,
+        within={label: _share(evaluation.judged.within_goal(label)) for label in LABELS},
         guesses=GUESSES,
         losses=_losses(material),
         delays=delays,
@@ -174,23 +175,23 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
 
 
 def _figures(material: Material, values: Mapping[str, Any]) -> dict[str, Any]:
-    outcome = material.outcome
-    drawn: dict[str, Any] = {"rates": pictures.rates(outcome), "noise": pictures.noise(material.noise)}
-    first = next((c for c in outcome.contacts if c.kind == "first"), None)
+    evaluation = material.evaluation
+    drawn: dict[str, Any] = {"rates": pictures.rates(evaluation), "noise": pictures.noise(material.noise)}
+    first = next((c for c in evaluation.contacts if c.kind == "first"), None)
     if first is not None:
-        later = [c for c in outcome.contacts if c.kind == "first" and c is not first]
-        end = later[0].start_us if later else outcome.stop_us
-        hand = [c.stop_us for c in outcome.contacts if c.start_us < end]
-        drawn["scene"] = pictures.scene_picture(outcome, first.start_us - 60_000.0, max(hand) + 60_000.0)
-        drawn["close_up"] = pictures.close_up(outcome, first)
-        drawn["maps"] = pictures.maps(outcome, first)
-        drawn["delays"] = pictures.delays_by_class(outcome.judged, outcome.judged_plain)
+        later = [c for c in evaluation.contacts if c.kind == "first" and c is not first]
+        end = later[0].start_us if later else evaluation.stop_us
+        hand = [c.stop_us for c in evaluation.contacts if c.start_us < end]
+        drawn["scene"] = pictures.scene_picture(evaluation, first.start_us - 60_000.0, max(hand) + 60_000.0)
+        drawn["close_up"] = pictures.close_up(evaluation, first)
+        drawn["maps"] = pictures.maps(evaluation, first)
+        drawn["delays"] = pictures.delays_by_class(evaluation.judged, evaluation.judged_plain)
     if values["delay_split_ms"]:
         drawn["split"] = pictures.delay_split(values["delay_split_ms"])
     return drawn
 
 
-def _split(outcome: Outcome) -> dict[str, dict[str, float]]:
+def _split(evaluation: Evaluation) -> dict[str, dict[str, float]]:
     """Return the medians of what a delay is made of, ms, for impacts: physics, kernel, frame, host.
 
     Physics: from the true moment to the start of the frame in which two neighbouring taxels first showed it (or fewer
@@ -198,15 +199,15 @@ def _split(outcome: Outcome) -> dict[str, dict[str, float]]:
     the host reported it.
     """
     split = {}
-    for row in outcome.judged.rows:
+    for row in evaluation.judged.rows:
         if row.name not in ("first impact", "bounce, 0.4 m/s and more") or not row.found:
             continue
-        mine = outcome.found[row.label]
-        delay = outcome.readout.neurons[row.label].delay_ms
+        mine = evaluation.found[row.label]
+        delay = evaluation.readout.neurons[row.label].delay_ms
         parts = []
         for touch, place in row.places:
-            contact = outcome.contacts[touch]
-            stamp = outcome.first_input(contact, row.label)
+            contact = evaluation.contacts[touch]
+            stamp = evaluation.first_input(contact, row.label)
             if stamp is None:
                 continue
             true = contact.start_us if row.label == "contact" else contact.stop_us
@@ -285,17 +286,17 @@ def _which_drop(found: Mapping[str, Any]) -> dict[str, Any]:
     return {"lines": lines, "right": right, "chance": {name: _share(v) for name, v in found["chance"].items()}}
 
 
-def _dashpots(by_ms: Mapping[float, Outcome]) -> list[dict[str, str]]:
+def _dashpots(by_ms: Mapping[float, Evaluation]) -> list[dict[str, str]]:
     lines = []
-    for ms, outcome in by_ms.items():
+    for ms, evaluation in by_ms.items():
         line = {"dashpot": f"{ms:g} ms" if ms else "none"}
         for label in LABELS:
-            row = outcome.judged.row("first", label)
+            row = evaluation.judged.row("first", label)
             line[label] = _line(row)["p50"] + " / " + _line(row)["p95"]
-            line[f"{label}_within"] = _share(outcome.judged.within_goal(label))
+            line[f"{label}_within"] = _share(evaluation.judged.within_goal(label))
         line["found"] = ", ".join(
-            f"{sum(r.found for r in outcome.judged.rows if r.label == label and _fast(r))} of "
-            f"{sum(r.touches for r in outcome.judged.rows if r.label == label and _fast(r))}"
+            f"{sum(r.found for r in evaluation.judged.rows if r.label == label and _fast(r))} of "
+            f"{sum(r.touches for r in evaluation.judged.rows if r.label == label and _fast(r))}"
             for label in LABELS
         )
         lines.append(line)

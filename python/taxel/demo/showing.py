@@ -16,8 +16,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from taxel._core import ProblemError
+from taxel.demo.evaluation import Evaluation, evaluate_acts
 from taxel.demo.footfalls import NOTE, footfalls
-from taxel.demo.outcome import Outcome, evaluate_acts
 from taxel.demo.playing import play_live
 from taxel.demo.report import Material, figures, write
 from taxel.demo.screen import Screen
@@ -80,11 +80,11 @@ def show(
     console.print(f"[bold]taxel demo[/bold]: {scenes} scene(s) of seed [bold]{seed}[/bold]")
     counters: dict[str, Any] = {}
     if not live:
-        outcome = _evaluate(console, f"playing {scenes} scenes without the clock", script(seed, scenes), used, seed)
+        evaluation = _evaluate(console, f"playing {scenes} scenes without the clock", script(seed, scenes), used, seed)
     else:
         with Drawing(console=console, refresh_per_second=10, transient=True) as drawing:
             playing = play_live(used, folder, seed=seed, scenes=scenes, screen=lambda *given: Screen(drawing, *given))
-        outcome = playing.outcome
+        evaluation = playing.evaluation
         counters = {
             "counters": playing.counters,
             "emulator": playing.emulator,
@@ -108,7 +108,7 @@ def show(
             seed=seed,
             scenes=scenes,
             live=live,
-            outcome=outcome,
+            evaluation=evaluation,
             noise=quiet,
             dashpots=dashpots,
             footfalls=stepped,
@@ -117,7 +117,7 @@ def show(
         )
         page = write(folder, material)
     values = figures(material)
-    _print_table(console, outcome, quiet)
+    _print_table(console, evaluation, quiet)
     _print_answers(console, values["which_drop"])
     console.print(f"[dim]{time.monotonic() - began:.0f} s in all[/dim]")
     return values, page
@@ -134,18 +134,18 @@ def _busy(console: Console, task: str) -> Progress:
     return bar
 
 
-def _evaluate(console: Console, task: str, acts: Sequence[Act], readout: Readout, seed: int) -> Outcome:
+def _evaluate(console: Console, task: str, acts: Sequence[Act], readout: Readout, seed: int) -> Evaluation:
     with _busy(console, task) as bar:
         return evaluate_acts(
             acts, readout, seed=seed, watch=lambda share: bar.update(bar.task_ids[0], completed=share, total=1.0)
         )
 
 
-def _print_table(console: Console, outcome: Outcome, quiet: Outcome) -> None:
+def _print_table(console: Console, evaluation: Evaluation, quiet: Evaluation) -> None:
     table = Table(box=None, pad_edge=False)
     for name in ("touch", "label", "found", "error, ms", "known, ms"):
         table.add_column(name, justify="left" if name in ("touch", "label") else "right", no_wrap=True)
-    for row in outcome.judged.rows:
+    for row in evaluation.judged.rows:
         if not row.touches:
             continue
         error = f"{row.errors_ms.mean():+.2f}" if row.found else "-"
@@ -153,9 +153,9 @@ def _print_table(console: Console, outcome: Outcome, quiet: Outcome) -> None:
         table.add_row(row.name, row.label, f"{row.found} of {row.touches}", error, known)
     console.print(table)
     console.print("[dim]error: time minus true, mean; known: minus true, median / 95 %[/dim]")
-    false = sum(len(times) for times in outcome.judged.false.values())
+    false = sum(len(times) for times in evaluation.judged.false.values())
     noise_s = (quiet.stop_us - quiet.start_us) * 1e-6
-    within = sum(outcome.judged.false_within.values())
+    within = sum(evaluation.judged.false_within.values())
     off = f" ({within} within a press, more than 50 ms off)" if within else ""
     console.print(f"false detections: {false} in the scenes{off}, {len(quiet.found)} in {noise_s:.0f} s of noise")
 

@@ -114,7 +114,7 @@ def _curves(found: Answer) -> Figure:
 
 
 def _ticks(ax: Axes, values: Sequence[float]) -> None:
-    """Name on a logarithmic axis what was asked, and nothing else."""
+    """Mark these values alone on a logarithmic axis."""
     ax.set_xticks(values, [f"{value:g}" for value in values])
     ax.set_xticks([], minor=True)
 

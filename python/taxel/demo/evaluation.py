@@ -18,11 +18,11 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["Outcome", "evaluate_acts", "evaluate_events"]
+__all__ = ["Evaluation", "evaluate_acts", "evaluate_events"]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Evaluation:
     """One run: events, spikes, detections of the neurons and of the plain rule, truth, and how they compare."""
 
     readout: Readout
@@ -71,7 +71,7 @@ class Outcome:
 
 def evaluate_acts(
     acts: Sequence[Act], readout: Readout, *, seed: int, watch: Callable[[float], object] = lambda _: None
-) -> Outcome:
+) -> Evaluation:
     """Simulate acts without waiting for the clock, and run the readout on the events.
 
     `watch` is called with the share that is done.
@@ -79,7 +79,9 @@ def evaluate_acts(
     return evaluate_events(play(acts, seed=seed, watch=watch).events, acts, readout)
 
 
-def evaluate_events(events: Events, acts: Sequence[Act], readout: Readout, found: Detections | None = None) -> Outcome:
+def evaluate_events(
+    events: Events, acts: Sequence[Act], readout: Readout, found: Detections | None = None
+) -> Evaluation:
     """Run the readout on events, those of the tare among them; or judge the detections `found` live."""
     start = events.markers[0][0]
     tare = Tare.take(events, stop_us=start)
@@ -91,7 +93,7 @@ def evaluate_events(events: Events, acts: Sequence[Act], readout: Readout, found
     area = area.between(to_ms(start), area.stop)
     contacts, force = truth(acts)
     plain = plain_rule(area, FRAME_US)
-    return Outcome(
+    return Evaluation(
         readout=readout,
         tare=tare,
         events=events.between(start, np.inf),
