@@ -96,7 +96,7 @@ def every(
 ) -> None:
     """Run every study and make one page of them; with --confirm, confirm those whose kept figures are stale.
 
-    Studies on recordings are left out, and said to be, where no recordings are; so are those whose packages are not
+    Studies on recordings are left out, and named, where no recordings are; so are those whose packages are not
     installed.
 
     Example: taxel study all --report figures --jobs 2
@@ -109,7 +109,7 @@ def every(
                 _confirm(name, figures, data, strict)
         return
     changes = {} if realisations is None else {"realisations": realisations}
-    said = {}
+    sections = {}
     try:
         for name in STUDIES:
             study = load(name)
@@ -117,7 +117,7 @@ def every(
             where = _data(data)
             if _left_out(name, where) is not None:
                 continue
-            said[name] = study.run(
+            sections[name] = study.run(
                 report,
                 size=size if size in study.sizes else "full",
                 changes=own,
@@ -130,9 +130,9 @@ def every(
         # Whatever stopped it: the page shows what was run, and names the rest.
         page = _page(report)
     if as_json:
-        typer.echo(json.dumps(said))
+        typer.echo(json.dumps(sections))
         return
-    for section in said.values():
+    for section in sections.values():
         _tell(section)
     typer.echo(f"page: {page}")
 
@@ -218,8 +218,8 @@ def _data(data: Path | None) -> Path | None:
     return data or (Path(named) if named else None)
 
 
-def _changes(said: list[str], realisations: int | None) -> dict[str, Any]:
-    return ({} if realisations is None else {"realisations": realisations}) | assignments(said)
+def _changes(given: list[str], realisations: int | None) -> dict[str, Any]:
+    return ({} if realisations is None else {"realisations": realisations}) | assignments(given)
 
 
 def _tell(section: dict[str, Any]) -> None:
@@ -231,12 +231,12 @@ def _tell(section: dict[str, Any]) -> None:
         holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
         typer.echo(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
         typer.echo(f"    published: {s['published']}\n    ours: {s['ours']}")
-    for said in section["tables"]:
-        if not said["folded"]:
-            table = Table(title=said["title"], title_justify="left")
-            for k, name in enumerate(said["head"]):
+    for shown in section["tables"]:
+        if not shown["folded"]:
+            table = Table(title=shown["title"], title_justify="left")
+            for k, name in enumerate(shown["head"]):
                 table.add_column(name, justify="right" if k else "left", no_wrap=not k)
-            for row in said["rows"]:
+            for row in shown["rows"]:
                 table.add_row(*row)
             Console().print(table)
     for file, why in section["unread"].items():

@@ -48,7 +48,6 @@ __all__ = [
     "sampled",
     "smoothed",
     "spatial_grams",
-    "told",
 ]
 
 #: 5.6.2's experiment: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
@@ -161,7 +160,7 @@ def play_tasks(p: Mapping[str, Any]) -> list[Task]:
     return [Task({**named(p), "condition": list(one)}, p["seed"]) for one in conditions(p)]
 
 
-def told(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
+def played_summary(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
     """Return what a realisation of `play_tasks` tells of its drops; None where it is another's."""
     if "condition" not in params:
         return None

@@ -31,7 +31,7 @@ def foot(seed=1, jitter_ms=3.0, pattern=True):
 
 
 def test_it_finds_the_steps_of_a_made_up_foot_untold():
-    said = stdp_walk.heard(foot(), stdp_walk.PARAMETERS)
+    said = stdp_walk.train_and_test(foot(), stdp_walk.PARAMETERS)
     assert stdp_walk.found(said["learnt"])
     assert said["learnt"]["once"] > 0.9
     assert -10 < said["learnt"]["phase_ms"] < 80
@@ -41,7 +41,7 @@ def test_it_finds_the_steps_of_a_made_up_foot_untold():
 
 def test_where_nothing_repeats_there_is_nothing_to_find():
     for seed in range(3):
-        assert not stdp_walk.found(stdp_walk.heard(foot(seed, pattern=False), stdp_walk.PARAMETERS)["learnt"])
+        assert not stdp_walk.found(stdp_walk.train_and_test(foot(seed, pattern=False), stdp_walk.PARAMETERS)["learnt"])
 
 
 @pytest.mark.parametrize("hz", [0.1, 1.0])

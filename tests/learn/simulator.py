@@ -89,7 +89,7 @@ class Simulated:
         low, high = inner[k - 1], inner[k]
         if values[k] < 0:
             return float(high)
-        while high - low > 1e-10:
+        while high - low > max(1e-10, 2 * np.spacing(abs(high))):
             middle = (low + high) / 2
             low, high = (low, middle) if self.above(middle)[0] >= 0 else (middle, high)
         return float(high)
@@ -101,4 +101,4 @@ def misfire(neuron, weights, pattern, targets, end):
     if len(fired) != len(targets):
         return f"fires at {fired[:9]}, not at {targets}"
     off = np.abs(np.array(fired) - np.array(targets)).max(initial=0)
-    return f"fires {off} ms beside a target" if off > 1e-6 + 4 * np.spacing(end) else None
+    return f"fires {off} ms beside a target" if off > 1e-6 + 4 * np.spacing(abs(end)) else None

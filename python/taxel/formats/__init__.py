@@ -83,6 +83,13 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
     FormatError : no format, or several, or a file that does not hold what it should (names file and line)
     ProblemError : a format that is none
     FileNotFoundError : nothing is there
+
+    Examples
+    --------
+    >>> list(trials("a folder that is not there"))
+    Traceback (most recent call last):
+    ...
+    FileNotFoundError: [Errno 2] No such file or directory: 'a folder that is not there'
     """
     place = Path(checked_path("path", path))
     if not place.exists():

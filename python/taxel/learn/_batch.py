@@ -56,6 +56,15 @@ class BatchLearner(SpikeLearner):
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
         """Return when the learner fires, one array a pattern, ms.
 
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains as in `fit`.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
+
         Raises
         ------
         ProblemError : patterns that make no sense

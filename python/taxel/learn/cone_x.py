@@ -25,14 +25,19 @@ __all__ = ["Certificate", "ConeX", "ConeXProblem", "Margin", "Row"]
 class Row(NamedTuple):
     """Name a row of a problem by pattern and time.
 
-    Attributes
+    Parameters
     ----------
     kind : {"target", "silence", "slope"}
         The potential at a target equals the threshold (6.9a); it stays below at a time (6.9b); it comes up to a target
         from below.
-    pattern : int
-    at : int or float
-        Which target of the pattern; in silence when, ms.
+    pattern : int, 0 or more
+    at : int, 0 or more, or float, ms
+        The number of the target in its pattern; of a row of silence, its time.
+
+    Examples
+    --------
+    >>> Row("silence", 0, 17.5)
+    Row(kind='silence', pattern=0, at=17.5)
     """
 
     kind: Literal["target", "silence", "slope"]
@@ -44,11 +49,10 @@ class Row(NamedTuple):
 class Certificate:
     """Prove that no weights within the bounds meet the named rows together (Farkas).
 
-    Attributes
+    Parameters
     ----------
     rows : list of Row
-    multipliers : float64, shape (rows,)
-        Of targets any sign, of all other rows 0 or more.
+    multipliers : float64, shape (rows,), of any sign at targets, else 0 or more
     gap : float, mV
         By how much the bounds fail what the rows demand.
     at_all : bool
@@ -56,6 +60,12 @@ class Certificate:
         this margin.
     text : str
         Which patterns, which targets, which silences conflict.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
+    >>> print(ConeX().fit([trains], [[40.0]]).certificate_)
+    no weights within the bounds fire at pattern 0 target 0 (40 ms): no input counts before it. Impossible at all: it needs no margin
     """
 
     rows: list[Row]
@@ -72,9 +82,9 @@ class Certificate:
 
 
 class Margin(NamedTuple):
-    """Say how far below the threshold silence stays.
+    """Hold how far below the threshold silence stays.
 
-    Attributes
+    Parameters
     ----------
     mv : float, mV
         Away from targets.
@@ -126,18 +136,18 @@ class ConeX(SpikeLearner):
     horizon : float or float64 of shape (patterns,), ms, optional
         Where silence ends; the later of a pattern's stop and its last target + `tau` where left out.
     tolerance : float, from 1e-12 to 0.1
-        The proven relative gap at which a fit counts as solved.
+        The proven relative gap at which the search ends.
     max_seconds : float, s, above 0, optional
         After so long a fit ends with the best so far.
 
     Attributes
     ----------
     status_ : {"solved", "infeasible", "stopped"}
-        "solved": silence keeps at least half its margin, the neuron, run on the patterns, fires within 1e-6 ms of every
-        target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion where theta_0 is not
-        0.3 mV), and no weights that keep the whole margin have an objective smaller by more than `tolerance` of it, or
-        by more than 1e-10 of what B is without weights. "infeasible": `certificate_` proves it. "stopped": neither is
-        known.
+        "solved": silence keeps at least half its margin, and the neuron, run on the patterns, fires within 1e-6 ms of
+        every target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion where theta_0 is
+        not 0.3 mV). Unless the search ended early (`reason_`), no weights that keep the whole margin have an objective
+        smaller by more than `tolerance` of it, or by more than 1e-10 of what B is without weights. "infeasible":
+        `certificate_` proves it. "stopped": neither is known.
     weights_ : float64, shape (trains,), mV
         The best so far where stopped; NaN where infeasible.
     objective_ : float
@@ -151,11 +161,12 @@ class ConeX(SpikeLearner):
         The margin that holds, at least half of what was asked for (`problem_.margin`); on the grid, as `mv`, the least
         threshold - potential over the silent points.
     reason_ : str or None
-        Why, where stopped: what is not met, with its pattern and time.
+        Where stopped: what is not met, with its pattern and time. Where solved: None, or why `gap_` is above
+        `tolerance`: `max_seconds` or Ctrl-C ended the search, or rounding did.
     violation_ : float, mV
         How far the worst row is broken: targets missed, silence with half its margin.
     engine_ : {"native", "cone solver"}
-        What closed the gap: taxel's own engine, or row generation around Clarabel where the own one did not.
+        Which engine closed the gap: taxel's own, or row generation around Clarabel where the own one did not.
     certificate_ : Certificate or None
         The proof, where infeasible.
     problem_ : ConeXProblem
@@ -248,7 +259,7 @@ class ConeX(SpikeLearner):
         Raises
         ------
         ProblemError : patterns or targets that make no sense (names pattern and target)
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the best so far is kept, `status_` is "stopped"
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         if progress is not None:
             callback("progress", progress)
@@ -284,6 +295,15 @@ class ConeX(SpikeLearner):
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
         """Return the output spikes of the trained neuron, one array a pattern, ms.
 
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains as in `fit`.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
+
         Raises
         ------
         ProblemError : patterns that make no sense
@@ -295,6 +315,14 @@ class ConeX(SpikeLearner):
 class ConeXProblem:
     """State the rows of a problem when asked, by pattern and time; never all of them at once.
 
+    Parameters
+    ----------
+    cone : ConeX
+        The learner whose parameters state the problem.
+    patterns : sequence of SpikeTrains
+    targets : sequence of float sequences, ms
+        As in `ConeX.fit`.
+
     Attributes
     ----------
     lb, ub : float64, shape (trains,), mV
@@ -302,6 +330,18 @@ class ConeXProblem:
         One array a pattern.
     margin : Margin
         How far below the threshold its rows keep silence.
+
+    Raises
+    ------
+    ProblemError : as `ConeX.fit`
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[5.0], [12.0]], stop=60.0)
+    >>> problem = ConeXProblem(ConeX(), [trains], [[20.0]])
+    >>> coefficients, threshold = problem.target(0, 0)
+    >>> coefficients.round(3), threshold
+    (array([0.368, 0.313]), 0.3)
     """
 
     def __init__(self, cone: ConeX, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
@@ -361,7 +401,7 @@ class ConeXProblem:
 
         Parameters
         ----------
-        pattern, target : int
+        pattern, target : int, 0 or more
 
         Returns
         -------
@@ -379,7 +419,7 @@ class ConeXProblem:
 
         Parameters
         ----------
-        pattern : int
+        pattern : int, 0 or more
         t : float, ms
         margin : bool
             False: with margin 0.
@@ -401,7 +441,7 @@ class ConeXProblem:
 
         Parameters
         ----------
-        pattern, target : int
+        pattern, target : int, 0 or more
         margin : bool
             False: with slope 0.
 
@@ -423,7 +463,7 @@ class ConeXProblem:
 
         Parameters
         ----------
-        pattern, target : int
+        pattern, target : int, 0 or more
 
         Returns
         -------
