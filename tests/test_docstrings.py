@@ -23,12 +23,8 @@ NOT_YET = {
     "taxel.device",
     # encode
     "taxel.encode",
-    # learn
-    "taxel.learn",
     # live
     "taxel.live",
-    # metrics
-    "taxel.metrics",
     # plot
     "taxel.plot",
     # wire

@@ -44,11 +44,11 @@ class Neuron(Value):
     first_threshold : {"theta_0", "printed"}
         The threshold before the first spike: `theta_0`, or raised from the start as 6.9 prints it.
     time : {"continuous", "grid"}
-        Crossings are found exactly, or looked for at the points ``start + k * step_ms``.
+        Crossings are found exactly, or sought at the points ``start + k * step_ms``.
     step_ms : float, ms, above 0
         Step of the grid.
     kernel : {"alpha", "double_exponential", "exponential"}
-        What an input does to the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))``, its
+        The effect of an input on the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))``, its
         largest value 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential only jumps, at inputs.
     tau_s : float, ms, above 0 and below `tau`, optional
         Synaptic time constant of the double exponential; ``tau / 4`` where left out.

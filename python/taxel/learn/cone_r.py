@@ -1,4 +1,4 @@
-"""CONE-R: the best weights where targets and silence cannot all be met."""
+"""CONE-R: the best weights where no weights satisfy all targets and all silence."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class ConeR(SpikeLearner):
         The neuron to be trained; ``Neuron()`` where it is left out. Whatever its `time`, it is trained on the grid of
         its `step_ms`, which is also the step of the silent rows.
     kappa : float, above 0
-        What the potential shall reach behind a target, in thresholds.
+        The potential that B aims at behind a target, in thresholds.
     delta_t_ms : float, ms, 0 or more, optional
-        How far behind; ``0.1 * tau`` where left out.
+        Delay of that after the target; ``0.1 * tau`` where left out.
     lambdas : five floats, 0 or more
         Shares of l1, l2, B, C, D in the objective; only their ratios matter.
     lb, ub : float, or float sequence of shape (trains,), mV
-        Least and largest weight, for all synapses or one a synapse. All normalisers are taken at ``-max(|lb|, |ub|)``
+        Least and largest weight, for all synapses or one a synapse. All normalisers are computed at ``-max(|lb|, |ub|)``
         and ``+max(|lb|, |ub|)``, synapse by synapse.
     divide_b_by : {"B_max", "targets"}
         B over its largest value, as printed, or over the number of targets.
@@ -361,7 +361,7 @@ def _weighed(name: str, count: int, what: str) -> None:
 
 
 def _counted(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] | None:
-    """Return the trains that have a spike in some pattern, or that bounds hold away from 0; None: nothing to leave out.
+    """Return the trains that have a spike in some pattern, or that bounds hold away from 0; None where these are all trains.
 
     The weight of any other is 0 whatever else is learnt, and of a whole array's trains nearly all are such.
     """
@@ -378,7 +378,7 @@ def _counted(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64
 
 
 def _keep(cone: ConeR, found: Any, silent_rows: int, all_rows: int) -> None:
-    """Put what was found on the learner."""
+    """Set the results of a fit on the learner."""
     weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable, refires), multipliers = found
     cone.weights_ = weights
     cone.objective_ = objective

@@ -1,4 +1,4 @@
-"""CONE-X: weights that fire a neuron at its targets and nowhere else, exactly, or the proof that there are none."""
+"""CONE-X: weights with which a neuron fires at its targets and nowhere else, exactly, or a proof that there are none."""
 
 from __future__ import annotations
 
@@ -101,10 +101,10 @@ _DEFAULT = defaults("cone_x")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ConeX(SpikeLearner):
-    """Learn weights by CONE-X: every target met and every silence kept, with the least norms and missed lift.
+    """Learn weights by CONE-X: exact at every target, silent elsewhere, with the least norms and missed lift.
 
     In continuous time (the default) silence holds at every instant. On the grid it is the thesis' problem 6.11, which
-    asks for silence at 1 ms points only: most such weights fire early or once more between them.
+    requires silence at 1 ms points only: most such weights fire early or once more between them.
 
     Parameters
     ----------
@@ -112,13 +112,13 @@ class ConeX(SpikeLearner):
         The neuron to be trained; ``Neuron()`` where it is left out. With its ``time="grid"`` its `step_ms` is also the
         step of the silent rows.
     kappa : float, above 0
-        What the potential shall reach behind a target, in thresholds.
+        The potential that B aims at behind a target, in thresholds.
     delta_t_ms : float, ms, 0 or more, optional
-        How far behind; ``0.1 * tau`` where left out.
+        Delay of that after the target; ``0.1 * tau`` where left out.
     lambdas : three floats, 0 or more
         Shares of l1, l2, B in the objective; only their ratios matter. All 0: any weights will do.
     lb, ub : float or float64 of shape (trains,), mV
-        Least and largest weight, finite. All normalisers are taken at ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``.
+        Least and largest weight, finite. All normalisers are computed at ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``.
     divide_b_by : {"B_max", "targets"}
         B over its largest value, as printed, or over the number of targets.
     norm : {"norm", "square"}
@@ -126,7 +126,7 @@ class ConeX(SpikeLearner):
     margin : float, mV, 0 or more, optional
         How far below the threshold silence shall stay; where left out ``theta_0 / 300`` (1e-3 by default) in
         continuous time, 0 on the grid. Where neither it nor `slope` is given and no weights keep it, in continuous time
-        a tenth, a hundredth and a thousandth of both are tried (`problem_.margin` says which it was), so that
+        a tenth, a hundredth and a thousandth of both are tried (`problem_.margin` is the last), so that
         "infeasible" holds for any margin (``certificate_.at_all``); with one that is given it holds for that one. On
         the grid the best weights touch the threshold at many points, and a neuron that is run on the grid fires where
         it is touched: ask for 1e-9 or more.
@@ -156,12 +156,12 @@ class ConeX(SpikeLearner):
         Its terms: l1, l2, B.
     gap_ : float
         How far, relative to it, the objective can lie above the least one over all weights that keep the whole margin:
-        a proven bound, whatever the engine said. (In continuous time these weights keep `margin_`, a little less.)
+        a proven bound, independent of the engine. (In continuous time these weights keep `margin_`, a little less.)
     margin_ : Margin
-        The margin that holds, at least half of what was asked for (`problem_.margin`); on the grid, as `mv`, the least
+        The margin that holds, at least half of that of the problem (`problem_.margin`); on the grid, as `mv`, the least
         threshold - potential over the silent points.
     reason_ : str or None
-        Where stopped: what is not met, with its pattern and time. Where solved: None, or why `gap_` is above
+        Where stopped: the row that is violated or the spike that is wrong, with its pattern and time. Where solved: None, or why `gap_` is above
         `tolerance`: `max_seconds` or Ctrl-C ended the search, or rounding did.
     violation_ : float, mV
         How far the worst row is broken: targets missed, silence with half its margin.
@@ -170,7 +170,7 @@ class ConeX(SpikeLearner):
     certificate_ : Certificate or None
         The proof, where infeasible.
     problem_ : ConeXProblem
-        The problem, which states its rows when asked.
+        The problem, which states its rows one by one.
     rounds_ : int
         Rounds of row generation.
     held_ : list of (Row, float)
@@ -313,7 +313,7 @@ class ConeX(SpikeLearner):
 
 
 class ConeXProblem:
-    """State the rows of a problem when asked, by pattern and time; never all of them at once.
+    """State the rows of a problem one by one, by pattern and time; never all of them at once.
 
     Parameters
     ----------
@@ -397,7 +397,7 @@ class ConeXProblem:
         return self._problem.row(name, flag("margin", margin))
 
     def target(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
-        """State what a target asks (6.9a): the coefficients of the potential there, which equals the threshold.
+        """State the row of a target (6.9a): the coefficients of the potential there, which equals the threshold.
 
         Parameters
         ----------
@@ -415,7 +415,7 @@ class ConeXProblem:
         return self.row(("target", pattern, whole("target", target, 0)))
 
     def silence(self, pattern: int, t: float, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
-        """State what silence asks at a time (6.9b): coefficients of the potential, and what it must not exceed.
+        """State the row of silence at a time (6.9b): coefficients of the potential, and its limit.
 
         Parameters
         ----------
@@ -432,12 +432,19 @@ class ConeXProblem:
 
         Raises
         ------
-        ProblemError : a time at which nothing is asked
+        ProblemError : a time at which silence is not required
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[5.0], [12.0]], stop=60.0)
+        >>> coefficients, limit = ConeXProblem(ConeX(), [trains], [[20.0]]).silence(0, 50.0)
+        >>> coefficients.round(3), round(limit, 3)
+        (array([0.149, 0.201]), 0.38)
         """
         return self.row(("silence", pattern, t), margin=margin)
 
     def slope(self, pattern: int, target: int, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
-        """State how the potential comes up to a target from below (continuous time only).
+        """State the row of the slope at a target, where the potential rises to the threshold (continuous time only).
 
         Parameters
         ----------
@@ -459,7 +466,7 @@ class ConeXProblem:
         return self.row(("slope", pattern, whole("target", target, 0)), margin=margin)
 
     def behind(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
-        """State what B looks at behind a target (6.10): the coefficients of the potential, and what it shall reach.
+        """State the row of B behind a target (6.10): the coefficients of the potential, and the value that it aims at.
 
         Parameters
         ----------

@@ -173,6 +173,12 @@ class SKIM(BatchLearner):
         ------
         ProblemError : a pattern that makes no sense
         NotFittedError : before `fit`
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[float(t)] for t in range(0, 120, 3)], stop=200.0)
+        >>> int(SKIM(tau=8.0).fit([trains], [[60.0]]).output(trains).argmax())
+        63
         """
         return _core.output_skim(self._json(), self._fitted(), instance("pattern", pattern, SpikeTrains)._parts())
 

@@ -127,7 +127,7 @@ class Tempotron(Learner):
         Raises
         ------
         ProblemError : patterns, labels or first weights that make no sense
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the best weights so far are kept
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         given = enumerate(several("patterns", patterns))
         trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in given]
@@ -211,7 +211,7 @@ class Tempotron(Learner):
         return _core.peak_tempotron(self._json(), floats("weights", weights), trains)
 
     def change(self, weights: ArrayLike, pattern: SpikeTrains, label: bool) -> NDArray[np.float64]:
-        """Return what one presentation asks of the weights, over the learning rate: 0 where the neuron is right.
+        """Return the change of the weights by one presentation, over the learning rate: 0 where the neuron is right.
 
         Parameters
         ----------
@@ -223,7 +223,7 @@ class Tempotron(Learner):
         Returns
         -------
         float64, shape (trains,)
-            The potential that each input makes at the peak: taken off where a spike is false, added where one is
+            The potential that each input makes at the peak: negative where a spike is false, positive where one is
             missed.
 
         Raises
