@@ -54,7 +54,7 @@ def test_a_benchmark_runs_without_peers_and_names_those_that_it_leaves_out(path:
     assert [name for name in named if f"left out: {name}" not in done.stdout] == []
 
 
-def test_a_peer_that_is_not_installed_is_left_out_and_said() -> None:
+def test_a_peer_that_is_not_installed_is_left_out_and_named() -> None:
     done = without_peers("bench", "recording_write", "--quick")
     assert (done.returncode, done.stderr) == (0, "")
     assert "left out: mcap (Python): mcap not installed" in done.stdout

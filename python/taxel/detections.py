@@ -71,24 +71,24 @@ class Detection(NamedTuple):
 
 
 class Detections(Columns):
-    """Hold what a readout said: label, time of the event, time at which it could be said, and how surely.
+    """Hold what a readout detected: label, time of the event, time at which it could be known, and how surely.
 
     All times are us of the board's clock.
 
     Parameters
     ----------
-    label : str, shape (n,)
+    label : str, shape (n,), text
     t : int64, shape (n,), us
         When the event was: the crossing less the encoder's latency and the trained delay.
     known : int64, shape (n,), us
-        When it could first be said: the end of the frame in which the potential crosses.
+        When it could first be known: the end of the frame in which the potential crosses.
     slope : float, shape (n,), mV/ms, optional
         How steeply the potential rose above its threshold, as a measure of how sure; None for one that has none. Read
         back as NaN, also where it is left out.
     said : int64, shape (n,), us, optional
-        When it was said, by the host's clock less the estimated offset.
+        When it was reported, by the host's clock less the estimated offset.
     repaired : bool, shape (n,), optional
-        Whether it may rest on values that states of wire version 2 repaired after a loss: what it tells may have
+        Whether it may rest on values that states of wire version 2 repaired after a loss: what it reports may have
         happened before `t`. None where it is left out.
 
     Raises
@@ -200,7 +200,21 @@ class Detections(Columns):
         return Detections._of(label, t, known, slope, said, self.repaired[places])
 
     def between(self, start: float, stop: float) -> Detections:
-        """Return the detections of ``start <= t < stop`` (us)."""
+        """Return the detections of ``start <= t < stop`` (us).
+
+        Parameters
+        ----------
+        start, stop : float, us
+
+        Raises
+        ------
+        ProblemError : a start that lies after the stop, or is no number
+
+        Examples
+        --------
+        >>> len(Detections(["a", "b"], [10, 20], [11, 22]).between(15, 25))
+        1
+        """
         start, stop = window("us", start, stop)
         return self[(self.t >= start) & (self.t < stop)]
 
@@ -254,9 +268,19 @@ class Detections(Columns):
     def from_numpy(cls, records: NDArray[np.void]) -> Detections:
         """Build detections from records with the fields ``label t known slope``, and ``said``, ``repaired`` if there.
 
+        Parameters
+        ----------
+        records : structured array, shape (n,), with the units of the columns
+
         Raises
         ------
         ProblemError : a field is missing (names it)
+
+        Examples
+        --------
+        >>> found = Detections(["a"], [10], [11])
+        >>> Detections.from_numpy(found.to_numpy())
+        Detections(1: a 1; 10 to 10 us)
         """
         names = fields(records, ("label", "t", "known", "slope"))
         said, repaired = (records[name] if name in names else None for name in ("said", _REPAIRED))
@@ -264,6 +288,16 @@ class Detections(Columns):
 
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write a table ``label,t_us,known_us,slope_mv_per_ms[,said_us][,repaired]`` and return its path.
+
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
 
         Raises
         ------
@@ -288,10 +322,21 @@ class Detections(Columns):
     def from_csv(cls, path: str | os.PathLike[str]) -> Detections:
         """Read a table that `to_csv` wrote.
 
+        Parameters
+        ----------
+        path : path
+
         Raises
         ------
         FormatError : another header, or a value that makes no sense (names the line)
         FileNotFoundError : no such file
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> place = Detections(["a"], [10], [11]).to_csv(Path(tempfile.mkdtemp()) / "found.csv")
+        >>> Detections.from_csv(place)
+        Detections(1: a 1; 10 to 10 us)
         """
         place = Path(checked_path("path", path))
         table = HeaderTable.read(place, text_of(place))
@@ -329,6 +374,10 @@ class Detections(Columns):
     @classmethod
     def from_neo(cls, events: Any) -> Detections:
         """Build detections from a ``neo.Event`` of any time unit that `to_neo` made.
+
+        Parameters
+        ----------
+        events : neo.Event
 
         Raises
         ------

@@ -119,7 +119,16 @@ class Labels:
         return tuple(sorted({row.recording for row in self.rows} - {""}))
 
     def named(self, recording: str | os.PathLike[str]) -> str | None:
-        """Return as what the table names a recording: by its path, its name or its stem; None where it does not."""
+        """Return as what the table names a recording: by its path, its name or its stem; None where it does not.
+
+        Parameters
+        ----------
+        recording : path
+
+        Raises
+        ------
+        ProblemError : no path
+        """
         place = Path(checked_path("recording", recording))
         names = {row.recording for row in self.rows}
         return next((name for name in ("", str(recording), place.name, place.stem) if name in names), None)
@@ -129,6 +138,14 @@ class Labels:
 
         A recording that began in mid-stream counts from its first stamp, which is whole turns of the board's clock
         (6.5536 s) behind the board. Where both know the host's time, that settles how many.
+
+        Parameters
+        ----------
+        recording : Recording
+
+        Returns
+        -------
+        dict from str to int64, shape (events,), us
 
         Raises
         ------

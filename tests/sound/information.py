@@ -199,7 +199,6 @@ LEFT_OUT: dict[str, str] = {
     "taxel.information.Answer": "a result",
     "taxel.information.Control": "a result",
     "taxel.information.Estimate": "a result",
-    "taxel.information.LDA.from_moments": "for FoldSums, which checks",
     "taxel.information.Nested": "a result",
     "taxel.information.Point": "a result",
     "taxel.information.Verdict": "a result",

@@ -72,13 +72,7 @@ SOUND: dict[str, Sound] = {
 #: What is not tried, and why.
 LEFT_OUT: dict[str, str] = {
     "taxel.Detection": "one of Detections",
-    "taxel.Error": "raised, not called",
-    "taxel.FormatError": "raised, not called",
-    "taxel.ProblemError": "raised, not called",
-    "taxel.DeviceError": "raised, not called",
-    "taxel.SceneError": "raised, not called",
     "taxel.Clock": "of a recording",
     "taxel.Clock.host_ns": "of a recording",
     "taxel.Clock.board_us_at": "of a recording",
-    "taxel.NotFittedError": "raised, not called",
 }

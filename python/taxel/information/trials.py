@@ -53,6 +53,12 @@ class LabelledTrial:
     Raises
     ------
     ProblemError : a source of another kind, an empty label, or an end that does not lie after the start
+
+    Examples
+    --------
+    >>> events = Events([0, 200], [0, 1], [0, 0], [True, False], array=Array(1, 2))
+    >>> LabelledTrial(events, "ball", 0, 500).array.shape
+    (1, 2)
     """
 
     source: Events | Frames

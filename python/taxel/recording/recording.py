@@ -40,6 +40,11 @@ class Recording:
 
     Made by `taxel.open`.
 
+    Parameters
+    ----------
+    contents : Contents
+        What `taxel.open` read.
+
     Attributes
     ----------
     path : Path
@@ -338,14 +343,36 @@ class Recording:
 
         Notes without a time are left out, and stand in its `lost`.
 
+        Parameters
+        ----------
+        start, stop : float, us
+
         Raises
         ------
         ProblemError : a start that lies after the stop, or is no number
+
+        Examples
+        --------
+        >>> import pathlib, tempfile, taxel
+        >>> place = pathlib.Path(tempfile.mkdtemp()) / "two.npz"
+        >>> events = taxel.Events([0, 192], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+        >>> _ = taxel.convert(events, place)
+        >>> taxel.open(place).between(100, 200)
+        Recording(two.npz: 1 events, 192 to 192 us, 8 x 8 taxels)
         """
         return Recording(between(self._contents, *window("us", start, stop)))
 
     def with_notes(self, notes: Iterable[Note]) -> Recording:
-        """Return the same recording with further notes."""
+        """Return the same recording with further notes.
+
+        Parameters
+        ----------
+        notes : iterable of Note
+
+        Raises
+        ------
+        ProblemError : something that is no `taxel.Note`
+        """
         more = tuple(instance("notes", note, Note) for note in several("notes", notes))
         return Recording(with_notes(self._contents, more))
 

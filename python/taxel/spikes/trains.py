@@ -100,6 +100,11 @@ class SpikeTrains(Columns):
         Raises
         ------
         ProblemError : times that make no sense (names train and spike)
+
+        Examples
+        --------
+        >>> SpikeTrains.from_lists([[1.0, 5.0], []], stop=10.0)
+        SpikeTrains(2 trains, 2 spikes, 0 to 10 ms)
         """
         flat, counts = _by_train("times", bare("times", times, "ms"), np.float64)
         signed = None
@@ -435,6 +440,13 @@ class SpikeTrains(Columns):
         ------
         FormatError : another file (names it)
         FileNotFoundError : no such file
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> place = SpikeTrains.from_lists([[1.0, 5.0]]).save(Path(tempfile.mkdtemp()) / "trains.npz")
+        >>> SpikeTrains.load(place).times
+        array([1., 5.])
         """
         place = checked_path("path", path)
         try:
