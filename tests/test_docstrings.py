@@ -25,8 +25,6 @@ NOT_YET = {
     "taxel.encode",
     # live
     "taxel.live",
-    # plot
-    "taxel.plot",
     # wire
     "taxel.wire",
 }

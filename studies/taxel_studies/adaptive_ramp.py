@@ -31,7 +31,7 @@ PARAMETERS: dict[str, Any] = {
     "fine_ms": 500.0,
     "realisations": 10,
 }
-#: What is called seen: so much more than before a tap, V (the least load that the thesis tells, 4.4.1).
+#: A tap counts as seen from this rise on, V (the least load that the thesis resolves, 4.4.1).
 SEEN_V = 0.1
 #: Silence before the first tap and between two, ms.
 APART_MS = 40.0
@@ -123,7 +123,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Tell of each converter how wrong it is in each phase, how late it sees a tap, and how often it scans."""
+    """Return of each converter how wrong it is in each phase, how late it sees a tap, and how often it scans."""
     del p
     summary: Summary = {"ramps": {}}
     for name in dict.fromkeys(row.params["ramp"] for row in rows):

@@ -55,7 +55,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[float]]:
-    """Return when each taxel under the impact first told a rise after contact, ms; taxels by their index there."""
+    """Return when each taxel under the impact first sent a rise after contact, ms; taxels by their index there."""
     low = events.array.columns // 2 - SIDE // 2
     x, y = events.x.astype(int) - low, events.y.astype(int) - low
     since = to_ms(events.t - contact_us)
@@ -175,7 +175,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             f"version 2 of the wire {alone['touched_kbit_s']:.0f} instead of {scanned['touched_kbit_s']:.0f}, of which "
             f"{alone['rest_kbit_s']:.0f} and {scanned['rest_kbit_s']:.0f} are sent at rest too",
             None,
-            "power is not simulated; a taxel by itself tells each step on the way, a scanned one only where a frame "
+            "power is not simulated; a taxel by itself sends each step on the way, a scanned one only where a frame "
             "finds it",
         ),
     ]

@@ -1,4 +1,4 @@
-"""What four codes tell of the same spikes: rate, first-spike latency, relative latency, rank order (thesis 2.3.2).
+"""The bits of four codes of the same spikes: rate, first-spike latency, relative latency, rank order (thesis 2.3.2).
 
 Balls of several radii fall from several heights on one place of the emulated board, its taxels and the ball's place
 drawn anew each time; FA-1 afferents under the impact fire; each code reads the same spikes, and linear discriminants
@@ -149,7 +149,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             + ", ".join(f"{half[code]:g} ms ({NAMES[code]})" for code in NAMES)
             + f"; {summary['spikes'][early]:.2f} spikes a train in the first {early} ms",
             min(half[code] for code in ("first", "relative", "rank")) < half["rate"],
-            "hardly a train fires twice so soon: a count then says which trains fired at all, and that tells as much",
+            "hardly a train fires twice so soon: a count then says which trains fired at all: it has as many bits",
         ),
         Statement(
             "First-spike latency needs a reliable reference; relative codes need none.",

@@ -49,6 +49,8 @@ Confirm = Annotated[
 
 REPORT = Path("taxel-studies")
 KEPT = Path("benchmarks/results/figures")
+#: Changed sources of a stale figure that are named.
+MOST_NAMED = 6
 
 
 @app.callback(invoke_without_command=True)
@@ -70,7 +72,8 @@ def _root(
 
         found = stale_figures(figures)
         for name, parts in found.items():
-            typer.echo(f"{name}: {', '.join(parts)}")
+            more = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
+            typer.echo(f"{name}: {', '.join(parts[:MOST_NAMED])}{more}")
         typer.echo(
             f"{len(found)} kept figures are stale; taxel study NAME --confirm, or run them again"
             if found
@@ -104,9 +107,18 @@ def every(
     if confirm:
         from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
 
+        moved = []
         for name in stale_figures(figures):
             if _left_out(name, _data(data)) is None:
-                _confirm(name, figures, data, strict)
+                try:
+                    _confirm(name, figures, data, strict)
+                except ProblemError as error:
+                    moved.append(name)
+                    typer.echo(str(error), err=True)
+        if moved:
+            raise ProblemError(
+                f"not confirmed: {', '.join(moved)}; run them again at full size, and say why they moved"
+            )
         return
     changes = {} if realisations is None else {"realisations": realisations}
     sections = {}

@@ -30,7 +30,7 @@ PARAMETERS: dict[str, Any] = {
     "alpha": 0.7,
     "seed": 1,
 }
-#: Forces that are given back to this share of them count as given back.
+#: A force on the base counts as equal to the one on the disc within this share of it.
 ROUNDING = 1e-8
 #: Samples of figure 5.3's picture, ms and mm (the thesis recorded every 0.2 ms), and its grids.
 PICTURE_MS, PICTURE_MM, GRIDS = 0.4, 0.1, 3

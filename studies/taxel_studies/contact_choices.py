@@ -144,7 +144,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Tell each choice's bits as they differ from the first's."""
+    """Return each choice's bits as they differ from the first's."""
     del p
     first, *others = summary["lines"]
     rows = [

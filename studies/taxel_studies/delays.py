@@ -153,7 +153,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "not in the thesis",
             f"{random:g} beside {plain:g} at {at}",
             bool(random <= plain + p["classes"] / p["inputs"][last]),
-            "it costs: fewer inputs are heard before an early target, and what is put off beyond the last one is lost",
+            "it costs: fewer inputs arrive before an early target, and what is put off beyond the last one is lost",
         ),
     ]
     chosen = {

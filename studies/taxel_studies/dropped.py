@@ -161,7 +161,7 @@ def play_tasks(p: Mapping[str, Any]) -> list[Task]:
 
 
 def played_summary(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
-    """Return what a realisation of `play_tasks` tells of its drops; None where it is another's."""
+    """Return the events and contact times of the drops of a realisation of `play_tasks`; None for another one."""
     if "condition" not in params:
         return None
     drops = played(params, Condition(*params["condition"]), seed, folder, rig)

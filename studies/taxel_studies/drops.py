@@ -41,7 +41,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any] 
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
-    """Tell each drop's data rate, and the events of one."""
+    """Return each drop's data rate, and the events of one."""
     shown = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses)
     spikes = dropped.sampled(shown.ticks[:1], to_ms(FRAME_US), np.zeros(1))[0]
     sample, sign, taxel = np.nonzero(spikes)

@@ -92,7 +92,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _beside(spikes: NDArray[np.float64], targets: NDArray[np.float64], step: float) -> dict[str, Any]:
-    """Tell whether there is a spike a target, and how far it is off, ms."""
+    """Return whether there is a spike a target, and how far it is off, ms."""
     right = len(spikes) == len(targets)
     off = float(np.max(np.abs(spikes - targets))) if right else None
     return {

@@ -123,7 +123,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"without it {bits - whole:+.2f} bits of {whole:.2f} and {cost:.2f} times the events, {late} ms",
                 None,
                 ("intervals lie apart" if high < bottom or low > top else "intervals overlap")
-                + "; of two codes, counts and first spikes, the one that tells more",
+                + "; of two codes, counts and first spikes, the one with more bits",
             )
         )
     return found

@@ -26,7 +26,7 @@ PARAMETERS: dict[str, Any] = {
     "presses": 3,
     "realisations": 10,
 }
-#: What the neurons need to hear of one state before the next, ms (a step is told after some 20 ms).
+#: How long a state must last for the neurons, ms (a step shows after some 20 ms).
 STEADY_MS = 60.0
 
 

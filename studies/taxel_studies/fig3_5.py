@@ -193,7 +193,7 @@ def _after(line: dict[str, Any]) -> str:
 
 
 def tables(_p: Parameters, summary: Summary) -> list[Table]:
-    """Tell the accuracy with each of the other values."""
+    """Return the accuracy with each of the other values."""
     lines = [{**line, "reading": "as above"} for line in summary["forces"]] + summary["others"]
     return [
         Table(

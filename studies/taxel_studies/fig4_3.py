@@ -53,7 +53,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Tell of each shape whether the time grows, up to which input, and how far it is from straight."""
+    """Return of each shape whether the time grows, up to which input, and how far it is from straight."""
     summary: Summary = {"shapes": {}}
     for row in rows:
         volts, elapsed = np.array(row.result["volts"]), np.array(row.result["elapsed_us"])
@@ -90,7 +90,9 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 "proportional",
                 f"within {1e3 * one['bent_us']:.1f} ns of a straight line",
                 straight,
-                "" if straight else "an RC ramp flattens: later voltages are finer told (Appendix 1, 2.2.3 has the RC)",
+                ""
+                if straight
+                else "an RC ramp flattens: later voltages are resolved more finely (Appendix 1, 2.2.3 has the RC)",
             )
         )
     return found

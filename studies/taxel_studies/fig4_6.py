@@ -65,7 +65,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Tell of each voltage: the law's curve, who sees 0.02 N, where the ramp and the amplifier end."""
+    """Return of each voltage: the law's curve, which taxels see 0.02 N, where the ramp and the amplifier end."""
     floor, ramp = Registers().noise_floor, Registers().ramp
     summary: Summary = {"floor": floor, "ramp": ramp, "lines": []}
     for v_trans in p["v_trans"]:

@@ -57,7 +57,7 @@ PRINTED = {"period_ms": 1.0, "tau_ms": 0.4, "sigma_mm": 2.0}
 PLATEAU, PLATEAU_MS, FAST_MS = 0.9, 10.0, 2.0
 #: Above this period the loss should be marked.
 MARKED_MS = 5.0
-#: Bits, and shares of what can be told, that differ by less are alike: one drop of a class of 100 is some .01.
+#: Bits, and shares of the largest possible bits, that differ by less are alike: one drop of a class of 100 is some .01.
 ALIKE = 0.02
 
 
@@ -305,7 +305,7 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Tell the search, period by period."""
+    """Return the search as a table, period by period."""
     return [
         Table(
             f"bits at a period of {_ms(line['period_ms'])} by tau and sigma",
@@ -335,7 +335,7 @@ STUDY = Study(
     where="thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13",
     protocol=(
         "The drops of the study drops. What the host holds is looked at every so often from the impact's first frame "
-        "on; a change above the board's noise floor since the last one that was told is an event, rises and falls "
+        "on; a change above the board's noise floor since the last one that was sent is an event, rises and falls "
         "apart. Trains are smoothed in time (5.8) and over taxels (5.11, a train counting twice at its own taxel, as "
         "printed), and compared by the Euclidean norm over taxels and time that 5.12's left side names; each drop is "
         "named by most of its 5 nearest others (the thesis gives no number). Bits of these answers, corrected by "

@@ -130,9 +130,9 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     sums = indented.summed(x, len(conditions), samples, seed)
     if params["ask"] == "bits":
         return indented.bits_of(sums, samples)
-    told = indented.varying(x, sums.folds)
+    varies = indented.varying(x, sums.folds)
     times = [
-        [t, indented.bits_of(sums, samples, features=k)["bits"] if told[:k].any() else 0.0]
+        [t, indented.bits_of(sums, samples, features=k)["bits"] if varies[:k].any() else 0.0]
         for t in params["times_ms"]
         if (k := round(t / period) * grid.taxels) and abs(k * period - t * grid.taxels) < 1e-6
     ]
@@ -277,7 +277,7 @@ def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: s
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Tell the search over alpha."""
+    """Return the search over alpha, as a table."""
     del p
     alphas = sorted({a for line in summary["lines"] for a, _ in line["searched"]})
     known = [dict(map(tuple, line["searched"])) for line in summary["lines"]]

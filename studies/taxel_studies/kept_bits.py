@@ -35,15 +35,15 @@ def listed(lines: Sequence[Mapping[str, Any]]) -> str:
 
 
 def lost(short: Mapping[str, Any], long: Mapping[str, Any], named: Mapping[str, str]) -> tuple[dict[str, float], str]:
-    """Return how much less can be told of each parameter at the longer of two periods, as a share, and in words."""
+    """Return how many bits less there are of each parameter at the longer of two periods, as a share, and in words."""
     share = {name: shares((short, long), name) for name in named if name in short["by"]}
     words = "; ".join(f"{named[name]} {a:.2f} to {b:.2f}" for name, (a, b) in share.items())
-    words += f" of what can be told, from {short['period_ms']:g} to {long['period_ms']:g} ms"
+    words += f" of the largest possible bits, from {short['period_ms']:g} to {long['period_ms']:g} ms"
     return {name: a - b for name, (a, b) in share.items()}, words
 
 
 def shares(lines: Sequence[Mapping[str, Any]], name: str) -> list[float]:
-    """Return which share of the bits that can be told of a parameter is told, period by period."""
+    """Return the bits of a parameter as a share of the largest possible, period by period."""
     return [line["by"][name]["bits"] / line["by"][name]["most"] for line in lines]
 
 
@@ -71,7 +71,7 @@ def by_period_parameter_and_time(
 
     lines = summary["lines"]
     periods = [line["period_ms"] for line in lines]
-    labels = ("bits", "share of the bits that can be told", "bits")
+    labels = ("bits", "share of the largest possible bits", "bits")
     found = []
     for k, (title, label) in enumerate(zip(figures, labels, strict=True)):
         figure = Figure(figsize=(6, 4), layout="constrained")

@@ -62,7 +62,7 @@ def timing(results: Sequence[dict[str, Any]], targets: Sequence[float]) -> dict[
 
 
 def exactness(parts: Sequence[dict[str, Any]]) -> tuple[str, bool]:
-    """Say what `timing` found of several parts, and whether every one of them is exact."""
+    """Describe what `timing` found of several parts, and whether every one of them is exact."""
     exact, of = sum(p["exact"] for p in parts), sum(p["of"] for p in parts)
     errors = [p["worst_error_ms"] for p in parts if p["worst_error_ms"] is not None]
     worst = f"worst error {max(errors):.0e} ms" if errors else "none fires as often as it should"
@@ -76,7 +76,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     ----------
     params : dict
         ``pattern`` ("single" or "poisson"), ``inputs``, ``stop`` (ms), ``targets`` (ms), ``learn`` (parameters
-        of `ConeX`), ``times`` (ms: where the potential is told; without spiking, or between output spikes).
+        of `ConeX`), ``times`` (ms: where the potential is sampled; without spiking, or between output spikes).
     seed : int
         Of the pattern.
 

@@ -183,7 +183,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             f"{PUBLISHED:g} % of 100 runs",
             f"{share:.0f} % of {summary['runs']} runs of {p['parts']} x {p['seconds']} s",
             bool(abs(share - PUBLISHED) <= give + 0.5) if enough else None,
-            f"held to be within {give:.0f} %, of {ENOUGH_RUNS} runs or more; how rates wander is told by the paper "
+            f"held to be within {give:.0f} %, of {ENOUGH_RUNS} runs or more; how rates wander is stated by the paper "
             "in words",
         )
     ]

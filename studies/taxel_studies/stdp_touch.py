@@ -14,7 +14,7 @@ from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Study, Summary
-from taxel_studies.untold import moved, threshold, unlearning
+from taxel_studies.unlabelled import moved, threshold, unlearning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -164,14 +164,12 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         values = [one[how][what] for one in boards if one[how][what] is not None]
         return float(np.median(values)) if values else float("nan")
 
-    size = (
-        f"medians of {len(boards)} boards, {p['touches'] - p['touches'] // 2} touches each that were not heard before"
-    )
+    size = f"medians of {len(boards)} boards, {p['touches'] - p['touches'] // 2} new touches each"
     same, other, beside = (middle("learnt", what) for what in ("same", "other", "beside"))
     soon, untrained = middle("learnt", "latency_ms"), middle("untrained", "latency_ms")
     return [
         Statement(
-            "A neuron that is told nothing comes to fire at every touch, and at nothing else.",
+            "A neuron without labels comes to fire at every touch, and at nothing else.",
             "called for in 3.6.2",
             f"at {same:.0%} of the touches that come again, {other:.0%} of the others, {beside:g} times beside them",
             bool(min(same, other) >= EVERY and beside == 0),
@@ -185,7 +183,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             size,
         ),
         Statement(
-            "It tells the touch that comes again from the others.",
+            "It distinguishes the touch that comes again from the others.",
             "called for in 3.6.2",
             f"it fires at {same:.0%} of these and {other:.0%} of those",
             bool(same >= EVERY and other <= NONE),

@@ -14,7 +14,7 @@ from taxel_studies.gait import sources
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Statement, Study, Summary
-from taxel_studies.untold import moved, threshold, unlearning
+from taxel_studies.unlabelled import moved, threshold, unlearning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,10 +82,10 @@ def train_and_test(foot: Piece, params: Parameters) -> dict[str, Any]:
     learnt = judged(stdp.spikes_ - late, foot, half)
     # As often, without learning: at a lower threshold.
     hz = max(1000 * len(stdp.spikes_) / half, params["untrained_hz"])
-    deaf = unlearning(threshold(first, hz, taus), taus).partial_fit(foot.spikes)
+    untrained = unlearning(threshold(first, hz, taus), taus).partial_fit(foot.spikes)
     return {
         "learnt": learnt,
-        "untrained": judged(deaf.spikes_[deaf.spikes_ >= half], foot, half),
+        "untrained": judged(untrained.spikes_[untrained.spikes_ >= half], foot, half),
         "strong": int(np.count_nonzero(stdp.weights_ > 0.5)),
         "course": course,
     }
@@ -94,7 +94,7 @@ def train_and_test(foot: Piece, params: Parameters) -> dict[str, Any]:
 def phases(
     times: NDArray[np.float64], contacts: NDArray[np.float64], begin: float, end: float
 ) -> tuple[NDArray[np.int64], list[tuple[float, float]], float]:
-    """Tell spikes by the stride that they fall into.
+    """Sort spikes by the stride that they fall into.
 
     Returns
     -------
@@ -157,9 +157,9 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     near = sum(-WANDERS_MS <= t <= 2 * WANDERS_MS for t in after)
     return [
         Statement(
-            "A neuron that is told nothing comes to fire once a stride, always at the same moment of it.",
+            "A neuron without labels comes to fire once a stride, always at the same moment of it.",
             "called for in 3.6.2",
-            f"{len(good)} of {len(feet)} feet, in half a walk that it had not heard; a neuron that learns nothing and "
+            f"{len(good)} of {len(feet)} feet, in the second half of a walk; a neuron that learns nothing and "
             f"fires as often: {len(by_chance)}",
             bool(len(good) > len(feet) / 2 and len(good) > len(by_chance)) if len(feet) > CHOSEN_ON else None,
             f"found: one spike in {ONCE:.0%} of the strides and a deviation of {WANDERS_MS:g} ms or less; holds where "

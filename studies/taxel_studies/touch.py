@@ -203,7 +203,7 @@ def _since_contact(drop: Drop, times: Sequence[float]) -> list[Frames]:
 
 
 def _best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
-    """Return the feature whose threshold tells most training scenes apart, and what it says of the others."""
+    """Return the feature whose threshold tells most training scenes apart, and its answers for the others."""
     features = [_features(which) for which in by_moment]
     best: tuple[float, str, float, int] = (-1.0, "", 0.0, 1)
     for name, values in features[0].items():
@@ -322,7 +322,7 @@ def detections_at(t: NDArray[np.int64], label: str = "contact") -> Detections:
 
 
 def _touched(train: list[Drop]) -> Callable[[ArrayLike], NDArray[Any]]:
-    """Return an LDA that tells pictures of a touch from pictures of none."""
+    """Return an LDA that separates pictures of a touch from pictures of none."""
     pictures, there = [], []
     for drop in train:
         for contact in drop.contacts:
@@ -388,7 +388,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "the neuron first (our goal)",
             ways,
             best == "neuron",
-            f"the rule looks at {summary['rules'][at]}; rule and LDA are told when the touch began, the neuron is not; "
+            f"the rule looks at {summary['rules'][at]}; rule and LDA are given the time of contact, the neuron is not; "
             "they look at one moment, and see less when the ball leaves (after 15 to 19 ms)",
         ),
     ]

@@ -199,7 +199,7 @@ def _source(name: str, listed: Sequence[Plan], known: Known) -> dict[str, Any]:
 
 
 def _conversion(data: Path) -> dict[str, Any]:
-    """Return one footfall of the plate as the insole feels and tells it: what figures 6.12 and 6.13 draw."""
+    """Return pressure and spikes of one footfall of the plate: what figures 6.12 and 6.13 draw."""
     folder, encoder = data / SOURCES["plate"].folder, NOTES["plate"]["contact"]["encoder"]
     cut = sources.cuts(folder, "plate", "own")[0]
     piece = sources.encoded(folder, "plate", encoder).pieces[cut.name]

@@ -1,4 +1,4 @@
-"""Figures 6.12 to 6.14: what the insole feels and tells of a footfall, and what was found."""
+"""Figures 6.12 to 6.14: pressure and spikes of the insole during a footfall, and what was found."""
 
 from __future__ import annotations
 

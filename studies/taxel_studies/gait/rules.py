@@ -15,7 +15,7 @@ from taxel_studies.gait.pieces import Piece
 
 __all__ = ["RULES", "detection_times", "grid"]
 
-#: Rising events are told by ON spikes and counts that rise, the others by OFF spikes and counts that fall.
+#: Rising events show in ON spikes and counts that rise, the others by OFF spikes and counts that fall.
 RISING = {"contact"}
 
 RULES = {

@@ -107,7 +107,7 @@ _ABOUT = [
     ],
     [
         "FA-1",
-        "hears one long row of footfalls; its threshold takes 1.6 s to come down after a spike, so it is nearly deaf "
+        "receives one long row of footfalls; its threshold takes 1.6 s to come down after a spike, so it hardly fires "
         "to the next one. Each footfall by itself would do better, and would let the cut mark time",
     ],
 ]

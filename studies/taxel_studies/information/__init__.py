@@ -68,7 +68,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Tell each set of recordings in a table."""
+    """Return a table for each set of recordings."""
     return [one for folder, found in summary.items() for one in ASKED[folder].tables(p, found)]
 
 
@@ -79,7 +79,7 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
 
 STUDY = Study(
     name="information",
-    title="how many bits real touches hold, and what else tells as much",
+    title="how many bits real touches hold, and which simpler measurements hold as many",
     where="beside thesis 5.5 and 5.6",
     protocol=(
         "Bits of a classifier's answers, corrected by Panzeri and Treves; linear discriminants, smoothing and ridge "

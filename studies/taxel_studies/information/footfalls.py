@@ -122,7 +122,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             late = [q["bits"] for q in person["points"] if q["window_ms"] == p["window_ms"]]
             found.append(
                 Statement(
-                    "A fast period tells more early, and none tells more in the end (5.8, 5.13).",
+                    "A fast period has more bits early, and none has more in the end (5.8, 5.13).",
                     "figures 5.8 and 5.13",
                     f"to 50 ms {fast:.2f} against {slow:.2f} bits; to {p['window_ms']:g} ms {min(late):.2f} to "
                     f"{max(late):.2f}",
@@ -135,7 +135,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         full = condition["full"]["bits"]
         found.append(
             Statement(
-                "How fast a person not trained on walked: the length of the stance alone tells more than the events.",
+                "How fast a person not trained on walked: the length of the stance has more bits than the events.",
                 "length .89; events to 400 ms .47",
                 f"length {length:.2f}; events {full:.2f}" if length is not None else "no length",
                 length > full if whole and length is not None else None,
@@ -146,7 +146,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Tell bits by period and time, and what else tells."""
+    """Return bits by period and time, and those of simpler measurements."""
     found = []
     for ask, one in summary.items():
         windows = sorted({q["window_ms"] for q in one["points"]})

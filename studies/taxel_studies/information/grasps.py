@@ -141,7 +141,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Tell bits by slice."""
+    """Return bits by slice, as a table."""
     del p
     one = summary["object"]
     rows = [

@@ -83,7 +83,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Tell bits by number of taxels."""
+    """Return bits by number of taxels, as a table."""
     del p
     one = summary["posture"]
 
