@@ -3,8 +3,8 @@
 15 000 trials of 1000 ternary features, 300 classes: our ten folds, beside scikit-learn's ``svd`` of one fold (it trains
 each anew, so ten cost ten times that). Once of spikes drawn one by one, whose scatter has its full rank, and once of
 rasters as an array gives them, in which features determine each other exactly. Predictions of that fold are compared,
-trial by trial. Then 150 000 x 5000, ten folds, once, with the time and the largest memory. CPU time of the process: both use
-all cores.
+trial by trial. Then 150 000 x 5000, ten folds, once, with the time and the largest memory. CPU time of the process:
+both use all cores.
 """
 
 import resource
