@@ -49,7 +49,7 @@ def pipe() -> IO[bytes]:
     """A pipe with the line that describes frames, and no frame."""
     read, write = os.pipe()
     with os.fdopen(write, "wb") as end:
-        end.write(b'{"rows": 4, "columns": 4, "rate_hz": 100, "bits": 8}\n')
+        end.write(b'{"rows": 4, "columns": 4, "rate": 100, "bits": 8}\n')
     return os.fdopen(read, "rb")
 
 
