@@ -23,14 +23,8 @@ NOT_YET = {
     "taxel.device",
     # encode
     "taxel.encode",
-    # learn
-    "taxel.learn",
     # live
     "taxel.live",
-    # metrics
-    "taxel.metrics",
-    # plot
-    "taxel.plot",
     # wire
     "taxel.wire",
 }
@@ -175,9 +169,6 @@ def test_the_reference_shows_exactly_what_is_public() -> None:
     pages = "\n".join(page.read_text("utf-8") + "\n" for page in sorted((DOCS / "reference").glob("*.rst")))
     by_module = re.findall(r"\.\. automodule:: (\S+)\n((?:   :.*\n)*)", pages)
     by_name = set(re.findall(r"\.\. auto(?:class|function|exception):: (\S+)", pages))
-    if ".. rivals::" in pages:  # the directive of docs/from_program.py: the rules that no other page names
-        learners = {name for name in taxel.learn.__all__ if hasattr(getattr(taxel.learn, name), "get_params")}
-        by_name |= {f"taxel.learn.{name}" for name in learners if "Cone" not in name}
     shown = {id(resolve_name(name)) for name in by_name}
     for name, options in by_module:
         if name.split(".")[0] == "taxel":

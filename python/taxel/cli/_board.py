@@ -73,8 +73,8 @@ FromOption = Annotated[str | None, live_option("remote", "--from", metavar="ADDR
 CongestionOption = Annotated[
     str | None,
     typer.Option(
-        help="With --from, where this computer is too slow: block, so that the other waits, or drop what is too much; "
-        "block where something is recorded or read out."
+        help="With --from, where this computer is too slow: block (the bridge waits) or drop (datagrams are lost and "
+        "counted). Default: block with --record or --readout, else drop."
     ),
 ]
 

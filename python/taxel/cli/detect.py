@@ -36,20 +36,24 @@ def detect(
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote.")],
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
     frame_us: Annotated[
-        float | None, typer.Option(help="Length of the board's frame; else the registers', the pictures' or 192.")
+        float | None,
+        typer.Option(help="Length of the board's frame, us. Default: by the registers or the frames, else 192."),
     ] = None,
     truth: Annotated[
-        str | None, typer.Option(help="Score against a CSV label,t_us or recording,label,t_us, or against notes.")
+        str | None,
+        typer.Option(
+            help="Score against a CSV label,t_us or recording,label,t_us, or notes: the recordings' own notes."
+        ),
     ] = None,
-    window_ms: Annotated[float, typer.Option(help="How far a detection may lie from its event, either way.")] = 50.0,
-    csv: Annotated[Path | None, typer.Option(help="Write the detections to this table.")] = None,
+    window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
+    csv: Annotated[Path | None, typer.Option(help="Write the detections to this .csv.")] = None,
     report: Annotated[
-        Path | None, typer.Option(help="A folder for a page: potential, weights, errors, the worst events.")
+        Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Say what happens when in a recording, or in each of a folder, by a trained readout.
+    """Detect events in a recording, or in each of a folder, by a trained readout.
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """

@@ -33,98 +33,123 @@ __all__ = ["emulate"]
 
 @app.command()
 def emulate(
-    port: Annotated[int, typer.Option(min=1, max=65_535, help="Where the datagrams go.")] = 5208,
-    host: Annotated[str, typer.Option(help="To which machine, by name or address.")] = "127.0.0.1",
-    scenes: Annotated[int | None, typer.Option(min=0, help="How many scenes; else until Ctrl-C.")] = None,
+    port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port to send to.")] = 5208,
+    host: Annotated[str, typer.Option(help="The machine to send to, by name or address.")] = "127.0.0.1",
+    scenes: Annotated[int | None, typer.Option(min=0, help="Number of scenes. Default: play until Ctrl-C.")] = None,
     scene: Annotated[
-        Path | None, typer.Option(help="Play the scene of this .toml instead of drawn ones, again and again.")
+        Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random ones.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
-    replay: Annotated[Path | None, typer.Option(help="Play a recording again instead of scenes.")] = None,
-    speed: Annotated[float | None, typer.Option(help="Of the replay: 2 in half the time; 1 where left out.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Seed of scenes, taxels and noise.")
+    ] = None,
+    replay: Annotated[Path | None, typer.Option(help="Play a recording instead of scenes.")] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="With --replay: playback speed; 2 takes half the time. Default: 1.")
+    ] = None,
     pipe: Annotated[
-        bool, typer.Option("--pipe", help="Scan frames of another sensor that come on standard input.")
+        bool, typer.Option("--pipe", help="Send events of another sensor, whose frames come on standard input.")
     ] = False,
     noise_floor: Annotated[
         int | None,
-        typer.Option(min=0, max=255, help="Of a pipe: a change above it makes an event; 3 where left out."),
+        typer.Option(min=0, max=255, help="With --pipe: a change above this makes an event. Default: 3."),
     ] = None,
     tare: Annotated[
         float | None,
         typer.Option(
-            min=0, max=60, help="How long the noise floor is 0 before the start marker, s; else 0.05 or the scene's."
+            min=0,
+            max=60,
+            help="How long the noise floor is 0 before the start marker, s. Default: 0.05, or the scene's.",
         ),
     ] = None,
     preset: Annotated[
         str | None,
         typer.Option(
-            help=f"The registers; where left out the scene's, or those of the array at reset. One of {QUOTED_PRESETS}.",
+            help=f"The registers: one of {QUOTED_PRESETS}. Default: the scene's, or those of the array at reset.",
         ),
     ] = None,
     wire: Annotated[
         int | None,
-        typer.Option(min=1, max=2, help="The version of the wire that the board speaks; else its registers'."),
+        typer.Option(min=1, max=2, help="Version of the wire. Default: by the registers."),
     ] = None,
-    board: Annotated[int, typer.Option(min=0, max=65_535, help="Version 2: the board's number.")] = 0,
-    session: Annotated[int, typer.Option(min=0, max=65_535, help="Version 2: the number of the first session.")] = 1,
-    hold: Annotated[float, typer.Option(min=0, max=30, help="Version 2: events wait so long for company, ms.")] = 0.0,
-    heartbeat: Annotated[float, typer.Option(min=0, help="Version 2: a promise so often in silence, ms.")] = 10.0,
+    board: Annotated[int, typer.Option(min=0, max=65_535, help="Wire 2: the board's number.")] = 0,
+    session: Annotated[int, typer.Option(min=0, max=65_535, help="Wire 2: the number of the first session.")] = 1,
+    hold: Annotated[
+        float, typer.Option(min=0, max=30, help="Wire 2: how long events wait to share a datagram, ms.")
+    ] = 0.0,
+    heartbeat: Annotated[
+        float, typer.Option(min=0, help="Wire 2: interval of heartbeats while nothing happens, ms.")
+    ] = 10.0,
     states: Annotated[
-        float, typer.Option(min=0, help="Version 2: each value told again so often, ms; 0: never.")
+        float, typer.Option(min=0, help="Wire 2: interval at which each taxel's value is repeated, ms; 0: never.")
     ] = 1000.0,
-    reset_every: Annotated[float | None, typer.Option(min=0.001, help="The board is reset so often, s.")] = None,
-    drift: Annotated[float, typer.Option(help="The board's clock runs faster by so much, parts per million.")] = 0.0,
+    reset_every: Annotated[
+        float | None, typer.Option(min=0.001, help="Interval between resets of the board, s. Default: none.")
+    ] = None,
+    drift: Annotated[float, typer.Option(help="How much faster the board's clock runs, parts per million.")] = 0.0,
     circuit: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Taxels share lines: gain, switch_ohm, wire_ohm, offset_mv, hysteresis_v, settle_us, amplifier_us; "
+            help="Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, wire_ohm, offset_mv, "
+            "hysteresis_v, settle_us, amplifier_us; "
             "one of them puts in the whole circuit, the others as usual. Takes the board to some 2.4 kHz.",
         ),
     ] = None,
     asynchronous: Annotated[
         bool,
-        typer.Option("--asynchronous", help="Each taxel compares by itself: no scan, stamps of 1 us (version 2)."),
+        typer.Option("--asynchronous", help="Taxels send by themselves, without a scan, with stamps of 1 us (wire 2)."),
     ] = False,
     flaw: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=SIZE[:SEED]",
-            help="Taxels: gain, threshold, hysteresis, drift, dead, stuck, loose, noise; may be repeated.",
+            help="A flaw of taxels: gain, threshold, hysteresis, drift, dead, stuck, loose, noise. May be repeated.",
         ),
     ] = None,
     fault: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="NAME=SHARE", help="Datagrams: lost, repeated, reordered, cut, corrupted; may be repeated."
+            metavar="NAME=SHARE",
+            help="A fault of the network: a share of the datagrams is lost, repeated, reordered, cut or "
+            "corrupted. May be repeated.",
         ),
     ] = None,
     control: Annotated[
-        int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")
+        int | None, typer.Option(help="Accept commands on this TCP port of loopback; 0 finds a free one.")
     ] = None,
-    line: Annotated[Path | None, typer.Option(help="A serial line of this name: a link to a pseudo-terminal.")] = None,
+    line: Annotated[
+        Path | None, typer.Option(help="Accept commands on a serial line of this name (a link to a pseudo-terminal).")
+    ] = None,
     baud: Annotated[
-        int | None, typer.Option(min=300, max=4_000_000, help="Of the serial line; 115200 where left out.")
+        int | None, typer.Option(min=300, max=4_000_000, help="Baud rate of --line. Default: 115200.")
     ] = None,
     sync: Annotated[
-        Path | None, typer.Option(help="The sync line as text, to a new file or a pipe: board us, 1 or 0, host ns.")
+        Path | None,
+        typer.Option(help="Write the sync line as text to a new file or a pipe: board us, 1 or 0, host ns."),
     ] = None,
-    source_port: Annotated[int, typer.Option(min=0, max=65_535, help="The board sends from here; 0: any port.")] = 0,
-    rest: Annotated[bool, typer.Option("--rest", help="Nobody catches the ball.")] = False,
+    source_port: Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port to send from; 0: any.")] = 0,
+    rest: Annotated[
+        bool, typer.Option("--rest", help="Let the ball bounce until it rests, instead of catching it.")
+    ] = False,
     labels: Annotated[
         Path | None,
-        typer.Option("--truth", help="Write what really happens when to this CSV, label,t_us,host_ns, as it happens."),
+        typer.Option(
+            "--truth", help="Write the true times of the touches to this CSV, label,t_us,host_ns, as they happen."
+        ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace such files where they exist.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the files that are written where they exist.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False,
 ) -> None:
-    """Be a board that sends its events by UDP, in real time, until Ctrl-C.
+    """Emulate a board that sends its events by UDP, in real time, until Ctrl-C.
 
-    Scenes: a ball is dropped on foam over 64 x 64 taxels, caught in flight, pressed by hand and lifted. The board arms
-    after its first frame, is tared with a noise floor of 0, then takes the preset's floor and marks the start. --truth
-    is what taxel train learns from: contact and lift, by the board's clock (t_us) and by this machine's (host_ns).
+    In each scene a ball is dropped on foam over 64 x 64 taxels, caught in flight, pressed by hand and lifted. The board
+    starts with a noise floor of 0, so that the rest of the taxels can be measured; then it sets the preset's floor and
+    marks the start. --truth writes the labels for taxel train: contact and lift, by the board's clock (t_us) and by
+    this machine's (host_ns).
 
-    --scene plays a scene from a file instead of drawn ones. --replay plays a recording again. --pipe takes any other
+    --scene plays a scene from a file instead of random ones. --replay plays a recording. --pipe reads another
     sensor's frames from standard input: one line of JSON (rows, columns, rate, bits), then uint16, little-endian, row
     by row.
 

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import taxel
 from taxel._core import DeviceError
-from taxel.demo.hearing import Hearing, listen
+from taxel.demo.evaluation import Evaluation, evaluate_events
 from taxel.demo.script import script
 from taxel.detect import Readout, run
 from taxel.detections import Detection
@@ -41,13 +41,13 @@ class Screen(Protocol):
 class Playing:
     """A play in real time, and what was counted."""
 
-    hearing: Hearing
+    evaluation: Evaluation
     counters: dict[str, Any]
     emulator: dict[str, Any]
     verdicts: list[str]
     recording: Path
     agrees: bool
-    """Whether the recording, read again, says what was said live."""
+    """Whether the recording, read again, gives the detections that were made live."""
 
 
 def play_live(
@@ -95,7 +95,7 @@ def play_live(
                 if time.monotonic() > drawn + _DRAW_EVERY_S:
                     drawn = time.monotonic()
                     shown.draw(live.counters, live.picture, said)
-            told, complaint = board.communicate()
+            printed, complaint = board.communicate()
         finally:
             if board.poll() is None:
                 board.terminate()
@@ -106,13 +106,13 @@ def play_live(
             said.append(one)
         tare = live.tare
         summary = live.stop()
-    emulator = json.loads(told)
+    emulator = json.loads(printed)
     found = heard(said)
     events = taxel.open(recording).events
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
-    hearing = listen(events, acts, readout, found)
-    again = again[again.t >= hearing.start_us]
-    mine = hearing.found
+    evaluation = evaluate_events(events, acts, readout, found)
+    again = again[again.t >= evaluation.start_us]
+    mine = evaluation.found
     agrees = len(again) == len(mine) and bool(
         (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
     )
@@ -120,6 +120,7 @@ def play_live(
     if summary.counters["late"]:
         verdicts.append(
             f"{summary.counters['late']} events came after the readout's time had moved on, 5 frames behind the host's "
-            f"clock: this machine was too busy, and what they told was known later than it could have been"
+            f"clock: this machine was too busy, and detections of them came late, moved or were missed; the recording has "
+            f"every event, and --no-clock simulates without the clock"
         )
-    return Playing(hearing, summary.counters, emulator, verdicts, recording, agrees)
+    return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)

@@ -1,4 +1,4 @@
-"""What is drawn while the demo runs: the picture, the counters, what was said."""
+"""The terminal display while the demo runs: pressure picture, counters, detections."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PICTURE_WIDTH, _PICTURE_HEIGHT, _LEAST_WIDTH, _LEAST_HEIGHT = 36, 18, 40, 5
 
 
 class Screen:
-    """What is drawn while it runs: the picture, the counters, what was said."""
+    """The display: pressure picture, counters, detections."""
 
     def __init__(self, drawing: Drawing, contacts: list[Contact], seconds: float) -> None:
         self._drawing = drawing
@@ -58,14 +58,14 @@ class Screen:
             ("events", f"{counters['events']:,}"),
             ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
             ("arrived to decoded", delays(counters["decode_latency"])),
-            ("known to said", delays(counters["said_latency"])),
+            ("known to detected", delays(counters["said_latency"])),
             *((label, str(sum(one.label == label for one in said))) for label in LABELS),
         ):
             rows.add_row(Text(name, style="dim"), value)
         state = "taring" if counters["taring"] else f"{min(now, self._seconds):5.1f} of {self._seconds:.1f} s"
         width, height = self._drawing.console.size
         if width < _PICTURE_WIDTH + _LEAST_WIDTH or height < _PICTURE_HEIGHT + _LEAST_HEIGHT:
-            # No room for the picture: the counters alone, and what was said.
+            # No room for the picture: counters and detections alone.
             pictured, taken = [], len(rows.rows) + 2
         else:
             pictured, taken = [Panel(_blocks(picture), title="pressure", width=_PICTURE_WIDTH)], _PICTURE_HEIGHT
@@ -97,7 +97,7 @@ class Screen:
         if len(true):
             nearest = int(np.abs(true - said.t).argmin())
             line.append(f"{self._kinds[nearest]:<7} known {to_ms(said.known - true[nearest]):+6.2f} ms, ")
-            line.append(f"said {to_ms(said.said - true[nearest]):+6.2f} ms after the truth", style="dim")
+            line.append(f"out {to_ms(said.said - true[nearest]):+6.2f} ms after the truth", style="dim")
         return line
 
 

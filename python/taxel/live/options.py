@@ -44,38 +44,43 @@ class LiveOptions:
 
     port: int = _option(PORT, "The UDP port that the board sends to.", least=0, most=65_535)
     _: KW_ONLY
-    host: str = _option("0.0.0.0", "The address of this machine to listen on; 0.0.0.0: every one.")
+    host: str = _option("0.0.0.0", "The address of this machine to listen on; 0.0.0.0: all.")
     remote: Remote | None = _option(
-        None, "A board of another computer, in place of --port: zenoh:HOST:PORT/NAME, as taxel bridge says it there."
+        None, "Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there."
     )
     array: Array | None = _option(
         None,
-        "The sensor and its pitch, as 24x20x5 (2.67 mm where it is left out); without it 64x64x2.67, or what is told "
-        "with --from.",
+        "Rows, columns and pitch of the sensor, as 24x20x5 (default pitch: 2.67 mm). Default: 64x64x2.67; with --from, "
+        "the bridge reports it.",
     )
     registers: str | Registers | None = _option(
         None,
-        f'The board\'s registers, "5.2 kHz" where left out: one of {QUOTED_PRESETS}. With --from they are told.',
+        f'The board\'s registers: one of {QUOTED_PRESETS}. Default: "5.2 kHz"; with --from, the bridge reports them.',
     )
     differences: bool = _option(False, "The board sends intensity differences.")
     readout: Readout | None = _option(None, "A trained readout (JSON), as taxel train writes it; the panel needs none.")
     tare: Tare | float | None = _option(
-        None, "Seconds at rest for a fresh one, or the file of an earlier one (JSON).", least=1e-6, most=3600
+        None,
+        "Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).",
+        least=1e-6,
+        most=3600,
     )
-    record: str | os.PathLike[str] | None = _option(None, "Keep everything in a new file (.mcap or .lsa).")
+    record: str | os.PathLike[str] | None = _option(None, "Record in a new file (.mcap or .lsa).")
     record_later: bool = _option(False, "Recordings begin and end while it runs.")
-    name: str = _option("board", "What the board is called among the recording's sources.")
+    name: str = _option("board", "The board's name among the sources of the recording.")
     sources: Mapping[str, str] | None = _option(
         None,
-        "Record this too: another board (udp:HOST:PORT,array=16x16), lines of numbers as an IMU's (serial:PATH@BAUD, "
-        "pipe:PATH, columns=t_us:ax:ay); may be repeated.",
+        "Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU "
+        "(serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.",
     )
-    compression: str = _option("none", "Of .mcap: none, lz4 or zstd.")
-    overwrite: bool = _option(False, "Replace a file that is there.")
-    guard_frames: float = _option(5.0, "In silence, frames behind the host's clock.", least=0.0)
+    compression: str = _option("none", "Compression of a .mcap: none, lz4 or zstd.")
+    overwrite: bool = _option(False, "Replace the file where it exists.")
+    guard_frames: float = _option(
+        5.0, "How far, in frames, a readout stays behind the host's clock while no events come.", least=0.0
+    )
     gap_frames: float = _option(1.0, "At a gap in version 2, frames to wait for what may only be late.", least=0.0)
     say: Callable[[Detection], object] | None = _option(None, "Called with each detection.")
-    lines: bool = _option(False, "Print a line of JSON a detection, and nothing else.")
+    lines: bool = _option(False, "Print one line of JSON for each detection, and nothing else.")
     send: str | Sequence[str] = _option(
         (),
         "Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.",

@@ -4,11 +4,12 @@ import warnings
 from typing import Any
 
 from taxel._base.files import write_whole
+from taxel._base.provenance import Sources, installed_sources
 from taxel.detect import Example, Outcome
 from taxel.report.information import write_information
 from taxel.report.listening import write_listening
 
-__all__ = ["write_information", "write_listening", "write_whole"]
+__all__ = ["Sources", "installed_sources", "write_information", "write_listening", "write_whole"]
 
 
 def __getattr__(name: str) -> Any:

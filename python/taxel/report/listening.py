@@ -1,4 +1,4 @@
-"""The page of ``taxel train``, ``detect`` and ``live``: what a readout heard in a recording, and what it made of it."""
+"""The page of ``taxel train``, ``detect`` and ``live``: the detections of a readout in recordings, and their errors."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _MOMENTS, _AROUND = 4, 6.0
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
-_SAID, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
+_FOUND, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
 
 
 class _Moment(NamedTuple):
@@ -59,7 +59,7 @@ def write_listening(
     judged: str = "",
     held_out: Sequence[Score] = (),
 ) -> Path:
-    """Write what a readout heard in recordings as a page with pictures, ``report.html`` in a new folder.
+    """Write the detections of a readout in recordings as a page with pictures, ``report.html`` in a new folder.
 
     Parameters
     ----------
@@ -120,15 +120,15 @@ def write_listening(
 def _drawn(figure: Figure | None) -> Markup | None:
     if figure is None:
         return None
-    said = chart(figure)
+    drawn = chart(figure)
     plt.close(figure)
-    return said
+    return drawn
 
 
 def _row(one: Outcome, label: str, score: Score | None) -> dict[str, Any]:
     own = None if score is None else score[label]
-    said = len(one.found[label]) if own is None else own.found + own.false
-    return {"recording": one.name, "label": label, "said": said, "score": own}
+    count = len(one.found[label]) if own is None else own.found + own.false
+    return {"recording": one.name, "label": label, "detections": count, "score": own}
 
 
 def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
@@ -136,13 +136,13 @@ def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
     moments = []
     for k, one in enumerate(listened):
         if one.score is None:
-            moments += [_Moment(k, label, float(t), "said", 0.0) for t in one.found[label].t]
+            moments += [_Moment(k, label, float(t), "detected", 0.0) for t in one.found[label].t]
             continue
-        own, said = one.score[label], one.found.t
-        happened = said[own.pairs[:, 0]] - np.rint(to_us(own.errors_ms)).astype(np.int64)
+        own, times = one.score[label], one.found.t
+        happened = times[own.pairs[:, 0]] - np.rint(to_us(own.errors_ms)).astype(np.int64)
         true = np.asarray(one.example.labels.get(label, ()), np.int64)
         moments += [_Moment(k, label, float(t), "missed", np.inf) for t in np.setdiff1d(true, happened)]
-        moments += [_Moment(k, label, float(t), "false", np.inf) for t in said[own.false_detections]]
+        moments += [_Moment(k, label, float(t), "false", np.inf) for t in times[own.false_detections]]
         moments += [
             _Moment(k, label, float(t), f"{error:+.2f} ms", abs(float(error)))
             for t, error in zip(happened, own.errors_ms, strict=True)
@@ -151,7 +151,7 @@ def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
 
 
 def _potential(readout: Readout, listened: Sequence[Outcome], label: str, moments: list[_Moment]) -> Figure | None:
-    """Draw potential and threshold around moments, with what was said and what is true."""
+    """Draw potential and threshold around moments, with detections and labels."""
     if not moments:
         return None
     one = readout.neurons[label]
@@ -160,9 +160,9 @@ def _potential(readout: Readout, listened: Sequence[Outcome], label: str, moment
     )
     reach = _AROUND * one.neuron.tau + one.delay_ms
     for axis, moment in zip(axes[0], moments, strict=True):
-        heard = listened[moment.recording]
-        trains = _trains(readout, heard)
-        found = to_ms(heard.found[label].t)
+        outcome = listened[moment.recording]
+        trains = _trains(readout, outcome)
+        found = to_ms(outcome.found[label].t)
         at = to_ms(moment.t)
         times = np.linspace(at - reach, at + reach, 600)
         crossings = found + readout.encoder.latency_ms + one.delay_ms
@@ -171,8 +171,8 @@ def _potential(readout: Readout, listened: Sequence[Outcome], label: str, moment
         threshold = readout.run_threshold * one.neuron.theta_0
         axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
         for k, t in enumerate(found[np.abs(found - at) < reach]):
-            axis.axvline(t - at, color=_SAID, linewidth=1.2, label="said" * (k == 0))
-        true = to_ms(np.asarray(heard.example.labels.get(label, ()), np.float64))
+            axis.axvline(t - at, color=_FOUND, linewidth=1.2, label="detected" * (k == 0))
+        true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
         for k, t in enumerate(true[np.abs(true - at) < reach]):
             axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--", label="true" * (k == 0))
         axis.set_title(f"{moment.what}, {at / 1000.0:.3f} s", fontsize=9)
@@ -182,21 +182,21 @@ def _potential(readout: Readout, listened: Sequence[Outcome], label: str, moment
     return figure
 
 
-def _trains(readout: Readout, heard: Outcome) -> Any:
-    encoder = readout.encoder if heard.example.tare is None else readout.encoder.with_tare(heard.example.tare)
-    source = heard.example.source
+def _trains(readout: Readout, outcome: Outcome) -> Any:
+    encoder = readout.encoder if outcome.example.tare is None else readout.encoder.with_tare(outcome.example.tare)
+    source = outcome.example.source
     trains = source if isinstance(source, SpikeTrains) else encoder.encode(source)
     trains = trains.split_by_sign() if trains.signed else trains
     delays = readout.delays_ms
     return trains if len(delays) == 1 and not delays[0] else trains.delayed(delays)
 
 
-def _weights(readout: Readout, heard: Outcome, label: str) -> Figure:
+def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
     """Draw weights over the array where trains are taxels', else as bars."""
     weights = np.asarray(readout.neurons[label].weights)
-    array = array_of([heard.example])
+    array = array_of([outcome.example])
     if array is None:
-        raise ProblemError(f"{heard.name}: spike trains do not state their array")
+        raise ProblemError(f"{outcome.name}: spike trains do not state their array")
     largest = float(np.abs(weights).max()) or 1.0
     named = _planes(weights, readout, array.rows * array.columns)
     if not named or array.rows * array.columns < 4:
@@ -263,6 +263,6 @@ def _errors(listened: Sequence[Outcome], label: str) -> Figure | None:
     figure, axis = plt.subplots(figsize=(4.2, 2.2), layout="constrained")
     axis.hist(np.concatenate(errors), bins=30, color=_TRUE)
     axis.axvline(0, color="#999999", linewidth=0.8)
-    axis.set_xlabel("said minus true, ms")
+    axis.set_xlabel("time minus true, ms")
     axis.set_ylabel("events")
     return figure

@@ -28,18 +28,18 @@ __all__ = ["SpikeTrains"]
 
 
 class SpikeTrains(Columns):
-    """Hold spike times by train, with the window in which spikes were looked for.
+    """Hold spike times by train, with the window in which spikes were recorded.
 
     Parameters
     ----------
     times : float64, shape (spikes,), ms
         All times, train after train, ascending in each.
-    offsets : int64, shape (trains + 1,), indices
-        Where each train begins in `times`, and at last where all end.
+    offsets : int64, shape (trains + 1,), 0 or more
+        Index of each train's first spike in `times`; the last entry is the number of spikes.
     start, stop : float, ms
-        The window: without it an empty train could not say "silent".
-    values : float32, shape (spikes,), -1 to 1 or bits, optional
-        A signed value a spike (polarity, bits), where the encoder has one.
+        The window: a train without spikes was silent in it.
+    values : float32, shape (spikes,), polarity or bits, optional
+        A signed value a spike, where the encoder has one.
 
     Raises
     ------
@@ -91,8 +91,7 @@ class SpikeTrains(Columns):
         start : float, ms
         stop : float, ms, optional
             The last spike's time where it is left out.
-        values : sequence of float sequences, -1 to 1 or bits, optional
-            A signed value a spike.
+        values : sequence of float sequences, a polarity or bits a spike, optional
 
         Returns
         -------
@@ -172,20 +171,24 @@ class SpikeTrains(Columns):
         return self._from_parts(_core.split_by_sign(self._parts()))
 
     def between(self, start: float, stop: float) -> SpikeTrains:
-        """Return the spikes of ``start <= t < stop`` (ms), with that window; times stay as they are.
+        """Return the spikes of ``start <= t < stop``, with that window; times stay as they are.
 
         Parameters
         ----------
         start, stop : float, ms
 
+        Returns
+        -------
+        SpikeTrains
+
         Raises
         ------
-        ProblemError : a start that lies after the stop, or is no number
+        ProblemError : a window that makes no sense
 
         Examples
         --------
-        >>> SpikeTrains.from_lists([[1.0, 5.0]], stop=10.0).between(2.0, 8.0).times
-        array([5.])
+        >>> SpikeTrains.from_lists([[1.0, 5.0], [3.0]], stop=10.0).between(2.0, 5.0)
+        SpikeTrains(2 trains, 1 spikes, 2 to 5 ms)
         """
         start, stop = window("ms", start, stop)
         return self._where((self.times >= start) & (self.times < stop), start, stop)
@@ -195,8 +198,12 @@ class SpikeTrains(Columns):
 
         Parameters
         ----------
-        trains : int or bool, shape (n,), numbers of trains or a mask over all of them
-            A number below 0 is none.
+        trains : int of shape (n,), 0 or more, or bool of shape (trains,)
+            Numbers of trains, or a mask over all of them.
+
+        Returns
+        -------
+        SpikeTrains
 
         Raises
         ------
@@ -204,8 +211,8 @@ class SpikeTrains(Columns):
 
         Examples
         --------
-        >>> SpikeTrains.from_lists([[1.0], [2.0], [3.0]]).select([2, 0]).times
-        array([3., 1.])
+        >>> list(SpikeTrains.from_lists([[1.0], [2.0], [3.0]], stop=10.0).select([2, 0]))
+        [array([3.]), array([1.])]
         """
         try:
             chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
@@ -290,15 +297,18 @@ class SpikeTrains(Columns):
     def from_neo(cls, trains: Sequence[Any]) -> SpikeTrains:
         """Build spike trains from ``neo.SpikeTrain`` objects of any time unit.
 
-        The window is the widest of theirs.
-
         Parameters
         ----------
         trains : sequence of neo.SpikeTrain
 
+        Returns
+        -------
+        SpikeTrains
+            Their window is the widest of those of `trains`.
+
         Raises
         ------
-        ProblemError : no such trains
+        ProblemError : something else than ``neo.SpikeTrain`` objects
         """
         try:
             foreign = next(([train] for train in trains if not hasattr(train, "rescale")), [])
@@ -399,14 +409,14 @@ class SpikeTrains(Columns):
         ----------
         path : path
         overwrite : bool
-            Whether an existing file may be replaced.
 
         Returns
         -------
-        Path
+        pathlib.Path
 
         Raises
         ------
+        ProblemError : a path that is none
         FileExistsError : the file is there already and `overwrite` is false
         """
         columns: dict[str, Any] = {"times": self.times, "offsets": self.offsets, "start": self.start, "stop": self.stop}
@@ -421,6 +431,10 @@ class SpikeTrains(Columns):
         Parameters
         ----------
         path : path
+
+        Returns
+        -------
+        SpikeTrains
 
         Raises
         ------
