@@ -360,7 +360,7 @@ def emulate(
         "tare_ms": None if acts is None else number("tare_ms", tare_ms),
         "previous": text("previous", previous, ("last_sent", "last_sample")),
         "intensity": text("intensity", intensity, ("value", "difference", "nothing")),
-        "version_2": asdict(instance("version_2", version_2 or Version2(), Version2)),
+        "version_2": asdict(instance("version_2", Version2() if version_2 is None else version_2, Version2)),
         "control": None if control is None else text("control", control),
         "line": None if line is None else (str(Path(checked_path("line", line))), whole("baud", baud, 300, 4_000_000)),
         "sync": None if sync is None else (str(Path(checked_path("sync", sync))), bool(overwrite)),
