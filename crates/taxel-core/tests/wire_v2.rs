@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
 use taxel_core::board::{Board, IntensityWord, Version2};
 use taxel_core::vectors::Instructions;
-use taxel_core::wire::v2::{self, Counts, Decoder, Header, Heard, Kind, MAGIC, Packer, Settings, StreamReader};
+use taxel_core::wire::v2::{self, Counts, Decoder, Header, Kind, MAGIC, Outcome, Packer, Settings, StreamReader};
 use taxel_core::wire::{Decoder as Decoder1, Registers, Room};
 use taxel_core::{Array, Events, Stop};
 
@@ -99,7 +99,7 @@ fn what_the_board_means_is_what_the_host_hears() {
                     let before = events.len();
                     let heard = decoder.push(datagram, None, &mut events);
                     assert!(events.t[before..].iter().all(|&t| t >= until), "seed {seed}: a promise was broken");
-                    let Heard::Intact { until: promised, missing: 0, reset: false } = heard else {
+                    let Outcome::Intact { until: promised, missing: 0, reset: false } = heard else {
                         panic!("{heard:?}")
                     };
                     until = until.max(promised.unwrap_or(0));
@@ -176,9 +176,9 @@ fn each_intact_datagram_is_decoded_once_whatever_the_network_does() {
         let (mut once, mut refused) = (vec![], 0);
         for (k, datagram) in &arriving {
             match decoder.push(datagram, None, &mut events) {
-                Heard::Intact { .. } => once.push(*k),
-                Heard::Repeated => assert!(once.contains(k)),
-                Heard::Refused(_) => refused += 1,
+                Outcome::Intact { .. } => once.push(*k),
+                Outcome::Repeated => assert!(once.contains(k)),
+                Outcome::Refused(_) => refused += 1,
             }
         }
         assert_eq!(refused, hurt);
@@ -254,7 +254,7 @@ fn a_reset_goes_on_in_time_and_is_noticed() {
             board
                 .frame(&frame, |datagram| {
                     let heard = decoder.push(datagram, Some(arrived), &mut events);
-                    resets += u64::from(matches!(heard, Heard::Intact { reset: true, .. }));
+                    resets += u64::from(matches!(heard, Outcome::Intact { reset: true, .. }));
                     true
                 })
                 .unwrap();
@@ -314,7 +314,7 @@ fn a_slow_board_still_promises_and_silence_has_its_heartbeats() {
     for k in 0..20_u16 {
         board
             .frame(&[if k == 3 { 50 } else { 0 }; 16], |datagram| {
-                if let Heard::Intact { until: Some(u), .. } =
+                if let Outcome::Intact { until: Some(u), .. } =
                     decoder.push(datagram, None, &mut Events::empty(array.clone()))
                 {
                     until = until.max(u);
@@ -505,8 +505,9 @@ fn every_set_of_instructions_hears_the_same() {
         for set in Instructions::ALL.into_iter().filter(|set| set.present()) {
             let mut decoder = Decoder::new(array.clone()).instructions(set).unwrap();
             let mut events = Events::empty(array.clone());
-            let told: Vec<Heard> = datagrams.iter().map(|datagram| decoder.push(datagram, None, &mut events)).collect();
-            assert!(seed % 2 == 1 || told.iter().all(|heard| matches!(heard, Heard::Intact { .. })));
+            let told: Vec<Outcome> =
+                datagrams.iter().map(|datagram| decoder.push(datagram, None, &mut events)).collect();
+            assert!(seed % 2 == 1 || told.iter().all(|heard| matches!(heard, Outcome::Intact { .. })));
             events.view().check().unwrap();
             let heard = (events, decoder.counts(), decoder.held(), told);
             let first = first.get_or_insert_with(|| heard.clone());
@@ -768,13 +769,13 @@ fn a_number_drawn_twice_is_a_reset_once() {
         header.write(&[0x05, 0x80], &mut datagram);
         decoder.push(&datagram, None, &mut events)
     };
-    let intact = |heard| matches!(heard, Heard::Intact { .. });
+    let intact = |heard| matches!(heard, Outcome::Intact { .. });
     assert!(intact(hear(70_000, 20_000_000)));
     assert!(intact(hear(70_001, 20_000_192)));
     // After the reset, each once; what comes again stays a repetition, and the old session is over.
     for sequence in 0..5 {
         assert!(intact(hear(sequence, 192 * u64::from(sequence))));
-        assert!(matches!(hear(sequence, 192 * u64::from(sequence)), Heard::Repeated));
+        assert!(matches!(hear(sequence, 192 * u64::from(sequence)), Outcome::Repeated));
     }
     let counts = decoder.counts();
     assert_eq!((counts.intact, counts.repeated, counts.resets, counts.missing), (7, 5, 1, 0));

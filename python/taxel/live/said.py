@@ -1,4 +1,4 @@
-"""Detections as they come, with the time at which each was reported."""
+"""Detections of a `Live`, with the time of their output."""
 
 from __future__ import annotations
 
@@ -11,23 +11,28 @@ __all__ = ["Said", "heard"]
 
 
 class Said(NamedTuple):
-    """Report what was detected, and when: all times but the last in us of the board's clock.
+    """Hold a detection and its times, all but the last in us of the board's clock.
 
     Attributes
     ----------
     label : str
     t : int, us
-        When the event was: the crossing less the encoder's latency and the trained delay.
+        Time of the event: the crossing minus the encoder's latency and the trained delay.
     known : int, us
-        When it could first be known: the end of the board's frame in which the potential crosses.
+        When it could first be detected: the end of the board's frame in which the potential crosses.
     slope : float, mV/ms
         How steeply the potential crossed its threshold, as a measure of how sure.
     said : int, us
-        When it was output, by the host's clock less the estimated offset between the clocks.
+        When it was output, by the host's clock minus the estimated offset between the clocks.
     said_ns : int, ns since 1970
         The same by the host's clock.
     repaired : bool
-        Whether it may rest on values that states of wire version 2 repaired after a loss.
+        Whether it may depend on values that states of wire version 2 repaired after a loss.
+
+    Examples
+    --------
+    >>> Said("contact", 1000, 1192, 2.5, 1400, 1_700_000_000_000_000_000).label
+    'contact'
     """
 
     label: str
@@ -40,7 +45,18 @@ class Said(NamedTuple):
 
 
 def heard(said: Sequence[Said]) -> Detections:
-    """Return detections of a `Live` as `Detections`."""
+    """Return detections of a `Live` as `Detections`.
+
+    Parameters
+    ----------
+    said : sequence of Said
+        The detections.
+
+    Examples
+    --------
+    >>> heard([Said("contact", 1000, 1192, 2.5, 1400, 1_700_000_000_000_000_000)]).t
+    array([1000])
+    """
     return Detections._of(
         [s.label for s in said],
         [s.t for s in said],
