@@ -20,6 +20,9 @@ ROOMS = (
     "taxel.simulate.Flaws",
     "taxel.simulate.Faults",
     "taxel.simulate.circuit.Converter",
+    "taxel.simulate.emulate",
+    "taxel.live",
+    "taxel.device",
 )
 
 READINGS = Path(__file__).parents[1] / "docs" / "readings.md"

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 import taxel
-from live.boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, touch
 from taxel import Array, Events, Neuron, Readout, wire
 from taxel.encode import ContactArea
 from taxel.live import Live, send
 from taxel.simulate import Board, Scene, emulate
 from taxel.wire import Registers
+
+from .boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, touch
 
 
 def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path: Path) -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import taxel
-from live.boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, recording, wait_for, wait_until
 from taxel.live import Live
+
+from .boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, recording, wait_for, wait_until
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is always full")

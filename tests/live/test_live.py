@@ -12,7 +12,11 @@ import numpy as np
 import pytest
 
 import taxel
-from live.boards import (
+from taxel import Array, DeviceError, Events, Neuron, ProblemError, Readout, wire
+from taxel.encode import ContactArea
+from taxel.live import Live, Said, heard, send
+
+from .boards import (
     LOOPBACK,
     SMALL,
     datagrams,
@@ -21,9 +25,6 @@ from live.boards import (
     touch,
     wait_for,
 )
-from taxel import Array, DeviceError, Events, Neuron, ProblemError, Readout, wire
-from taxel.encode import ContactArea
-from taxel.live import Live, Said, heard, send
 
 
 @pytest.mark.parametrize("segment", [False, True])

@@ -100,7 +100,7 @@ class Live:
         Send each detection as such a line to "udp:HOST:PORT" (a datagram each), "pipe:PATH" (an existing named pipe)
         or "serial:PATH@BAUD"; "lsl:NAME" sends its label in a stream of markers of the lab streaming layer. Up to 1024
         lines wait for a slow reader; lines without room, or without a reader, are lost and counted.
-    kernel_buffer_bytes, queue_bytes, readout_events : int, bytes or events, optional
+    kernel_buffer_bytes, queue_bytes, readout_events : int, 0 or more (bytes, bytes, events), optional
         Sizes of the queues in the kernel, before the decoder and before the readout.
     gro : bool, optional
         Let the kernel merge trains of datagrams (`UDP_GRO`). It then counts its drops in trains.
@@ -201,6 +201,12 @@ class Live:
         ------
         OSError : the disk is full, the socket failed
         ProblemError : the encoder cannot read the events
+
+        Examples
+        --------
+        >>> with Live(0, host="127.0.0.1") as live:
+        ...     live.next(0.0) is None
+        True
         """
         said = self._core.next(number("timeout", timeout))
         return None if said is None else Said(*said)
@@ -295,7 +301,7 @@ class Live:
         ----------
         name : str
             Of the source, as in `sources`.
-        values : float, shape (columns,), in the units of the source
+        values : float, shape (columns,), each in the unit of its column (s, m/s2 ...)
             One for each column, with its own time stamp.
         arrived_ns : int, ns since 1970, optional
             When they arrived. Default: now.

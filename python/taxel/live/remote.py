@@ -113,6 +113,15 @@ class Remote:
     DeviceError : no bridge answers, or several boards are published and none is named; the wheel is not installed
     ProblemError : the text is no address
 
+    Examples
+    --------
+    ``with Remote("zenoh:192.168.1.5/left") as remote, Live(remote=remote) as live: ...`` receives a board of another
+    computer.
+
+    >>> Remote("192.168.1.5")
+    Traceback (most recent call last):
+    taxel.ProblemError: address '192.168.1.5': must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left
+
     Notes
     -----
     The computers' clocks are compared by round trips, four times a second: of each second the shortest counts, the

@@ -13,9 +13,10 @@ __all__ = ["Said", "heard"]
 class Said(NamedTuple):
     """Hold a detection and its times, all but the last in us of the board's clock.
 
-    Attributes
+    Parameters
     ----------
     label : str
+        The name of the neuron.
     t : int, us
         Time of the event: the crossing minus the encoder's latency and the trained delay.
     known : int, us

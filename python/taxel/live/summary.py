@@ -16,7 +16,7 @@ __all__ = ["Summary", "delays"]
 class Summary:
     """Report how a `Live`, or a recording of one, ended.
 
-    Attributes
+    Parameters
     ----------
     counters : dict
         As `Live.counters`, at the end.

@@ -38,7 +38,7 @@ _END_WITHIN_S = 4.0
 class Viewing:
     """Hold the state of a `Viewer`.
 
-    Attributes
+    Parameters
     ----------
     sent, lost : dict
         Numbers of pictures, times of the curves ("curves"), spikes, detections and notes that the viewer has received,
@@ -49,6 +49,11 @@ class Viewing:
         Why no viewer is connected, or what the panel's server refused.
     over : bool
         Whether all of a recording has been shown.
+
+    Examples
+    --------
+    >>> Viewing(sent={"pictures": 3}, there=True).lost
+    {}
     """
 
     sent: dict[str, int] = field(default_factory=dict)
