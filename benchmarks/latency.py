@@ -31,9 +31,9 @@ import numpy as np
 from _rounds import stamp
 from numpy.typing import NDArray
 
-from taxel import Array, Frames, Neuron, Readout, Tare
+from taxel import Array, Detection, Frames, Neuron, Readout, Tare
 from taxel.encode import ContactArea
-from taxel.live import Live, Said
+from taxel.live import Live
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 
@@ -169,7 +169,7 @@ def heard(way: Way, seconds: float, scratch: Path) -> dict[str, Any]:
     payload, log = scratch / "frames.pickle", scratch / "sent.pickle"
     payload.write_bytes(pickle.dumps(frames))
     del frames
-    called: list[tuple[Said, int]] = []
+    called: list[tuple[Detection, int]] = []
     used = time.process_time()
     with Live(
         0, host="127.0.0.1", array=array, registers=way.registers, readout=judge, tare=tare,

@@ -1,4 +1,4 @@
-"""What the README and the docs tell to type: the README's way works, of every other line command and options exist."""
+"""Shell commands of README and docs: those of the README work in order; of all others command and options exist."""
 
 import os
 import re
@@ -22,7 +22,7 @@ LOOPBACK = "127.0.0.1"
 
 
 def shell_lines(page: Path) -> list[str]:
-    """Return what a page tells to type, without comments."""
+    """Return the shell commands of a page, without comments."""
     blocks = re.findall(r"^```(?:sh|bash|shell|console)?\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
     lines = [re.sub(r"\s+#.*", "", line).strip() for block in blocks for line in block.splitlines()]
     return [line for line in lines if re.match(r"(taxel|make|source|pip|cargo|\.venv/bin/taxel) ", line)]

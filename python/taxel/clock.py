@@ -68,7 +68,25 @@ class Clock:
         return int(self.host_ns(0))
 
     def host_ns(self, board_us: int | NDArray[np.int64]) -> Any:
-        """Return the host's time (ns since 1970) at times of the source (us)."""
+        """Return the host's time (ns since 1970) at times of the source (us).
+
+        Parameters
+        ----------
+        board_us : int or int64, shape (n,), us
+
+        Returns
+        -------
+        int or int64, shape (n,), ns since 1970
+
+        Raises
+        ------
+        ProblemError : no datagrams, so that nothing is known of the clock
+
+        Examples
+        --------
+        >>> Clock(np.array([0, 1000]), np.array([10**15, 10**15 + 10**6])).host_ns([500])
+        array([1000000000500000])
+        """
         t = np.asarray(board_us, np.int64)
         own, host = self._knots
         k = np.clip(np.searchsorted(own, t, side="right") - 1, 0, len(own) - 2)
@@ -83,7 +101,25 @@ class Clock:
         return len(self._lines) == 1
 
     def board_us_at(self, host_ns: int | NDArray[np.int64]) -> Any:
-        """Return the source's time (us) at times of the host (ns since 1970)."""
+        """Return the source's time (us) at times of the host (ns since 1970).
+
+        Parameters
+        ----------
+        host_ns : int or int64, shape (n,), ns since 1970
+
+        Returns
+        -------
+        int or int64, shape (n,), us
+
+        Raises
+        ------
+        ProblemError : no datagrams, so that nothing is known of the clock
+
+        Examples
+        --------
+        >>> Clock(np.array([0, 1000]), np.array([10**15, 10**15 + 10**6])).board_us_at([10**15 + 500_000])
+        array([500])
+        """
         wanted = np.asarray(host_ns, np.int64)
         own, host = self._knots
         t = own[0] + (wanted - host[0]) // 1000

@@ -98,6 +98,15 @@ class Frames(Columns):
         Raises
         ------
         ProblemError : events without intensities, a period below 1 us, or held values of another array
+
+        Examples
+        --------
+        >>> from taxel.events import Events
+        >>> events = Events([0, 150], [0, 1], [0, 0], [True, True], array=Array(1, 2), intensity=[5, 7])
+        >>> Frames.from_events(events, 100, 0, 250).values[:, 0]
+        array([[5., 0.],
+               [5., 0.],
+               [5., 7.]], dtype=float32)
         """
         instance("events", events, Events)
         if events.intensity is None or events.present is None:
@@ -130,12 +139,41 @@ class Frames(Columns):
         return Frames(self.values[chosen], self.t[chosen], unit=self.unit, array=self.array)
 
     def between(self, start: float, stop: float) -> Frames:
-        """Return the pictures of ``start <= t < stop`` (us)."""
+        """Return the pictures of ``start <= t < stop`` (us).
+
+        Parameters
+        ----------
+        start, stop : float, us
+
+        Raises
+        ------
+        ProblemError : a start that lies after the stop, or is no number
+
+        Examples
+        --------
+        >>> len(Frames([[[1.0]], [[2.0]]], [0, 100]).between(50, 150))
+        1
+        """
         first, last = np.searchsorted(self.t, window("us", start, stop))
         return self[int(first) : int(last)]
 
     def region(self, x: slice, y: slice) -> Frames:
-        """Return the pictures of a rectangle of columns `x` and rows `y`, as a smaller array."""
+        """Return the pictures of a rectangle of columns `x` and rows `y`, as a smaller array.
+
+        Parameters
+        ----------
+        x, y : slice
+            Columns and rows, without a step.
+
+        Raises
+        ------
+        ProblemError : no slices of whole numbers, one with a step, or no taxel
+
+        Examples
+        --------
+        >>> Frames([[[1.0, 2.0]]], [0]).region(slice(1, 2), slice(None)).values
+        array([[[2.]]], dtype=float32)
+        """
         columns, rows = self.array.region(x, y)
         values = self.values[:, slice(*rows), slice(*columns)]
         exists = None if self.array.exists is None else self.array.exists[slice(*rows), slice(*columns)]
@@ -156,6 +194,10 @@ class Frames(Columns):
         Returns
         -------
         float64, shape (n,), mm2
+
+        Raises
+        ------
+        ProblemError : a level below 0, or taxels whose pitch is not known
 
         Examples
         --------
@@ -186,6 +228,10 @@ class Frames(Columns):
         float64, shape (n, 2), mm
             x to the right and y downwards from the middle of the taxel in the first column and row; NaN where no taxel
             counts.
+
+        Raises
+        ------
+        ProblemError : a level below 0, or taxels whose pitch is not known
         """
         if not number("above", above) >= 0:
             raise ProblemError(f"above is {shown(above)}: must be 0 or more, as values are weights")

@@ -95,6 +95,10 @@ class Tare:
     def off(self, frames: Frames) -> Frames:
         """Return pictures with each taxel's rest subtracted: 0 where it reads less, or where its rest is not known.
 
+        Parameters
+        ----------
+        frames : Frames
+
         Raises
         ------
         ProblemError : pictures of an array of another shape
@@ -108,6 +112,10 @@ class Tare:
     @classmethod
     def from_json(cls, text: str) -> Tare:
         """Return the tare that `to_json` wrote.
+
+        Parameters
+        ----------
+        text : str
 
         Raises
         ------
@@ -132,6 +140,16 @@ class Tare:
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the tare to a JSON file, whole or not at all.
 
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
+
         Raises
         ------
         FileExistsError : the file is there already and `overwrite` is false
@@ -142,9 +160,21 @@ class Tare:
     def load(cls, path: str | os.PathLike[str]) -> Tare:
         """Read a tare from the file that `save` wrote.
 
+        Parameters
+        ----------
+        path : path
+
         Raises
         ------
         FormatError : no tare (names the file)
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from taxel.frames import Frames
+        >>> rest = Tare.take(Frames([[[5.0]], [[7.0]]], [0, 100]))
+        >>> Tare.load(rest.save(Path(tempfile.mkdtemp()) / "tare.json")).rest
+        array([[5.]])
         """
         place = Path(checked_path("path", path))
         try:

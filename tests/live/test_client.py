@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel import ProblemError
+from taxel import Detection, Note, ProblemError
 from taxel.encode import ChangeEvents
 from taxel.live import Live, Panel, PanelClient
-from taxel.live.client import Curves, Detection, Note, Picture, Spikes
+from taxel.live.client import Curves, Picture, Spikes
 
 from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 from .test_viewer import SOON, above_rest, force, spikes_of

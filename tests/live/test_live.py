@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel import Array, DeviceError, Events, Neuron, ProblemError, Readout, wire
+from taxel import Array, Detection, DeviceError, Events, Neuron, ProblemError, Readout, wire
 from taxel.encode import ContactArea
-from taxel.live import Live, Said, heard, send
+from taxel.live import Live, heard, send
 
 from .boards import (
     LOOPBACK,
@@ -59,7 +59,7 @@ def test_what_is_recorded_is_what_was_sent(tmp_path: Path) -> None:
 
 
 def test_detections_come_live_and_are_those_of_the_recording(tmp_path: Path) -> None:
-    called: list[Said] = []
+    called: list[Detection] = []
     # A machine that stalls makes datagrams late: here the host's clock moves nothing on.
     options = {"array": SMALL, "readout": touch(), "guard_frames": 1e6, "say": called.append}
     with Live(0, host=LOOPBACK, record=tmp_path / "said.mcap", **options) as live:
@@ -97,7 +97,7 @@ def test_in_silence_what_is_owed_is_said() -> None:
 def test_what_a_thread_keeps_for_itself_lasts_from_one_call_to_the_next() -> None:
     own, calls = threading.local(), []
 
-    def count(said: Said) -> None:
+    def count(said: Detection) -> None:
         own.calls = getattr(own, "calls", 0) + 1
         calls.append((threading.get_ident(), own.calls))
 
@@ -111,7 +111,7 @@ def test_what_a_thread_keeps_for_itself_lasts_from_one_call_to_the_next() -> Non
 
 
 def test_what_the_callers_function_raises_is_raised() -> None:
-    def refuse(said: Said) -> None:
+    def refuse(said: Detection) -> None:
         raise LookupError(f"nothing to do with {said.label}")
 
     with Live(0, host=LOOPBACK, array=SMALL, readout=touch(), say=refuse) as live:
@@ -279,7 +279,7 @@ def test_stop_from_several_threads_gives_each_the_same_summary() -> None:
 
 
 def test_stop_from_within_say_is_one_error() -> None:
-    def say(_: Said) -> None:
+    def say(_: Detection) -> None:
         live.stop()
 
     live = Live(0, host=LOOPBACK, array=SMALL, readout=touch(), say=say)

@@ -87,6 +87,28 @@ impl SpikeTrains {
         Ok(Self { times, values: signed.then_some(values), offsets, start, stop })
     }
 
+    /// Copies the columns of spike trains with the window `(start, stop)`, ms, and checks them.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` as [`SpikeTrains::check`]; `Interrupted` where the caller stops it.
+    pub fn copy_of(
+        times: &[f64],
+        offsets: Vec<usize>,
+        values: Option<&[f32]>,
+        (start, stop): (f64, f64),
+        interrupt: Stop<'_>,
+    ) -> Result<Self> {
+        let mut copy = Vec::with_capacity(times.len());
+        for piece in times.chunks(BETWEEN_CHECKS) {
+            interrupt.check()?;
+            copy.extend_from_slice(piece);
+        }
+        let trains = Self { times: copy, offsets, values: values.map(<[f32]>::to_vec), start, stop };
+        trains.check()?;
+        Ok(trains)
+    }
+
     /// How many trains.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -111,21 +133,21 @@ impl SpikeTrains {
     ///
     /// `Interrupted` where the caller stops it.
     pub fn by_time(&self, stop: Stop<'_>) -> Result<Vec<Spike>> {
-        stop.check()?;
-        let mut all: Vec<Spike> = (0..self.len())
-            .flat_map(|n| {
-                (self.offsets[n]..self.offsets[n + 1]).map(move |k| Spike {
-                    t: self.times[k],
-                    train: u32::try_from(n).unwrap_or(u32::MAX),
-                    value: self.values.as_ref().map_or(1.0, |v| v[k]),
-                })
-            })
-            .collect();
-        for piece in all.chunks_mut(SORTED_AT_ONCE) {
+        let mut all: Vec<Spike> = Vec::with_capacity(self.times.len());
+        for n in 0..self.len() {
+            let train = u32::try_from(n).unwrap_or(u32::MAX);
+            for (k, &t) in (self.offsets[n]..).zip(self.train(n)) {
+                if all.len() % BETWEEN_CHECKS == 0 {
+                    stop.check()?;
+                }
+                all.push(Spike { t, train, value: self.values.as_ref().map_or(1.0, |v| v[k]) });
+            }
+        }
+        for piece in all.chunks_mut(BETWEEN_CHECKS) {
             stop.check()?;
             piece.sort_by(|a, b| a.t.total_cmp(&b.t));
         }
-        let mut sorted = SORTED_AT_ONCE;
+        let mut sorted = BETWEEN_CHECKS;
         while sorted < all.len() {
             let mut merged = Vec::with_capacity(all.len());
             for pair in all.chunks(2 * sorted) {
@@ -163,14 +185,14 @@ impl SpikeTrains {
     }
 }
 
-/// So many spikes are sorted between two checks for Ctrl-C.
-const SORTED_AT_ONCE: usize = 1 << 18;
+/// So many spikes are copied or sorted between two checks for Ctrl-C.
+const BETWEEN_CHECKS: usize = 1 << 18;
 
 /// Appends two sorted runs to `out`, sorted; at equal times those of the first come first.
 fn merge(first: &[Spike], second: &[Spike], out: &mut Vec<Spike>, stop: Stop<'_>) -> Result<()> {
     let (mut i, mut j) = (0, 0);
     while i < first.len() && j < second.len() {
-        if (i + j) % SORTED_AT_ONCE == 0 {
+        if (i + j) % BETWEEN_CHECKS == 0 {
             stop.check()?;
         }
         if second[j].t.total_cmp(&first[i].t).is_lt() {

@@ -7,6 +7,8 @@
 mod aligned;
 mod eight;
 mod fetch;
+#[cfg(target_arch = "x86_64")]
+mod front;
 mod instructions;
 mod products;
 mod windows;
@@ -16,6 +18,8 @@ pub(crate) use eight::{LANES, Vector, lines, lines_mut};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use eight::{Ymm, Zmm};
 pub(crate) use fetch::fetch;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use front::TO_FRONT;
 pub use instructions::Instructions;
 pub(crate) use instructions::{by_width, kernel, wide};
 pub(crate) use products::{add, add_lines, dot, times};

@@ -33,7 +33,7 @@ export const FIELDS = [
   { name: "ramp", manual: "ramp_time", register: 4, low: 0, bits: 16, offset: 0, unit: "ticks", default: 150, least: 1, greatest: 65535, text: "How long the ramp rises." },
   { name: "threshold_rest", manual: "threshold_rest", register: 4, low: 16, bits: 16, offset: 0, unit: "1/1024", default: 0, least: 0, greatest: 65535, text: "FA-1: theta_0, in ticks after the power law." },
   { name: "threshold_decay", manual: "threshold_decay", register: 5, low: 0, bits: 8, offset: 0, unit: "1/1024 theta_0", default: 0, least: 0, greatest: 255, text: "FA-1: by how much a quiet frame lowers the threshold, B of Table 5.3." },
-  { name: "noise_floor", manual: "noise_floor", register: 5, low: 8, bits: 8, offset: 0, unit: "ticks", default: 3, least: 0, greatest: 255, text: "Smallest difference that makes no event." },
+  { name: "noise_floor", manual: "noise_floor", register: 5, low: 8, bits: 8, offset: 0, unit: "ticks", default: 3, least: 0, greatest: 255, text: "Largest difference that makes no event." },
   { name: "lines", manual: "nrows", register: 5, low: 16, bits: 8, offset: 1, unit: "lines", default: 64, least: 1, greatest: 256, text: "Driven lines (the register holds one less; the manual's field has 6 bits, read: 8)." },
   { name: "record", manual: "record", register: 7, low: 16, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "A recording runs: setting and clearing it sends a marker and moves the sync line." },
   { name: "channels", manual: "channels", bits: 8, offset: 0, unit: "channels", default: 16, least: 0, greatest: 255, text: "Channels of the converter, 16 or 64: the board's build, not a register." },

@@ -52,7 +52,7 @@ fn weighed<'py>(py: Python<'py>, rows: &[(Row, f64)]) -> Weighed<'py> {
     (rows.iter().map(|r| from_row(r.0)).collect(), array(py, rows.iter().map(|r| r.1).collect()))
 }
 
-/// A certificate as Python gets it: rows and multipliers, gap, whether it needs no margin, what it says.
+/// A certificate as Python gets it: rows and multipliers, gap, whether it needs no margin, its explanation.
 type CertificateOut<'py> = (Weighed<'py>, f64, bool, String);
 
 /// A fit as Python gets it: status, weights, objective, parts, gap, violation, margins that hold and were asked for, engine, rounds,
@@ -113,7 +113,7 @@ impl ConeXProblem {
         Ok((array(py, coefficients), limit))
     }
 
-    /// What B looks at behind a target, and what it shall reach.
+    /// The row of B behind a target, and the value that it aims at.
     fn behind<'py>(&self, py: Python<'py>, pattern: usize, target: usize) -> PyResult<RowOut<'py>> {
         let Stated { coefficients, limit } = self.problem.behind(pattern, target).map_err(core)?;
         Ok((array(py, coefficients), limit))

@@ -67,7 +67,7 @@ impl ConeRProblem {
         self.0.silent_rows()
     }
 
-    /// All rows, grid points at which nothing is asked included.
+    /// All rows, grid points without a requirement included.
     #[getter]
     fn rows(&self) -> usize {
         self.0.rows()

@@ -164,7 +164,7 @@ fn batch_names() -> &'static [&'static str] {
     Batch::NAMES
 }
 
-/// Learns from all examples at once; gives weights, and what else is said of them as JSON.
+/// Learns from all examples at once; returns weights, and further results as JSON.
 #[pyfunction]
 fn fit_batch<'py>(
     py: Python<'py>,

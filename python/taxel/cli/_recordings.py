@@ -184,7 +184,7 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
     span = f"{recording.path} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
     if total and lost == total:
         raise ProblemError(f"{option} {table.path}: none of its {total} events lies within {span}")
-    if recording.clock is None and any(row.host_ns is not None for row in table.rows):
+    if recording.clock is None and any(row.at_ns for row in table.rows):
         warnings.warn(
             f"the {kind_of_file(recording.kind)} keeps no arrival times, so host_ns cannot settle by how many turns of "
             f"the board's clock (6.5536 s) {table.path} is ahead of it: times are taken as they are",

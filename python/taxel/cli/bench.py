@@ -16,9 +16,9 @@ from typing import Annotated, Any, BinaryIO
 import typer
 
 from taxel._base.files import write_whole
+from taxel._base.provenance import Sources, installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.report.provenance import Sources, installed
 
 __all__ = ["bench", "stale_results"]
 
@@ -88,7 +88,7 @@ def bench(
 
 def _sources(folder: Path) -> Sources:
     """Return the sources of the benchmarks and of what they measure."""
-    return installed("taxel_studies", *sorted(folder.glob("*.py")))
+    return installed_sources("taxel_studies", *sorted(folder.glob("*.py")))
 
 
 def stale_results(folder: Path, names: Sequence[str]) -> dict[str, list[str]]:

@@ -50,7 +50,7 @@ def demo(
     """Play scenes on the emulated board, find contact and lift-off while they run, and leave a report.
 
     A ball falls on foam, is caught in flight, pressed by hand and lifted. The board is a process of its own that sends
-    real packets over UDP; this one records, encodes and says contact and lift. A new folder gets report.html and
+    real packets over UDP; this one records, encodes and detects contact and lift. A new folder gets report.html and
     report.json.
 
     Example: taxel demo --seed 1

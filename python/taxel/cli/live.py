@@ -42,8 +42,9 @@ from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, an
 from taxel.cli._recordings import new_report
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.detect import Readout
+from taxel.detections import Detection
 from taxel.device import Cable
-from taxel.live import Live, Panel, Said, Summary, Viewer, delays
+from taxel.live import Live, Panel, Summary, Viewer, delays
 from taxel.live.options import LiveOptions
 from taxel.spikes import to_ms
 from taxel.tare import Tare
@@ -189,11 +190,12 @@ def live(
 def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | None) -> None:
     """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
-    from taxel.report import Listened, write_listening  # noqa: PLC0415  pictures load slowly
+    from taxel.detect import Example, Outcome  # noqa: PLC0415
+    from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
     recording = taxel.open(path)
     rest = tare if isinstance(tare, Tare) else None
-    heard = Listened(str(path), recording.events, recording.detections, rest)
+    heard = Outcome(str(path), Example(recording, {}, rest), recording.detections)
     write_listening(folder, readout, [heard], title=f"What was said live, recorded to {path}")
 
 
@@ -318,10 +320,10 @@ def _watch(
                 before = now
 
 
-def _tell(said: Said, console: Console, say: Callable[[str], None]) -> None:
+def _tell(said: Detection, console: Console, say: Callable[[str], None]) -> None:
     """Print a detection, with its delay after `known`; with --json the thread that made it has written it."""
     if not console.quiet:
-        say(f"{said.t / 1e6:10.4f} s  {said.label:<16} said {to_ms(said.said - said.known):.2f} ms after it was known")
+        say(f"{said.t / 1e6:10.4f} s  {said.label:<16} said {to_ms(said.latency or 0):.2f} ms after it was known")
 
 
 def _drain(pipeline: Live, console: Console, say: Callable[[str], None]) -> None:

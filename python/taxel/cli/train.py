@@ -26,11 +26,10 @@ from taxel.cli._recordings import (
 )
 
 if TYPE_CHECKING:
-    from taxel.detect import Example, Judged, Readout, Recipe
+    from taxel.detect import Example, Judged, Outcome, Readout, Recipe
     from taxel.events import Events
     from taxel.frames import Frames
     from taxel.recording import Recording
-    from taxel.report import Listened
 
 __all__ = ["train"]
 
@@ -165,9 +164,8 @@ def _on_itself(
     examples: Sequence[Example],
     window_ms: float,
     tell: Callable[[str], None],
-) -> list[Listened]:
-    from taxel.detect import run, score  # noqa: PLC0415
-    from taxel.report import Listened  # noqa: PLC0415
+) -> list[Outcome]:
+    from taxel.detect import Example, Outcome, run, score  # noqa: PLC0415
 
     heard = []
     for one, example in zip(opened, examples, strict=True):
@@ -175,16 +173,16 @@ def _on_itself(
         truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
         found = run(readout, one, tare=example.tare)
         own = score(found, truth, window_ms)
-        heard.append(Listened(str(one.path), _source(one), found, example.tare, truth, own))
+        heard.append(Outcome(str(one.path), Example(one, truth, example.tare), found, own))
     return heard
 
 
-def _own(heard: Sequence[Listened], window_ms: float) -> Judged:
+def _own(heard: Sequence[Outcome], window_ms: float) -> Judged:
     """Say how it did on what it was trained on."""
     from taxel.detect import Judged  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
 
-    truths = [one.truth for one in heard if one.truth is not None]
+    truths = [one.example.labels for one in heard]
     together = score_together([one.found for one in heard], truths, window_ms)
     return Judged(tuple(one.score for one in heard if one.score is not None), together, "its own training data")
 

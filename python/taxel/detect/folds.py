@@ -34,10 +34,15 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    example : int
+    example : int, from 0 on
         Its place among the examples.
     start, stop : float, us
-        What lies in ``start <= t < stop`` counts; all of it where they are left out.
+        What lies in ``start <= t < stop`` belongs to the part; all of it where they are left out.
+
+    Examples
+    --------
+    >>> Part(0, stop=1000.0)
+    Part(example=0, start=-inf, stop=1000.0)
     """
 
     example: int
@@ -192,10 +197,15 @@ def choose(
 
     Parameters
     ----------
-    examples, recipe, window_ms, frame_us, progress
+    examples : sequence of Example
+    recipe : Recipe
         As in `judge`.
     k : int, 2 or more; or sequence of Fold
         How many folds; of fewer examples than that, as many as there are. Or the folds themselves.
+    window_ms : float, ms
+    frame_us : float, us, optional
+    progress : function of a str, optional
+        As in `judge`.
 
     Returns
     -------

@@ -178,7 +178,7 @@ class RequestHandler:
         with _reasons():
             labels = Labels(table)
         name = labels.named(recording)
-        return [(row.label, row.t_us) for row in labels.rows if row.recording == name]
+        return [(row.text, row.t or 0) for row in labels.rows if row.recording == name]
 
     def write_labels(self, table: Path, rows: Sequence[tuple[str, int]]) -> None:
         """Write a table of labels."""

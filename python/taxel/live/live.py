@@ -20,9 +20,9 @@ from taxel._base.arguments import path as checked_path
 from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.detections import Detection
 from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.options import LiveOptions
-from taxel.live.said import Said
 from taxel.live.summary import Summary, summary_of
 from taxel.recording.notes import Zeroing
 from taxel.tare import Tare
@@ -91,7 +91,7 @@ class Live:
     gap_frames : float, 0 or more
         At a gap in the sequence of wire version 2 time waits this many frames: the datagrams may only be late.
     say : callable, optional
-        Called with each `Said` in the thread that detected it, one at a time; an exception ends the pipeline and is
+        Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and is
         raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues to
         receive; up to 16 384 detections wait for it.
     lines : bool
@@ -141,7 +141,7 @@ class Live:
         inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in sources if how.startswith(_LSL)}
         self._inlets = list(inlets.values())
         self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
-        receivers: list[Callable[[Said], object]] = [*outlets, *([] if say is None else [say])]
+        receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
         feed = None if remote is None else remote._fed(options.queue_bytes)
         self._core = _core.Live(
@@ -158,7 +158,7 @@ class Live:
             None if readout is None else readout.to_json(),
             tare.to_json() if isinstance(tare, Tare) else None,
             None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
-            None if not receivers else lambda *said: [receive(Said(*said)) for receive in receivers],
+            None if not receivers else lambda *said: [receive(Detection(*said)) for receive in receivers],
             flag("lines", options.lines),
             feed,
         )
@@ -190,7 +190,7 @@ class Live:
         """The origin of the datagrams: "UDP 127.0.0.1:5208", or the address of a remote board."""
         return self._place
 
-    def next(self, timeout: float = 1.0) -> Said | None:
+    def next(self, timeout: float = 1.0) -> Detection | None:
         """Return the next detection, or None after `timeout` without one, or at once after the end.
 
         Parameters
@@ -209,9 +209,9 @@ class Live:
         True
         """
         said = self._core.next(number("timeout", timeout))
-        return None if said is None else Said(*said)
+        return None if said is None else Detection(*said)
 
-    def __iter__(self) -> Iterator[Said]:
+    def __iter__(self) -> Iterator[Detection]:
         """Yield detections as they come, until `stop` is called."""
         while True:
             over = self._core.is_over()

@@ -23,7 +23,7 @@ from taxel.wire import Registers
 from taxel.wire.registers import QUOTED_PRESETS
 
 if TYPE_CHECKING:
-    from taxel.live.said import Said
+    from taxel.detections import Detection
 
 __all__ = ["LiveOptions"]
 
@@ -76,7 +76,7 @@ class LiveOptions:
     gap_frames: float = option(
         _DEFAULT.gap_frames, "At a gap in version 2, frames to wait for what may only be late.", least=0.0
     )
-    say: Callable[[Said], object] | None = option(None, "Called with each detection.")
+    say: Callable[[Detection], object] | None = option(None, "Called with each detection.")
     lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.")
     send: str | Sequence[str] = option(
         (),
@@ -102,7 +102,7 @@ class LiveOptions:
         if array is None and readout is not None:
             array = readout.array
         if self.say is not None and not callable(self.say):
-            raise ProblemError(f"say is {shown(self.say)}: must be a function of a Said")
+            raise ProblemError(f"say is {shown(self.say)}: must be a function of a Detection")
         if readout is None and self.tare is not None:
             raise ProblemError("tare without a readout: nothing would use it")
         array = Array._of(array)

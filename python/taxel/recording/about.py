@@ -14,8 +14,9 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.detections import Detections
 from taxel.formats.checks import sensor
+from taxel.labels import Note
 from taxel.recording.contents import Contents
-from taxel.recording.notes import BoardChange, Note, Zeroing
+from taxel.recording.notes import BoardChange, Zeroing
 from taxel.wire import Registers
 
 __all__ = ["about_of", "array_of", "board_changes_of", "detections_of", "json_of", "notes_of", "zeroings_of"]

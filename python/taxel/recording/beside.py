@@ -6,10 +6,9 @@ from pathlib import Path
 
 from taxel._core import ProblemError
 from taxel.calibration import Calibration
-from taxel.labels import Labels, beside
+from taxel.labels import Labels, Note, beside
 from taxel.recording.contents import Contents, alone, once
 from taxel.recording.kinds import ENDINGS
-from taxel.recording.notes import Note
 
 __all__ = ["calibration_beside", "has_calibration", "with_what_lies_beside"]
 
@@ -39,8 +38,8 @@ def _labels(path: Path) -> tuple[Note, ...]:
     """Return the labels that people set on a finished recording."""
     labels = Labels(beside(path))
     name = labels.named(path)
-    rows = sorted((row for row in labels.rows if row.recording == name), key=lambda row: row.t_us)
-    return tuple(Note(row.label, row.t_us, row.host_ns or 0) for row in rows)
+    rows = sorted((row for row in labels.rows if row.recording == name), key=lambda row: row.t or 0)
+    return tuple(Note(row.text, row.t, row.at_ns) for row in rows)
 
 
 def has_calibration(path: Path) -> bool:

@@ -17,13 +17,14 @@ __all__ = ["Apart", "between"]
 
 
 def between(of: Contents, start: float, stop: float) -> Contents:
-    """Return the part of ``start <= t < stop`` (us); notes without a time are left out.
+    """Return the part of ``start <= t < stop`` (us); notes without a time are left out, and stand in its `lost`.
 
     What the taxels held at its beginning is known from what came before it. Taxels that were zeroed before it stay so.
     """
     return after(
         "between",
         of,
+        lambda: _without_a_time(of),
         events=once(lambda: None if of.events is None else of.events.between(start, stop)) if of.has_events else None,
         frames=None if of.has_events else once(lambda: None if of.frames is None else of.frames.between(start, stop)),
         stretch=once(lambda: _stretch(of, start, stop)),
@@ -36,6 +37,11 @@ def between(of: Contents, start: float, stop: float) -> Contents:
         ),
         sources=once(lambda: _sources(of, start, stop)),
     )
+
+
+def _without_a_time(of: Contents) -> list[str]:
+    count = sum(note.t is None for note in of.notes)
+    return [f"{count} notes without a time"] * bool(count)
 
 
 class Apart(Mapping[str, Contents]):

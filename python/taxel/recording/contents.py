@@ -18,7 +18,8 @@ from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.notes import BoardChange, Datagrams, Note, Samples, Zeroing
+from taxel.labels import Note
+from taxel.recording.notes import BoardChange, Datagrams, Samples, Zeroing
 from taxel.wire import Registers
 
 __all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "once", "several"]

@@ -14,13 +14,12 @@ from taxel._core import FormatError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import Trial
-from taxel.labels import Labels
+from taxel.labels import Labels, Note
 from taxel.recording.beside import with_what_lies_beside
 from taxel.recording.contents import Contents
 from taxel.recording.csv import read_csv
 from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, kind_of
-from taxel.recording.notes import Note
 from taxel.recording.npz import read_npz
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap

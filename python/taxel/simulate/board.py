@@ -47,6 +47,11 @@ class Version2:
     Raises
     ------
     ProblemError : out of these ranges
+
+    Examples
+    --------
+    >>> Version2(board=3).heartbeat_us
+    10000
     """
 
     board: int = option(0, "Wire 2: the board's number.", least=0, most=65_535)
@@ -127,6 +132,12 @@ class Board:
     ------
     ProblemError, DeviceError : arguments or registers that make no sense
 
+    Notes
+    -----
+    +
+
+    What a new value is compared with (`previous`) is open in thesis 4.3; the board's own rule stands in `docs/wire.md`.
+
     Examples
     --------
     >>> board = Board()
@@ -166,10 +177,10 @@ class Board:
 
         Parameters
         ----------
-        ticks : uint16, shape (rows * columns,) or (rows, columns)
+        ticks : uint16, shape (rows * columns,) or (rows, columns), ticks
             Trip times of the comparators by taxel, in 1/300 us from the ramp's start. At or above the ramp's length
             one reads as that length; `NOT_RETURNED` is a fault.
-        most : int, optional
+        most : int, 0 or more, optional
             How many datagrams the network takes during this frame; the rest waits in the queue.
 
         Returns
@@ -179,6 +190,11 @@ class Board:
         Raises
         ------
         ProblemError : not one trip time a taxel
+
+        Examples
+        --------
+        >>> [len(datagram) for datagram in Board().frame(np.full((64, 64), 100, np.uint16))][:1]
+        [1400]
         """
         at_most = 2**32 if most is None else whole("most", most, 0, 2**32)
         return self._core.frame(numbers("ticks", ticks, np.uint16).reshape(-1), at_most)
@@ -188,11 +204,35 @@ class Board:
         self._core.reset()
 
     def command(self, data: Any) -> str:
-        """Take command bytes as they come; return the status lines that answer them."""
+        """Take command bytes as they come; return the status lines that answer them.
+
+        Parameters
+        ----------
+        data : bytes
+            Five bytes a command; what is not whole yet waits for the rest.
+
+        Raises
+        ------
+        ProblemError : no bytes
+
+        Examples
+        --------
+        >>> len(Board().command(bytes.fromhex("e000000000"))) > 0
+        True
+        """
         return self._core.command(given_bytes(data))
 
     def record(self, start: bool) -> None:
-        """Start or stop a recording: a marker goes out where that changes anything."""
+        """Start or stop a recording: a marker goes out where that changes anything.
+
+        Parameters
+        ----------
+        start : bool
+
+        Raises
+        ------
+        ProblemError : neither true nor false
+        """
         self._core.record(flag("start", start))
 
     def faults(self) -> str:

@@ -31,41 +31,65 @@ _QUANTILES = {"p50": "median", "p99": "99 %", "max": "at most"}
 
 
 class Played(NamedTuple):
-    """What a host decoded of a board's datagrams."""
+    """What a host decoded of a board's datagrams.
+
+    Attributes
+    ----------
+    events : Events
+        All of them: the tare's, then from the start marker on what the scenes made.
+    datagrams : int, 0 or more
+    words : int, 0 or more
+        Of version 1 of the wire, of five bytes each; 0 on version 2.
+    bytes : int, 0 or more
+        Of all datagrams, without what the network puts around them.
+    """
 
     events: Events
-    """All of them: the tare's, then from the start marker on what the scenes made."""
     datagrams: int
     words: int
-    """Of version 1 of the wire, of five bytes each; 0 on version 2."""
     bytes: int
-    """Of all datagrams, without what the network puts around them."""
 
 
 @dataclass(frozen=True)
 class EmulatorReport:
-    """What an emulated board has done so far."""
+    """What an emulated board has done so far.
+
+    Attributes
+    ----------
+    frames : int, 0 or more
+    began_ns : int, ns since 1970
+        The host's clock at the board's time 0, ns since 1970: what the board does is due by it.
+    board_seconds : float, s
+        By the board's own clock.
+    seconds : float, s
+        By the host's: larger where the machine cannot hold the board's rate.
+    changes : int, 0 or more
+    datagrams : int, 0 or more
+    bytes : int, 0 or more
+    dropped : int, 0 or more
+        Changes that found the board's queue full.
+    late_frames : int, 0 or more
+        Sent more than a frame after their end.
+    late_us : mapping of str to float, us
+        How long after its end a frame was sent: p50, p99, max; not measured where frames go as they come.
+    network : mapping of str to int, or None
+        What the network did to datagrams, where asked to: given, delivered, and by fault.
+    resets : int, 0 or more
+        How often the board was reset.
+    """
 
     frames: int
     began_ns: int
-    """The host's clock at the board's time 0, ns since 1970: what the board does is due by it."""
     board_seconds: float
-    """By the board's own clock."""
     seconds: float
-    """By the host's: larger where the machine cannot hold the board's rate."""
     changes: int
     datagrams: int
     bytes: int
     dropped: int
-    """Changes that found the board's queue full."""
     late_frames: int
-    """Sent more than a frame after their end."""
     late_us: Mapping[str, float]
-    """How long after its end a frame was sent: p50, p99, max; not measured where frames go as they come."""
     network: Mapping[str, int] | None = None
-    """What the network did to datagrams, where asked to: given, delivered, and by fault."""
     resets: int = 0
-    """How often the board was reset."""
 
     @property
     def wanted_hz(self) -> float:
@@ -172,9 +196,11 @@ def play(
         The first should be a Silence longer than the tare.
     seed : int, 0 or more
         Draws the taxels' spread and the noise.
-    preset, array
+    preset : str, optional
         As in `truth`.
-    tare_ms : float, 0 to 60000
+    tare_ms : float, ms, 0 to 60000
+    array : Array, optional
+        As in `truth`.
     sensor : mapping, optional
         What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm, gain_spread,
         offset_mv, noise_ticks.

@@ -57,7 +57,17 @@ class Pipe:
         self._registers = held.replace(noise_floor=floor)
 
     def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames' line has their rate
-        """Return what the board holds that scans such frames."""
+        """Return what the board holds that scans such frames.
+
+        Parameters
+        ----------
+        preset : str or None
+            As in `emulate`.
+
+        Raises
+        ------
+        ProblemError : no such preset
+        """
         return self._registers
 
     def _line(self) -> bytes:

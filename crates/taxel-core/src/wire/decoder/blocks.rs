@@ -45,7 +45,7 @@ pub(super) fn plain(
     }
     loop {
         done += blocks(set, &bytes[done..], columns, rows, state, filling);
-        // An odd number, so that pairs that lie across the blocks' edges come to lie inside.
+        // An odd number, so that pairs that lie across the edges of AVX2's blocks come to lie inside.
         let most = if set < Instructions::Avx2 { usize::MAX } else { BLOCK_WORDS - 1 };
         let words = scalar::words(&bytes[done..], columns, rows, state, filling, most);
         done += words * WORD_BYTES;

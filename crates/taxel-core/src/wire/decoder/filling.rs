@@ -31,12 +31,18 @@ impl Filling<'_> {
         self.room.x[k].write(change.x);
         self.room.y[k].write(change.y);
         self.room.p[k].write(change.p);
-        if self.paired {
-            self.room.ticks[k].write(0);
-            self.room.present[k].write(false);
-        }
         self.rows = k + 1;
         self.open = true;
+        if self.paired {
+            self.without_intensity();
+        }
+    }
+
+    /// Writes "none" for the last row; there must be one.
+    #[inline]
+    pub(super) fn without_intensity(&mut self) {
+        self.room.ticks[self.rows - 1].write(0);
+        self.room.present[self.rows - 1].write(false);
     }
 
     /// Gives the last row its intensity, if it is of that taxel.

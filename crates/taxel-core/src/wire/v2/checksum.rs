@@ -15,8 +15,8 @@ pub(super) const EVEN: usize = 64;
 #[inline]
 pub(super) fn crc32c(bytes: &[u8]) -> u32 {
     #[cfg(target_arch = "x86_64")]
-    if (4..=EVEN).contains(&bytes.len()) && Instructions::Avx512.present() && is_x86_feature_detected!("sse4.2") {
-        // SAFETY: the machine has these (and so F, which BW needs), and there are 4 to 64 bytes.
+    if (REGISTER..=EVEN).contains(&bytes.len()) && Instructions::Avx2.present() && is_x86_feature_detected!("sse4.2") {
+        // SAFETY: the machine has these, and there are 16 to 64 bytes.
         return unsafe { even(bytes) };
     }
     #[cfg(target_arch = "x86_64")]
@@ -27,28 +27,64 @@ pub(super) fn crc32c(bytes: &[u8]) -> u32 {
     crc32c::crc32c(bytes)
 }
 
-/// Eight steps for whatever length, the bytes behind zeros, as [`short`] explains.
+/// Bytes of a register.
+#[cfg(target_arch = "x86_64")]
+const REGISTER: usize = 16;
+
+/// A register with which a sum begins, by how many zero bytes come before the message: all ones are left behind those.
+#[cfg(target_arch = "x86_64")]
+static BEFORE_ZEROS: [u32; EVEN - REGISTER + 1] = {
+    let mut out = [u32::MAX; EVEN - REGISTER + 1];
+    let mut zeros = 1;
+    while zeros < out.len() {
+        let (mut sum, mut bit) = (out[zeros - 1], 0);
+        while bit < 8 {
+            // A step back: the top bit shows whether the polynomial was added.
+            sum = if sum >> 31 == 1 { (sum ^ 0x82f6_3b78) << 1 | 1 } else { sum << 1 };
+            bit += 1;
+        }
+        out[zeros] = sum;
+        zeros += 1;
+    }
+    out
+};
+
+/// From place `16 - k` on: a register's bytes moved `k` places to the back (`pshufb`), zeros before them.
+#[cfg(target_arch = "x86_64")]
+static TO_BACK: [u8; 2 * REGISTER] = {
+    let mut out = [0x80; 2 * REGISTER];
+    let mut k = 0;
+    while k < REGISTER {
+        out[REGISTER + k] = k as u8;
+        k += 1;
+    }
+    out
+};
+
+/// Eight steps for whatever length: the message behind so many zeros that they are [`EVEN`] bytes together.
 ///
 /// # Safety
 ///
-/// There must be 4 to [`EVEN`] bytes.
+/// There must be 16 to [`EVEN`] bytes.
 #[cfg(target_arch = "x86_64")]
 #[inline]
-#[target_feature(enable = "avx512f,avx512bw,sse4.2")]
+#[target_feature(enable = "ssse3,sse4.1,sse4.2")]
 pub(super) unsafe fn even(bytes: &[u8]) -> u32 {
-    use std::arch::x86_64::{
-        _mm_crc32_u64, _mm512_maskz_loadu_epi8, _mm512_maskz_set1_epi8, _mm512_storeu_si512, _mm512_xor_si512,
-    };
-    let there = u64::MAX << (EVEN - bytes.len());
-    let turned = there & !(there << 4);
-    let mut words = [0_u64; EVEN / 8];
-    // SAFETY: the lanes that are read are the bytes, which end where the 64 end; `words` has 64.
-    unsafe {
-        let lanes = _mm512_maskz_loadu_epi8(there, bytes.as_ptr_range().end.wrapping_sub(EVEN).cast());
-        let lanes = _mm512_xor_si512(lanes, _mm512_maskz_set1_epi8(turned, -1));
-        _mm512_storeu_si512(words.as_mut_ptr().cast(), lanes);
+    use std::arch::x86_64::{_mm_crc32_u64, _mm_cvtsi128_si64, _mm_extract_epi64, _mm_loadu_si128, _mm_shuffle_epi8};
+    let zeros = EVEN - bytes.len();
+    let mut sum = u64::from(BEFORE_ZEROS[zeros]);
+    for at in (0..EVEN).step_by(REGISTER) {
+        let (from, moved) = (at.saturating_sub(zeros), zeros.saturating_sub(at).min(REGISTER));
+        // SAFETY: `from` is at most 16 before the end of the bytes, as `at` is before that of the 64, and 0 at least; the table has
+        // 16 bytes from place 0 to 16 on.
+        let lanes = unsafe {
+            let lanes = _mm_loadu_si128(bytes.as_ptr().add(from).cast());
+            _mm_shuffle_epi8(lanes, _mm_loadu_si128(TO_BACK.as_ptr().add(REGISTER - moved).cast()))
+        };
+        sum = _mm_crc32_u64(sum, _mm_cvtsi128_si64(lanes) as u64);
+        sum = _mm_crc32_u64(sum, _mm_extract_epi64::<1>(lanes) as u64);
     }
-    !(words.iter().fold(0, |sum, &word| _mm_crc32_u64(sum, word)) as u32)
+    !(sum as u32)
 }
 
 /// One strand of eight bytes at a time. Zeros before a message do not change a sum that begins at 0, and beginning at all ones

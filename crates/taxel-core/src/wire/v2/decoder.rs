@@ -256,7 +256,7 @@ impl Decoder {
         out: &mut impl Table,
     ) -> Taken {
         #[cfg(target_arch = "x86_64")]
-        if self.instructions == Instructions::Avx512Bytes
+        if self.instructions >= Instructions::Avx2
             && let (Some(first), Some(board), Some(session)) =
                 (datagrams.clone().next(), self.board, self.sessions.last_mut())
             && let Self { held, counts, latest, .. } = self

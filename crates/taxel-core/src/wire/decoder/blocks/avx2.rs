@@ -1,8 +1,9 @@
-//! Blocks of 16 words with AVX2: all changes, or changes each followed by its intensity.
+//! Blocks of 16 words with AVX2: changes alone, or changes and intensities in any order.
 
 use std::arch::x86_64::*;
 
 use super::carried::{Carried, indices, value};
+use crate::vectors::TO_FRONT;
 use crate::wire::decoder::filling::Filling;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
@@ -37,12 +38,70 @@ static HEAD: [[u8; 16]; 3] = fetch([Some(0), None]);
 /// Bits of a byte mask that belong to the first bytes of 16-bit lanes.
 const FIRSTS: u32 = 0x5555_5555;
 
+/// The intensities of a block in which they alternate with changes.
+const ALTERNATE: u32 = FIRSTS & 0xcccc_cccc;
+
+/// The paired intensities of a block that begins with one, and in which they alternate with changes.
+const SPLIT_PAIRS: u32 = 0x5555;
+
+/// The 16-bit lanes of a block that were chosen, at the front of each half; how many each half has.
+struct Chosen {
+    early: usize,
+    late: usize,
+    shuffle: __m256i,
+}
+
+impl Chosen {
+    /// The lanes of a mask of 16 bits.
+    #[inline]
+    #[target_feature(enable = "avx2,popcnt")]
+    fn new(lanes: u32) -> Self {
+        let halves = [lanes & 0xff, lanes >> 8 & 0xff];
+        // SAFETY: each entry of the table is 16 bytes long.
+        let [early, late] = halves.map(|half| unsafe { _mm_loadu_si128(TO_FRONT[half as usize].as_ptr().cast()) });
+        let [first, second] = halves.map(|half| half.count_ones() as usize);
+        Self { early: first, late: second, shuffle: _mm256_set_m128i(late, early) }
+    }
+
+    /// Its lanes of a vector.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn of(&self, lanes: __m256i) -> [__m128i; 2] {
+        let lanes = _mm256_shuffle_epi8(lanes, self.shuffle);
+        [_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes)]
+    }
+}
+
+/// The 16-bit lanes one up; the last lane of `before` comes first.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn one_up(before: __m256i, lanes: __m256i) -> __m256i {
+    _mm256_alignr_epi8::<14>(lanes, _mm256_permute2x128_si256::<0x21>(before, lanes))
+}
+
+/// A bit for each 16-bit lane, all of which are 0 or all ones.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn mask(lanes: __m256i) -> u32 {
+    let bytes = _mm_packs_epi16(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes));
+    _mm_movemask_epi8(bytes) as u32
+}
+
+/// Whether lanes of 32 bits are two words of one taxel each.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn paired_lanes(place: __m256i) -> bool {
+    let other = _mm256_or_si256(_mm256_slli_epi32::<16>(place), _mm256_srli_epi32::<16>(place));
+    _mm256_movemask_epi8(_mm256_cmpeq_epi16(place, other)) == -1
+}
+
 /// See [`super::blocks`].
 ///
 /// # Safety
 ///
-/// The machine must have AVX2, and each column of `filling.room` at least `filling.rows + bytes.len() / 5` entries.
-#[target_feature(enable = "avx2")]
+/// The machine must have AVX2 and POPCNT, and each column of `filling.room` at least `filling.rows + bytes.len() / 5`
+/// entries.
+#[target_feature(enable = "avx2,popcnt")]
 pub(super) unsafe fn blocks(
     bytes: &[u8],
     columns: u16,
@@ -59,6 +118,14 @@ pub(super) unsafe fn blocks(
     let (last_column, last_row) =
         (_mm256_set1_epi16(columns.min(64) as i16 - 1), _mm256_set1_epi16(rows.min(64) as i16 - 1));
     let low_bits = |v: __m256i| _mm256_movemask_epi8(v) as u32;
+    let (zero, one) = (_mm256_setzero_si256(), _mm256_set1_epi16(1));
+    let last_lane = _mm256_set1_epi16(i16::from_le_bytes([14, 15]));
+
+    // Of the word before a block: its taxel, and whether it is a change, whose intensity may come first in the block. The
+    // intensity of such a change is written with the next block, or behind the last.
+    let (x, y) = if filling.open { filling.last_taxel() } else { (0, 0) };
+    let mut place_before = _mm256_set1_epi16((x | y << 8) as i16);
+    let mut open = u32::from(filling.open);
 
     let mut at = 0;
     while at + BYTES <= bytes.len() {
@@ -77,7 +144,6 @@ pub(super) unsafe fn blocks(
 
         let in_place = low_bits(head) == FIRSTS && low_bits(_mm256_or_si256(low, place)) == 0;
         let markers = low_bits(_mm256_slli_epi16::<4>(head)) & FIRSTS;
-        let intensities = low_bits(_mm256_slli_epi16::<2>(head)) & FIRSTS;
         let place = _mm256_and_si256(place, _mm256_set1_epi16(0x3f3f));
         let x = _mm256_and_si256(place, _mm256_set1_epi16(0x3f));
         let y = _mm256_srli_epi16::<8>(place);
@@ -86,29 +152,29 @@ pub(super) unsafe fn blocks(
             break;
         }
         let values = _mm256_or_si256(_mm256_maddubs_epi16(sevens, low), _mm256_slli_epi16::<14>(head));
+        let intensities = low_bits(_mm256_slli_epi16::<2>(head)) & FIRSTS;
+        let polarity = _mm256_and_si256(_mm256_srli_epi16::<6>(head), one);
         let base = state.latest as u16;
-        let bases = _mm256_set1_epi16(base as i16);
+        let ahead = _mm256_sub_epi16(values, _mm256_set1_epi16(base as i16));
         let start = _mm256_set1_epi64x(state.latest * STAMP_US);
         let time = |ahead: __m128i| {
             let ahead = _mm256_cvtepu16_epi64(ahead);
             _mm256_add_epi64(start, _mm256_mul_epu32(ahead, _mm256_set1_epi64x(STAMP_US)))
         };
-        let polarity = _mm256_and_si256(_mm256_srli_epi16::<6>(head), _mm256_set1_epi16(1));
         let first = filling.rows;
 
+        let farthest;
         if intensities == 0 {
             // Stamps ahead of the latest time that do not fall are each ahead of the one before.
-            let ahead = _mm256_sub_epi16(values, bases);
-            let carried = _mm256_permute2x128_si256::<0x08>(ahead, ahead);
-            let before = _mm256_alignr_epi8::<14>(ahead, carried);
+            let before = one_up(zero, ahead);
             let rising = low_bits(_mm256_cmpeq_epi16(_mm256_max_epu16(ahead, before), ahead)) == u32::MAX;
-            let farthest = value(bytes, at + WORD_BYTES * (WORDS - 1)).wrapping_sub(base);
+            farthest = value(bytes, at + WORD_BYTES * (WORDS - 1)).wrapping_sub(base);
             if !rising || farthest > state.farthest() {
                 break;
             }
             let p = _mm_packus_epi16(_mm256_castsi256_si128(polarity), _mm256_extracti128_si256::<1>(polarity));
             let (early, late) = (_mm256_castsi256_si128(ahead), _mm256_extracti128_si256::<1>(ahead));
-            // SAFETY: at least 16 words are left, so 16 rows fit after `first`.
+            // SAFETY: at least 16 words are left, so 16 rows fit after `first`; a row before it is `open`.
             unsafe {
                 let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
                 _mm256_storeu_si256(t.cast(), time(early));
@@ -119,33 +185,29 @@ pub(super) unsafe fn blocks(
                 _mm256_storeu_si256(filling.room.y.as_mut_ptr().add(first).cast(), y);
                 _mm_storeu_si128(filling.room.p.as_mut_ptr().add(first).cast(), p);
                 if filling.paired {
-                    _mm256_storeu_si256(filling.room.ticks.as_mut_ptr().add(first).cast(), _mm256_setzero_si256());
-                    _mm_storeu_si128(filling.room.present.as_mut_ptr().add(first).cast(), _mm_setzero_si128());
+                    let row = first - open as usize;
+                    _mm256_storeu_si256(filling.room.ticks.as_mut_ptr().add(row).cast(), zero);
+                    _mm_storeu_si128(filling.room.present.as_mut_ptr().add(row).cast(), _mm_setzero_si128());
                 }
             }
             filling.rows = first + WORDS;
-            filling.open = true;
-            state.latest += i64::from(farthest);
-        } else {
-            // Lanes of 32 bits are a change and its intensity, where they alternate and name the same taxel.
-            let alternate = intensities == 0x4444_4444;
-            let other = _mm256_or_si256(_mm256_slli_epi32::<16>(place), _mm256_srli_epi32::<16>(place));
-            let same = low_bits(_mm256_cmpeq_epi16(place, other)) == u32::MAX;
-            if !alternate || !same {
-                break;
-            }
+            open = 1;
+        } else if intensities == ALTERNATE && paired_lanes(place) {
             let changes = |lanes: __m256i| {
                 let low = _mm256_and_si256(lanes, _mm256_set1_epi32(0xffff));
                 _mm_packus_epi32(_mm256_castsi256_si128(low), _mm256_extracti128_si256::<1>(low))
             };
-            let ahead = changes(_mm256_sub_epi16(values, bases));
+            let ahead = changes(ahead);
             let before = _mm_slli_si128::<2>(ahead);
             let rising = _mm_movemask_epi8(_mm_cmpeq_epi16(_mm_max_epu16(ahead, before), ahead)) == 0xffff;
-            let farthest = value(bytes, at + WORD_BYTES * (WORDS - 2)).wrapping_sub(base);
+            farthest = value(bytes, at + WORD_BYTES * (WORDS - 2)).wrapping_sub(base);
             if !rising || farthest > state.farthest() {
                 break;
             }
             filling.begin_pairs();
+            if open == 1 {
+                filling.without_intensity();
+            }
             let p = changes(polarity);
             // SAFETY: at least 16 words are left, so 8 rows fit after `first`.
             unsafe {
@@ -160,11 +222,85 @@ pub(super) unsafe fn blocks(
                 _mm_storel_epi64(filling.room.present.as_mut_ptr().add(first).cast(), _mm_set1_epi8(1));
             }
             filling.rows = first + WORDS / 2;
-            filling.open = false;
+            open = 0;
             state.intensities += (WORDS / 2) as u64;
-            state.latest += i64::from(farthest);
+        } else {
+            let intensity = _mm256_srai_epi16::<15>(_mm256_slli_epi16::<10>(head));
+            let change = _mm256_cmpeq_epi16(intensity, zero);
+            let changes = mask(change);
+            // Stamps ahead of the latest time that do not fall are each the greatest so far.
+            let ahead = _mm256_and_si256(change, ahead);
+            let mut greatest = _mm256_max_epu16(ahead, _mm256_bslli_epi128::<2>(ahead));
+            greatest = _mm256_max_epu16(greatest, _mm256_bslli_epi128::<4>(greatest));
+            greatest = _mm256_max_epu16(greatest, _mm256_bslli_epi128::<8>(greatest));
+            let half = _mm256_permute2x128_si256::<0x08>(greatest, greatest);
+            greatest = _mm256_max_epu16(greatest, _mm256_shuffle_epi8(half, last_lane));
+            let rising = _mm256_or_si256(_mm256_cmpeq_epi16(greatest, ahead), intensity);
+            farthest = _mm256_extract_epi16::<15>(greatest) as u16;
+            if low_bits(rising) != u32::MAX || farthest > state.farthest() {
+                break;
+            }
+            // An intensity is paired where the word before it is a change of the same taxel.
+            let same = _mm256_cmpeq_epi16(place, one_up(place_before, place));
+            let behind_change = one_up(_mm256_set1_epi16(-(open as i16)), change);
+            let pair = _mm256_and_si256(_mm256_and_si256(intensity, behind_change), same);
+            let pairs = mask(pair);
+            if pairs == SPLIT_PAIRS {
+                // One word later they are whole pairs, which go faster: `blocks` goes on behind an odd number.
+                break;
+            }
+            let found = pairs.count_ones();
+            if found != 0 && !filling.paired {
+                filling.begin_pairs();
+            }
+            let rows = Chosen::new(changes);
+            let ([t_early, t_late], [early, late]) = (rows.of(ahead), rows.of(place));
+            let [p_early, p_late] = rows.of(polarity);
+            let (columns, row_bits) = (_mm_set1_epi16(0x3f), |place| _mm_srli_epi16::<8>(place));
+            // SAFETY: at least 16 words are left, so 16 rows fit after `first`: 8 behind its up to 8 early ones.
+            unsafe {
+                let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
+                let x = filling.room.x.as_mut_ptr().add(first);
+                let y = filling.room.y.as_mut_ptr().add(first);
+                let p = filling.room.p.as_mut_ptr().add(first);
+                _mm256_storeu_si256(t.cast(), time(t_early));
+                _mm256_storeu_si256(t.add(4).cast(), time(_mm_srli_si128::<8>(t_early)));
+                _mm256_storeu_si256(t.add(rows.early).cast(), time(t_late));
+                _mm256_storeu_si256(t.add(rows.early + 4).cast(), time(_mm_srli_si128::<8>(t_late)));
+                _mm_storeu_si128(x.cast(), _mm_and_si128(early, columns));
+                _mm_storeu_si128(x.add(rows.early).cast(), _mm_and_si128(late, columns));
+                _mm_storeu_si128(y.cast(), row_bits(early));
+                _mm_storeu_si128(y.add(rows.early).cast(), row_bits(late));
+                _mm_storel_epi64(p.cast(), _mm_packus_epi16(p_early, p_early));
+                _mm_storel_epi64(p.add(rows.early).cast(), _mm_packus_epi16(p_late, p_late));
+            }
+            if filling.paired {
+                // The words behind changes, from the change before the block on: its intensity, or none.
+                let behind = Chosen::new(changes << 1 | open);
+                let [ticks_early, ticks_late] = behind.of(_mm256_and_si256(values, pair));
+                let [there_early, there_late] = behind.of(_mm256_srli_epi16::<15>(pair));
+                // SAFETY: as above; an open change has a row before `first`.
+                unsafe {
+                    let ticks = filling.room.ticks.as_mut_ptr().add(first - open as usize);
+                    let present = filling.room.present.as_mut_ptr().add(first - open as usize);
+                    _mm_storeu_si128(ticks.cast(), ticks_early);
+                    _mm_storeu_si128(ticks.add(behind.early).cast(), ticks_late);
+                    _mm_storel_epi64(present.cast(), _mm_packus_epi16(there_early, there_early));
+                    _mm_storel_epi64(present.add(behind.early).cast(), _mm_packus_epi16(there_late, there_late));
+                }
+            }
+            filling.rows = first + rows.early + rows.late;
+            open = changes >> 15;
+            state.intensities += u64::from(found);
+            state.unpaired += u64::from(WORDS as u32 - changes.count_ones() - found);
         }
+        place_before = place;
+        state.latest += i64::from(farthest);
         at += BYTES;
+    }
+    filling.open = open == 1;
+    if filling.open && filling.paired {
+        filling.without_intensity();
     }
     at
 }

@@ -1,4 +1,4 @@
-//! Plain datagrams of a few words, as a scene's are: one, or many in one go, with AVX-512.
+//! Plain datagrams of a few words, as a scene's are: one, or many in one go, with AVX2.
 //!
 //! Plain is a datagram ahead in the latest session, with changes as they are (no differences, no time of their own), no
 //! earlier than what is held and all on the array. Anything else ends the run, and the decoder takes it by itself, which alone
@@ -68,7 +68,7 @@ impl<'a> Run<'a> {
     ///
     /// The machine must have the features below, and `VALUE` be that which [`Self::new`] gave.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,bmi2,popcnt,sse4.2")]
+    #[target_feature(enable = "avx2,bmi1,popcnt,sse4.2")]
     pub(super) unsafe fn take<'d, const VALUE: u32>(
         &mut self,
         datagrams: impl Iterator<Item = &'d [u8]>,
@@ -96,7 +96,9 @@ impl<'a> Run<'a> {
                 break;
             }
             // SAFETY: the machine has the features, `new` has seen to the array, and so many rows fit behind `row`, as was seen above.
-            let Some(rows) = (unsafe { self.words::<VALUE>(body, start as u16, t, room, row, paired) }) else { break };
+            let Some(rows) = (unsafe { self.words::<VALUE>(datagram, start as u16, t, room, row, paired) }) else {
+                break;
+            };
             self.session.note(number);
             self.session.latest = self.session.latest.max(header.base);
             *self.latest = (*self.latest).max(t + i64::from(header.span));
@@ -111,17 +113,17 @@ impl<'a> Run<'a> {
         row - first
     }
 
-    /// Takes a body's whole words, which begin at a position and are of one time; gives how many rows they are. None where one
+    /// Takes a datagram's whole words, which begin at a position and are of one time; gives how many rows they are. None where one
     /// is not plain: of those before it, eight by eight, some may be held by then, as the decoder will hold them again.
     ///
     /// # Safety
     ///
     /// As [`Self::take`]'s; [`ROWS`] must fit behind `first`.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,bmi2,popcnt,sse4.2")]
+    #[target_feature(enable = "avx2,bmi1,popcnt,sse4.2")]
     unsafe fn words<const VALUE: u32>(
         &mut self,
-        body: &[u8],
+        datagram: &[u8],
         mut passed: u16,
         t: i64,
         room: &mut Room<'_>,
@@ -129,18 +131,20 @@ impl<'a> Run<'a> {
         paired: bool,
     ) -> Option<usize> {
         let bytes = if VALUE == 16 { 4 } else { 2 };
-        let mut row = first;
-        for words in body.chunks(bytes * EIGHT) {
-            // SAFETY: so many words lie there; with the caller's promises the events lie on the array, and so in `held`, and 8 rows
-            // fit behind those so far.
+        let (mut row, mut at, end) = (first, HEADER_BYTES, datagram.len() - TRAILER_BYTES);
+        while at < end {
+            let count = ((end - at) / bytes).min(EIGHT);
+            // SAFETY: so many words lie there, behind the header; with the caller's promises the events lie on the array, and so in
+            // `held`, and 8 rows fit behind those so far.
             unsafe {
-                let eight = Eight::read::<VALUE>(words.as_ptr(), words.len() / bytes, passed, self.held)?;
+                let eight = Eight::read::<VALUE>(datagram, at, count, passed, self.held)?;
                 eight.write::<VALUE>(t, room, row, paired);
                 if VALUE > 0 && eight.n > 0 {
                     eight.hold(t, self.held);
                 }
                 (row, passed) = (row + eight.n, eight.passed);
             }
+            at += bytes * count;
         }
         Some(row - first)
     }

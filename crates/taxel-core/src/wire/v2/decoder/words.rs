@@ -5,17 +5,17 @@
 //! the same rows, held values and counts.
 
 #[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
 mod avx512;
 mod body;
 #[cfg(target_arch = "x86_64")]
 mod eight;
 mod single;
 
-#[cfg(target_arch = "x86_64")]
-pub(super) use avx512::FULL;
 pub(super) use body::{Body, Meaning};
 #[cfg(target_arch = "x86_64")]
-pub(super) use eight::{EIGHT, Eight};
+pub(super) use eight::{EIGHT, Eight, FULL};
 
 use super::held::Held;
 use crate::vectors::Instructions;
@@ -27,6 +27,8 @@ const MARGIN: usize = 32;
 
 /// Words that are taken one by one before blocks are tried again.
 const STRETCH: usize = 32;
+/// As [`STRETCH`], of AVX2, whose blocks are shorter.
+const SHORT_STRETCH: usize = 8;
 
 /// Bytes of the shortest word.
 const WORD_BYTES: usize = 2;
@@ -60,7 +62,11 @@ pub(super) fn decode(
         if body.left() == 0 {
             break;
         }
-        let most = if set == Instructions::Avx512Bytes { STRETCH } else { usize::MAX };
+        let most = match set {
+            Instructions::Plain => usize::MAX,
+            Instructions::Avx2 | Instructions::Avx512 => SHORT_STRETCH,
+            Instructions::Avx512Bytes => STRETCH,
+        };
         match body.layout.value {
             0 => single::words::<2, 15, 0>(body, held, room, paired, counts, most),
             8 => single::words::<2, 7, 8>(body, held, room, paired, counts, most),
@@ -75,19 +81,22 @@ pub(super) fn decode(
 #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
 fn blocks(body: &mut Body<'_>, set: Instructions, held: &mut Held, room: &mut Room<'_>, paired: bool) {
     #[cfg(target_arch = "x86_64")]
-    if set == Instructions::Avx512Bytes
+    if set >= Instructions::Avx2
         && body.meaning == Meaning::Changes
         && body.stride == held.stride
-        && held.values.len() <= 1 << 16
+        && held.values.len() < usize::from(FULL)
     {
         // SAFETY: the machine has this set, as `Decoder::instructions` and `best` see to. `decode` has asserted that the room
         // holds, behind the rows so far, a row for each word and 32 more, and no word gives more than one row. The last two
         // conditions are the block's own.
         unsafe {
-            match body.layout.value {
-                0 => avx512::blocks::<0>(body, held, room, paired),
-                8 => avx512::blocks::<8>(body, held, room, paired),
-                _ => avx512::blocks::<16>(body, held, room, paired),
+            match (set, body.layout.value) {
+                (Instructions::Avx512Bytes, 0) => avx512::blocks::<0>(body, held, room, paired),
+                (Instructions::Avx512Bytes, 8) => avx512::blocks::<8>(body, held, room, paired),
+                (Instructions::Avx512Bytes, _) => avx512::blocks::<16>(body, held, room, paired),
+                (_, 0) => avx2::blocks::<0>(body, held, room, paired),
+                (_, 8) => avx2::blocks::<8>(body, held, room, paired),
+                (_, _) => avx2::blocks::<16>(body, held, room, paired),
             }
         }
     }

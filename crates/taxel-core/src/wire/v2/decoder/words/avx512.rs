@@ -3,14 +3,11 @@
 use std::arch::x86_64::*;
 
 use super::body::Body;
-use super::eight::{EIGHT, hold_eight};
+use super::eight::{EIGHT, FULL, hold_eight};
 use crate::wire::columns::Room;
 use crate::wire::v2::decoder::held::Held;
 
 const WORDS: usize = 32;
-
-/// Positions are counted from 1 in 16 bits, and sums stop here: what comes to it is left to the one by one.
-pub(crate) const FULL: u16 = u16::MAX;
 
 /// For each 16-bit lane the last lane of the 128 bits before it, and the 16th lane.
 static LAST_BEFORE: [u16; WORDS] = lanes(false);

@@ -1,13 +1,43 @@
-//! Up to eight words at once, in registers of 128 bits, with AVX-512 (F, BW, VL, VBMI2) and BMI2: most datagrams of a scene
-//! have no more.
+//! Up to eight words at once, in registers of 128 bits, with AVX2: most datagrams of a scene have no more.
 
 use std::arch::x86_64::*;
 
+use crate::vectors::TO_FRONT;
 use crate::wire::columns::Room;
+use crate::wire::v2::HEADER_BYTES;
 use crate::wire::v2::decoder::held::Held;
 
 /// Words.
 pub(crate) const EIGHT: usize = 8;
+
+/// Bytes of a register, which the header before a body has too.
+const REGISTER: usize = 16;
+const _: () = assert!(HEADER_BYTES >= REGISTER);
+
+/// Positions are counted from 1 in 16 bits, and sums stop here: what comes to it is left to the one by one.
+pub(crate) const FULL: u16 = u16::MAX;
+
+/// From place `k` on: the first `16 - k` of a register's bytes moved `k` places to the front (`pshufb`), zeros behind them.
+static TO_START: [u8; 2 * REGISTER] = {
+    let mut out = [0x80; 2 * REGISTER];
+    let mut k = 0;
+    while k < REGISTER {
+        out[k] = k as u8;
+        k += 1;
+    }
+    out
+};
+
+/// From place `8 - k` on: `k` lanes of ones, and zeros behind them.
+static FIRST_LANES: [u32; 2 * EIGHT] = {
+    let mut out = [0; 2 * EIGHT];
+    let mut k = 0;
+    while k < EIGHT {
+        out[k] = u32::MAX;
+        k += 1;
+    }
+    out
+};
 
 /// The events among up to eight plain words, the first ones in the first lanes.
 #[derive(Clone, Copy)]
@@ -19,37 +49,75 @@ pub(crate) struct Eight {
     x: __m128i,
     y: __m128i,
     ticks: __m128i,
-    p: u32,
+    p: __m128i,
 }
 
 impl Eight {
-    /// Reads `count` words that begin at a place, the first eight of them, behind so many positions; none where one is of time, or an
-    /// event lies outside the array.
+    /// Reads the words that end a number of bytes into a datagram, `count` of them but at most the first eight, behind so many
+    /// positions; none where one is of time, or an event lies outside the array.
     ///
     /// # Safety
     ///
-    /// The machine must have the features below. That many words, of 4 bytes each where `VALUE` is 16 and of 2 else, must lie
-    /// there. The array must have fewer than 65 535 positions, at which sums stop.
+    /// The machine must have the features below. So many words, of 4 bytes each where `VALUE` is 16 and of 2 else, must lie at
+    /// `at`, with a header's bytes before them. The array must have fewer than 65 535 positions, at which sums stop.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,bmi2,popcnt")]
+    #[target_feature(enable = "avx2,bmi1,popcnt")]
     pub(crate) unsafe fn read<const VALUE: u32>(
-        words: *const u8,
+        datagram: &[u8],
+        at: usize,
         count: usize,
         passed: u16,
         held: &Held,
     ) -> Option<Self> {
-        let lanes = _bzhi_u32(0xff, count.min(EIGHT) as u32) as __mmask8;
-        let one = _mm_set1_epi16(1);
-        // SAFETY: only the lanes of those words are read.
-        let (head, value) = unsafe {
+        let count = count.min(EIGHT);
+        // SAFETY: of words of 4 bytes only the lanes of those words are read, by a mask of eight of 16 entries from 0 to 8 on. Of
+        // words of 2 bytes, the 16 bytes that end with the last word are read, of which the header has those before the first;
+        // the shuffle has 16 bytes from place 0 to 16 on.
+        unsafe {
+            let words = datagram.as_ptr().add(at);
+            let lanes = _mm_cmpgt_epi16(_mm_set1_epi16(count as i16), _mm_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7));
             if VALUE == 16 {
-                let both = _mm256_maskz_loadu_epi32(lanes, words.cast());
-                (_mm256_cvtepi32_epi16(_mm256_srli_epi32::<16>(both)), _mm256_cvtepi32_epi16(both))
-            } else {
-                (_mm_maskz_loadu_epi16(lanes, words.cast()), _mm_setzero_si128())
+                let mask = _mm256_loadu_si256(FIRST_LANES.as_ptr().add(EIGHT - count).cast());
+                return Self::of_large(_mm256_maskload_epi32(words.cast(), mask), lanes, passed, held);
             }
-        };
-        let polarity = _mm_movepi16_mask(head);
+            let ending = _mm_loadu_si128(words.add(2 * count).sub(REGISTER).cast());
+            let to_start = _mm_loadu_si128(TO_START.as_ptr().add(REGISTER - 2 * count).cast());
+            Self::of::<VALUE>(_mm_shuffle_epi8(ending, to_start), _mm_setzero_si128(), lanes, passed, held)
+        }
+    }
+
+    /// As [`Self::read`], of eight words wherever they lie.
+    ///
+    /// # Safety
+    ///
+    /// As [`Self::read`]'s; eight words must lie at `words`.
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,popcnt")]
+    pub(super) unsafe fn whole<const VALUE: u32>(words: *const u8, passed: u16, held: &Held) -> Option<Self> {
+        let lanes = _mm_set1_epi16(-1);
+        // SAFETY: eight words of 4 or 2 bytes.
+        unsafe {
+            if VALUE == 16 {
+                return Self::of_large(_mm256_loadu_si256(words.cast()), lanes, passed, held);
+            }
+            Self::of::<VALUE>(_mm_loadu_si128(words.cast()), _mm_setzero_si128(), lanes, passed, held)
+        }
+    }
+
+    /// Of words of 4 bytes, in the first `lanes`; zeros in the others.
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,popcnt")]
+    fn of_large(words: __m256i, lanes: __m128i, passed: u16, held: &Held) -> Option<Self> {
+        let halves = |lanes| _mm_packus_epi32(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes));
+        let value = _mm256_blend_epi16::<0xaa>(words, _mm256_setzero_si256());
+        Self::of::<16>(halves(_mm256_srli_epi32::<16>(words)), halves(value), lanes, passed, held)
+    }
+
+    /// Of the words' halves with polarity and skip, and of values where those have none; zeros outside `lanes`.
+    #[inline]
+    #[target_feature(enable = "avx2,bmi1,popcnt")]
+    fn of<const VALUE: u32>(head: __m128i, value: __m128i, lanes: __m128i, passed: u16, held: &Held) -> Option<Self> {
+        let (zero, one) = (_mm_setzero_si128(), _mm_set1_epi16(1));
         let (control, skip, value) = if VALUE == 8 {
             let seven = _mm_set1_epi16(0x7f);
             (seven, _mm_and_si128(_mm_srli_epi16::<8>(head), seven), _mm_and_si128(head, _mm_set1_epi16(0xff)))
@@ -57,35 +125,39 @@ impl Eight {
             let fifteen = _mm_set1_epi16(0x7fff);
             (fifteen, _mm_and_si128(head, fifteen), value)
         };
-        let advances = _mm_mask_cmpeq_epi16_mask(lanes, skip, control);
-        if advances & polarity != 0 {
+        let advances = _mm_cmpeq_epi16(skip, control);
+        if _mm_testz_si128(advances, _mm_and_si128(head, _mm_set1_epi16(i16::MIN))) == 0 {
             return None;
         }
         // Without a branch: in a scene no processor predicts which datagram has an advance.
         let advance = if VALUE == 8 {
             _mm_slli_epi16::<6>(_mm_add_epi16(value, one))
         } else {
-            let large = _mm_cmpgt_epu16_mask(value, _mm_set1_epi16(2));
-            _mm_mask_mov_epi16(_mm_slli_epi16::<14>(_mm_add_epi16(value, one)), large, _mm_set1_epi16(-1))
+            let small = _mm_cmpeq_epi16(_mm_subs_epu16(value, _mm_set1_epi16(2)), zero);
+            _mm_blendv_epi8(_mm_set1_epi16(-1), _mm_slli_epi16::<14>(_mm_add_epi16(value, one)), small)
         };
         // A sum that is too large stays too large: it is the position of none of these arrays.
-        let mut sums = _mm_mask_mov_epi16(_mm_maskz_add_epi16(lanes, skip, one), advances, advance);
+        let steps = _mm_blendv_epi8(_mm_add_epi16(skip, one), advance, advances);
+        let mut sums = _mm_and_si128(steps, lanes);
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<2>(sums));
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<4>(sums));
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<8>(sums));
         sums = _mm_adds_epu16(sums, _mm_set1_epi16(passed as i16));
         // No step is below 0, and lanes without a word add none: the last one has the sum.
         let passed = _mm_extract_epi16::<7>(sums) as u16;
-        let events = lanes & !advances;
-        let position = _mm_maskz_compress_epi16(events, _mm_sub_epi16(sums, one));
-        let ticks = _mm_maskz_compress_epi16(events, value);
-        let p = _pext_u32(u32::from(polarity), u32::from(events));
+        let events = _mm_movemask_epi8(_mm_packs_epi16(_mm_andnot_si128(advances, lanes), zero)) as usize;
+        // SAFETY: the mask has eight bits, and each entry of the table 16 bytes.
+        let front = unsafe { _mm_loadu_si128(TO_FRONT.as_ptr().add(events & 0xff).cast()) };
+        let position = _mm_shuffle_epi8(_mm_sub_epi16(sums, one), front);
+        let ticks = _mm_shuffle_epi8(value, front);
+        let p = _mm_shuffle_epi8(_mm_srli_epi16::<15>(head), front);
         let x = _mm_srl_epi16(position, _mm_cvtsi32_si128(i32::from(held.stride)));
         let y = _mm_and_si128(position, _mm_set1_epi16(((1_u32 << held.stride) - 1) as i16));
-        // Lanes without an event are at 0, which is on any array.
-        let outside = _mm_cmpge_epu16_mask(x, _mm_set1_epi16(held.columns as i16))
-            | _mm_cmpge_epu16_mask(y, _mm_set1_epi16(held.rows as i16));
-        (outside == 0).then_some(Self { n: events.count_ones() as usize, passed, position, x, y, ticks, p })
+        // Lanes without an event repeat the last one, and are at 0 where there is none.
+        let reaches = |at, end: u16| _mm_cmpeq_epi16(_mm_max_epu16(at, _mm_set1_epi16(end as i16)), at);
+        let outside = _mm_or_si128(reaches(x, held.columns), reaches(y, held.rows));
+        let n = events.count_ones() as usize;
+        (_mm_testz_si128(outside, outside) == 1).then_some(Self { n, passed, position, x, y, ticks, p })
     }
 
     /// Writes the events from a row on.
@@ -95,14 +167,17 @@ impl Eight {
     /// The machine must have the features below. 8 rows must fit behind `first`, with intensities where they are `paired`: what lies
     /// beyond the events is written again by later rows, or never read.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512bw,avx512vl")]
+    #[target_feature(enable = "avx2")]
     pub(crate) unsafe fn write<const VALUE: u32>(&self, t: i64, room: &mut Room<'_>, first: usize, paired: bool) {
+        let times = _mm256_set1_epi64x(t);
         // SAFETY: the caller's promise; a bool is a byte of 0 or 1.
         unsafe {
-            _mm512_storeu_si512(room.t.as_mut_ptr().add(first).cast(), _mm512_set1_epi64(t));
+            let to = room.t.as_mut_ptr().add(first);
+            _mm256_storeu_si256(to.cast(), times);
+            _mm256_storeu_si256(to.add(4).cast(), times);
             _mm_storeu_si128(room.x.as_mut_ptr().add(first).cast(), self.x);
             _mm_storeu_si128(room.y.as_mut_ptr().add(first).cast(), self.y);
-            _mm_storel_epi64(room.p.as_mut_ptr().add(first).cast(), _mm_maskz_set1_epi8(self.p as __mmask16, 1));
+            _mm_storel_epi64(room.p.as_mut_ptr().add(first).cast(), _mm_packus_epi16(self.p, self.p));
             if paired {
                 _mm_storeu_si128(room.ticks.as_mut_ptr().add(first).cast(), self.ticks);
                 let present = _mm_set1_epi8(i8::from(VALUE > 0));
@@ -117,16 +192,36 @@ impl Eight {
     ///
     /// The machine must have the features below; `held` must be the one that was read with.
     #[inline]
-    #[target_feature(enable = "avx512f,avx512bw,avx512vl")]
+    #[target_feature(enable = "avx2")]
     pub(crate) unsafe fn hold(&self, t: i64, held: &mut Held) {
         held.newest = t;
         // Lanes without an event repeat the last one, so that no branch depends on how many there are: no processor predicts that.
-        let lane = _mm_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7);
-        let repeated = _mm_min_epu16(_mm_set1_epi16(self.n as i16 - 1), lane);
-        let places = _mm_permutexvar_epi16(repeated, self.position);
-        let values = _mm_permutexvar_epi16(repeated, self.ticks);
         // SAFETY: they are the places of events on the array.
-        unsafe { hold_eight(places, values, t, held) }
+        unsafe { hold_eight(self.position, self.ticks, t, held) }
+    }
+
+    /// As [`Self::hold`], of events among which there may be eight neighbours, whose entries lie side by side.
+    ///
+    /// # Safety
+    ///
+    /// As [`Self::hold`]'s.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    pub(crate) unsafe fn hold_neighbours(&self, t: i64, held: &mut Held) {
+        let begin = usize::from(_mm_cvtsi128_si32(self.position) as u16);
+        if self.n < EIGHT || usize::from(_mm_extract_epi16::<7>(self.position) as u16) - begin >= EIGHT {
+            // SAFETY: the caller's promise.
+            return unsafe { self.hold(t, held) };
+        }
+        held.newest = t;
+        let times = _mm256_set1_epi64x(t);
+        // SAFETY: eight events, whose positions rise, lie on the array from `begin` on, and so in `held`.
+        unsafe {
+            _mm_storeu_si128(held.values.as_mut_ptr().add(begin).cast(), self.ticks);
+            let since = held.since.as_mut_ptr().add(begin);
+            _mm256_storeu_si256(since.cast(), times);
+            _mm256_storeu_si256(since.add(4).cast(), times);
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-"""What a readout made of a play, beside what really happened."""
+"""The result of one run of the demo: detections of a readout beside the simulated truth."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["Hearing", "hear", "listen"]
+__all__ = ["Evaluation", "evaluate_acts", "evaluate_events"]
 
 
 @dataclass(frozen=True)
-class Hearing:
-    """One play: events, spikes, what was said by neuron and by plain rule, truth, and how they compare."""
+class Evaluation:
+    """One run: events, spikes, detections of the neurons and of the plain rule, truth, and how they compare."""
 
     readout: Readout
     tare: Tare
@@ -59,39 +59,41 @@ class Hearing:
         return one.neuron.potential(one.weights, self.area, times, spikes=self.crossings(label))
 
     def first_input(self, contact: Contact, label: str) -> float | None:
-        """Return the stamp (us) of the first spike that told of a touch, or of its end; None where none did."""
+        """Return the time (us) of the first input spike of a touch, or of the last one at its end; None without any."""
         begin, end = contact.start_us - FRAME_US, contact.stop_us + 5_000.0
         rises, falls = to_us(self.area[0]), to_us(self.area[5])
         if label == "contact":
-            told = rises[(rises >= begin) & (rises < contact.stop_us)]
-            return float(told[0]) if len(told) else None
-        told = falls[(falls >= contact.start_us) & (falls < end)]
-        return float(told[-1]) if len(told) else None
+            inputs = rises[(rises >= begin) & (rises < contact.stop_us)]
+            return float(inputs[0]) if len(inputs) else None
+        inputs = falls[(falls >= contact.start_us) & (falls < end)]
+        return float(inputs[-1]) if len(inputs) else None
 
 
-def hear(
+def evaluate_acts(
     acts: Sequence[Act], readout: Readout, *, seed: int, watch: Callable[[float], object] = lambda _: None
-) -> Hearing:
-    """Play acts as fast as the board goes, and listen to what a host decodes of its datagrams.
+) -> Evaluation:
+    """Simulate acts without waiting for the clock, and run the readout on the events.
 
-    `watch` is told which share is played.
+    `watch` is called with the share that is done.
     """
-    return listen(play(acts, seed=seed, watch=watch).events, acts, readout)
+    return evaluate_events(play(acts, seed=seed, watch=watch).events, acts, readout)
 
 
-def listen(events: Events, acts: Sequence[Act], readout: Readout, found: Detections | None = None) -> Hearing:
-    """Listen to a play's events, the tare's among them; or take what was `found` while it ran."""
+def evaluate_events(
+    events: Events, acts: Sequence[Act], readout: Readout, found: Detections | None = None
+) -> Evaluation:
+    """Run the readout on events, those of the tare among them; or judge the detections `found` live."""
     start = events.markers[0][0]
     tare = Tare.take(events, stop_us=start)
     if found is None:
         found = run(readout, events, frame_us=FRAME_US, tare=tare)
-    # Before the start marker the board tells of every taxel's rest: nothing of it is meant.
+    # Before the start marker the board sends the rest of every taxel, which is no touch.
     found = found[found.t >= start]
     area = ContactArea(tare=tare).encode(events)
     area = area.between(to_ms(start), area.stop)
     contacts, force = truth(acts)
     plain = plain_rule(area, FRAME_US)
-    return Hearing(
+    return Evaluation(
         readout=readout,
         tare=tare,
         events=events.between(start, np.inf),

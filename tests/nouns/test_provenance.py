@@ -9,7 +9,7 @@ import pytest
 
 import taxel
 from taxel import _core
-from taxel.report.provenance import Sources, installed
+from taxel.report import Sources, installed_sources
 
 PACKAGE = {
     "__init__.py": '"""A package."""\nfrom toy.learning import Learner\nfrom toy.metrics import distance\n',
@@ -102,7 +102,7 @@ def test_every_name_of_the_compiled_part_has_a_digest() -> None:
 
 
 def test_the_private_base_is_left_out_and_what_stands_above_is_not_reached() -> None:
-    found = installed().parts("taxel.neuron")
+    found = installed_sources().parts("taxel.neuron")
     assert "taxel.neuron" in found
     assert not [name for name in found if name.startswith(("taxel._base", "taxel.learn", "taxel.cli"))]
 
@@ -113,7 +113,7 @@ def test_a_planted_change_is_found_in_a_copy_of_taxel(tmp_path: Path) -> None:
         Path(taxel.__file__).parent, tmp_path / "taxel", ignore=shutil.ignore_patterns("*.so", "__pycache__")
     )
     copy = Sources({"taxel": tmp_path / "taxel"}, _core.source_digests())
-    here = installed()
+    here = installed_sources()
     assert copy.parts("taxel.learn.cone_x") == here.parts("taxel.learn.cone_x")
     file = tmp_path / "taxel" / "neuron.py"
     text = file.read_text()

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from taxel import _core
 
-__all__ = ["Sources", "installed"]
+__all__ = ["Sources", "installed_sources"]
 
 _CORE = "taxel._core"
 #: What every room needs: a change there moves no result.
@@ -39,7 +39,7 @@ class Sources:
 
     Examples
     --------
-    >>> found = installed().parts("taxel.neuron")
+    >>> found = installed_sources().parts("taxel.neuron")
     >>> "taxel.neuron" in found, "taxel._core.neuron_run" in found, "taxel.learn.cone_x" in found
     (True, True, False)
     """
@@ -287,7 +287,7 @@ def _digest(data: bytes) -> str:
 
 
 @cache
-def installed(*more: str | Path) -> Sources:
+def installed_sources(*more: str | Path) -> Sources:
     """Return the sources of `taxel` as it is installed.
 
     Parameters

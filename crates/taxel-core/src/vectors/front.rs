@@ -1,0 +1,41 @@
+//! The chosen of eight 16-bit lanes brought to the front, where the machine has no instruction for it.
+
+/// For each choice of eight 16-bit lanes (a bit each) the bytes that a `pshufb` fetches: the chosen lanes in order, and
+/// behind them the last chosen one again and again; of an empty choice, zeros.
+pub(crate) static TO_FRONT: [[u8; 16]; 256] = {
+    let mut out = [[0x80; 16]; 256];
+    let mut choice = 1_u32;
+    while choice < 256 {
+        let (mut from, mut to) = (0, 0);
+        while to < 8 {
+            // The next chosen lane, if there is one, else the last one stays.
+            let rest = (choice >> from) & !1;
+            if to == 0 {
+                from = choice.trailing_zeros();
+            } else if rest != 0 {
+                from += rest.trailing_zeros();
+            }
+            out[choice as usize][2 * to] = 2 * from as u8;
+            out[choice as usize][2 * to + 1] = 2 * from as u8 + 1;
+            to += 1;
+        }
+        choice += 1;
+    }
+    out
+};
+
+#[cfg(test)]
+mod tests {
+    use super::TO_FRONT;
+
+    #[test]
+    fn chosen_lanes_come_first_and_the_last_one_repeats() {
+        for (choice, bytes) in TO_FRONT.iter().enumerate() {
+            let chosen: Vec<u8> = (0..8).filter(|lane| choice >> lane & 1 == 1).collect();
+            for (k, lane) in bytes.as_chunks::<2>().0.iter().enumerate() {
+                let wanted = chosen.get(k).or(chosen.last()).map_or([0x80; 2], |lane| [2 * lane, 2 * lane + 1]);
+                assert_eq!(*lane, wanted, "choice {choice:#b}, lane {k}");
+            }
+        }
+    }
+}
