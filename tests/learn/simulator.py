@@ -110,9 +110,7 @@ def on_grid(neuron, weights, pattern, targets, end):
     step, apart = np.longdouble(neuron.step_ms), 4 * np.spacing(max(abs(pattern.start), abs(end)))
     # An input at the double nearest to a point is at the point.
     points = np.round(((times - pattern.start) / step).astype(float))
-    since = np.where(
-        times == pattern.start + points * neuron.step_ms, points * step, times - np.longdouble(pattern.start)
-    )
+    since = np.where(times == pattern.start + points * neuron.step_ms, points * step, times - np.longdouble(pattern.start))
     wanted, fired = [round((t - pattern.start) / neuron.step_ms) for t in targets], []
     recovery = 2 * neuron.tau if neuron.tau_rec is None else neuron.tau_rec
     for k in range(round((end - pattern.start) / neuron.step_ms) + 1):

@@ -91,9 +91,9 @@ class Live:
     gap_frames : float, 0 or more
         At a gap in the sequence of wire version 2 time waits this many frames: the datagrams may only be late.
     say : callable, optional
-        Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and is
-        raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues to
-        receive; up to 16 384 detections wait for it.
+        Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and
+        is raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues
+        to receive; up to 16 384 detections wait for it.
     lines : bool
         Write each detection to the standard output as one line of JSON.
     send : str or sequence of str

@@ -2,7 +2,7 @@
 
 use rand::{SeedableRng, rngs::StdRng};
 use taxel_core::board::Board;
-use taxel_core::wire::v2::{Decoder, Header, Outcome, Kind, Packer, Settings};
+use taxel_core::wire::v2::{Decoder, Header, Kind, Outcome, Packer, Settings};
 use taxel_core::wire::{Decoder as Decoder1, Registers};
 use taxel_core::{Array, Events};
 
