@@ -24,7 +24,7 @@ __all__ = ["STAMP_US", "is_made", "stored"]
 #: The unit of the stamps of wire version 1, us.
 STAMP_US = 100
 
-#: What says how to read datagrams.
+#: Fields that describe how the datagrams are encoded.
 _OF_DATAGRAMS = ("version_2", "differences", "origin_us", "unmarked")
 
 #: So many numbers of repaired events at most stand in the description of a .mcap, which holds 16 MiB.
