@@ -42,7 +42,7 @@ class Recorded(Protocol):
 
     @property
     def held(self) -> NDArray[np.float32] | None:
-        """What the taxels held when it began, ticks, NaN of one without any event so far; None where it is not known."""
+        """What the taxels held when it began, ticks, NaN of one without an event so far; None where it is not known."""
         ...
 
     def frames(self) -> Frames:

@@ -39,6 +39,10 @@ class Part(NamedTuple):
     start, stop : float, us
         What lies in ``start <= t < stop`` belongs to the part; all of it where they are left out.
 
+    Raises
+    ------
+    ProblemError : values that make no sense, when `judge` or `choose` gets it
+
     Examples
     --------
     >>> Part(0, stop=1000.0)
@@ -58,6 +62,10 @@ class Fold(NamedTuple):
     train, test : sequence of Part
     inner : sequence of Fold
         Folds of the training data that a search chooses in; three are made where there are none.
+
+    Raises
+    ------
+    ProblemError : values that make no sense, when `judge` or `choose` gets it
 
     Examples
     --------
