@@ -48,8 +48,8 @@ class Neuron(Value):
     step_ms : float, ms, above 0
         Step of the grid.
     kernel : {"alpha", "double_exponential", "exponential"}
-        The effect of an input on the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))``, its
-        largest value 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential only jumps, at inputs.
+        The effect of an input on the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))``,
+        its largest value 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential only jumps, at inputs.
     tau_s : float, ms, above 0 and below `tau`, optional
         Synaptic time constant of the double exponential; ``tau / 4`` where left out.
 
@@ -61,9 +61,9 @@ class Neuron(Value):
     -----
     Thesis 6.3.1, equations 6.4 to 6.8. The choices that it leaves open stand on the page *Readings*.
 
-    Times are double precision: at 2**33 ms (100 days) neighbouring ones are 1.9e-6 ms apart. On a grid a potential counts
-    as reaching the threshold within its slope times four such distances, so that far from 0 a neuron may fire at a point
-    that is up to that long before its crossing. Times that count from the start of a recording avoid both.
+    Times are in double precision: at 2**33 ms (100 days) neighbouring ones are 1.9e-6 ms apart. On a grid a potential
+    counts as reaching the threshold within its slope times four such distances, so that far from 0 a neuron may fire at
+    a point that is up to that long before its crossing. Times that count from the start of a recording avoid both.
 
     Examples
     --------

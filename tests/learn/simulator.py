@@ -102,15 +102,17 @@ class Simulated:
 def on_grid(neuron, weights, pattern, targets, end):
     """The numbers of the grid points at which a neuron fires, and those of the targets.
 
-    Ages are whole numbers of steps less the time of an input since the start, in long double. A potential counts as at the
-    threshold from `ROUNDING` below it on, at a target from as far below it as a rounded time may move it.
+    Ages are whole numbers of steps less the time of an input since the start, in long double. A potential counts as at
+    the threshold from `ROUNDING` below it on, at a target from as far below it as a rounded time may move it.
     """
     pairs = sorted((float(t), float(w)) for train, w in zip(pattern, weights, strict=True) for t in train)
     times, weights = (np.array(column, np.longdouble) for column in zip(*pairs, strict=True))
     step, apart = np.longdouble(neuron.step_ms), 4 * np.spacing(max(abs(pattern.start), abs(end)))
     # An input at the double nearest to a point is at the point.
     points = np.round(((times - pattern.start) / step).astype(float))
-    since = np.where(times == pattern.start + points * neuron.step_ms, points * step, times - np.longdouble(pattern.start))
+    since = np.where(
+        times == pattern.start + points * neuron.step_ms, points * step, times - np.longdouble(pattern.start)
+    )
     wanted, fired = [round((t - pattern.start) / neuron.step_ms) for t in targets], []
     recovery = 2 * neuron.tau if neuron.tau_rec is None else neuron.tau_rec
     for k in range(round((end - pattern.start) / neuron.step_ms) + 1):

@@ -60,8 +60,8 @@ def test_potential_and_spikes_agree_at_every_point(start):
         assert below[: np.searchsorted(points, fired[0])].all()
 
 
-#: A potential of this draw crosses the threshold 1e-6 ms after a grid point. At 2^33 ms neighbouring times are 1.9e-6 ms
-#: apart, so that the crossing is at the point itself.
+#: A potential of this draw crosses the threshold 1e-6 ms after a grid point. At 2^33 ms neighbouring times are 1.9e-6
+#: ms apart, so that the crossing is at the point itself.
 BELOW_RESOLUTION = 42
 
 

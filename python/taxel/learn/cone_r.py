@@ -47,8 +47,8 @@ class ConeR(SpikeLearner):
     lambdas : five floats, 0 or more
         Shares of l1, l2, B, C, D in the objective; only their ratios matter.
     lb, ub : float, or float sequence of shape (trains,), mV
-        Least and largest weight, for all synapses or one a synapse. All normalisers are computed at ``-max(|lb|, |ub|)``
-        and ``+max(|lb|, |ub|)``, synapse by synapse.
+        Least and largest weight, for all synapses or one a synapse. All normalisers are computed at
+        ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``, synapse by synapse.
     divide_b_by : {"B_max", "targets"}
         B over its largest value, as printed, or over the number of targets.
     norm : {"norm", "square"}
@@ -361,7 +361,7 @@ def _weighed(name: str, count: int, what: str) -> None:
 
 
 def _counted(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] | None:
-    """Return the trains that have a spike in some pattern, or that bounds hold away from 0; None where these are all trains.
+    """Return the trains with a spike in some pattern, or with bounds away from 0; None where these are all trains.
 
     The weight of any other is 0 whatever else is learnt, and of a whole array's trains nearly all are such.
     """

@@ -106,7 +106,8 @@ class OnlineConeR(ConeR):
         ------
         ProblemError : a pattern or targets that make no sense (names them, counted from the first that ever came); the
             window is then as before
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the pattern is in the window, the weights are the best so far
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the pattern is in the window, the weights are the
+            best so far
 
         Warns
         -----

@@ -1,4 +1,4 @@
-"""Detections as they come, with the time at which each was reported."""
+"""Detections of a `Live`, with the time of their output."""
 
 from __future__ import annotations
 

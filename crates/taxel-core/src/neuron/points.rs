@@ -85,6 +85,12 @@ impl Grid {
         t <= now + rounding_ms(now)
     }
 
+    /// The first point that is not before a time, to rounding.
+    pub(crate) fn first_from(&self, t: f64) -> f64 {
+        let nearest = self.place(t).point;
+        if self.has_come(t, nearest) { nearest } else { nearest + 1.0 }
+    }
+
     /// How long after one time another is, ms.
     pub(crate) fn between(&self, from: Place, to: Place) -> f64 {
         (to.point - from.point) * self.step_ms + (to.rest - from.rest)

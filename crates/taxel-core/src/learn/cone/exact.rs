@@ -118,7 +118,7 @@ impl Exact {
     fn misfire(&self, weights: &[f64]) -> Result<Option<String>> {
         for (p, example) in self.statement.examples.iter().enumerate() {
             let grid = Grid::new(example.start, self.statement.neuron.step_ms);
-            let due = |&target: &f64| if self.is_grid() { grid.time(grid.place(target).from()) } else { target };
+            let due = |&target: &f64| if self.is_grid() { grid.time(grid.first_from(target)) } else { target };
             let wanted: Vec<f64> = example.targets.iter().map(due).collect();
             let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, example.start)?);
             for &(t, train) in example.inputs.iter().take_while(|input| input.0 <= example.end) {

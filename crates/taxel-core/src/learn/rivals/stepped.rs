@@ -215,8 +215,8 @@ impl SteppedNeuron {
             .by_time(stop)?
             .into_iter()
             .map(|spike| {
-                let point = grid.place(spike.t).from();
-                let pass = kernels.pass(grid.time(point) - spike.t);
+                let point = grid.first_from(spike.t);
+                let pass = kernels.pass((grid.time(point) - spike.t).max(0.0));
                 Input {
                     step: point as usize,
                     train: spike.train as usize,
