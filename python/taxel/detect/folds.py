@@ -370,7 +370,7 @@ def _sound(folds: Sequence[Fold], examples: int) -> None:
             raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold")
         train, test, inner = (several(f"fold {n}: {name}", getattr(fold, name)) for name in fold._fields)
         if not train or not test:
-            raise ProblemError(f"fold {n} is {shown(fold)}: must have parts to train on and parts to test")
+            raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold with parts to train on and parts to test")
         for part in (*train, *test):
             if not isinstance(part, Part) or not 0 <= whole(f"fold {n}: example", part.example) < examples:
                 raise ProblemError(f"fold {n}: {shown(part)} is no Part of {examples} examples")
