@@ -43,7 +43,7 @@ class Recorded(Protocol):
 
     @property
     def held(self) -> NDArray[np.float32] | None:
-        """What the taxels held when it began, ticks, NaN where one was not heard of; None where it is not known."""
+        """What the taxels held when it began, ticks, NaN of one without an event so far; None where it is not known."""
         ...
 
     def frames(self) -> Frames:

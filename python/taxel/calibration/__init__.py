@@ -47,6 +47,10 @@ class Load(NamedTuple):
         Force in all, however it is spread, or the same pressure at every taxel.
     taxel : (int, int), optional
         Column and row of the only taxel that bears it.
+
+    Raises
+    ------
+    ProblemError : values that make no sense, when `Calibration.fit` gets it
     """
 
     frames: Frames

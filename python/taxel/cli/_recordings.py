@@ -36,7 +36,7 @@ SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a n
 
 
 def assignments(said: list[str]) -> dict[str, Any]:
-    """Return what ``--set KEY=VALUE`` says; a VALUE that is no TOML is a text."""
+    """Return the values of ``--set KEY=VALUE``; a VALUE that is no TOML is a text."""
     values = {}
     for one in said:
         key, equals, value = one.partition("=")
@@ -112,7 +112,7 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
 
 
 def _taken(recording: Recording, source: Events | Frames, stop_us: int) -> Tare:
-    """Return the rest before a time; warn of taxels first heard of behind it: encoders do not listen to them."""
+    """Return the rest before a time; warn of taxels whose first event comes after it: encoders ignore them."""
     from taxel.events import Events  # noqa: PLC0415  the command line starts quickly
     from taxel.tare import Tare  # noqa: PLC0415
 
@@ -170,7 +170,7 @@ def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
 
 
 def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArray[np.int64]]:
-    """Return the events of a recording that lie within it; what lies outside is left out, and said."""
+    """Return the events that lie within a recording; those outside are left out, with a warning."""
     from taxel.recording import kind_of_file  # noqa: PLC0415  the command line starts quickly
 
     times = recording.events.t if recording.has_events else recording.frames().t
@@ -214,7 +214,7 @@ def told(quiet: bool) -> Iterator[Callable[[str], None]]:
 
 
 def open_recording(path: Path, array: str | None = None) -> Recording:
-    """Open a file of ours, of the sensor that ``--array`` says; imported late."""
+    """Open a file with the sensor of ``--array``; imported late."""
     from taxel import recording  # noqa: PLC0415  the command line starts quickly
 
     return of_array(recording.open_recording(path, array=None if array is None else geometry(array)), array)

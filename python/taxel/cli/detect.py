@@ -1,4 +1,4 @@
-"""``taxel detect``: what a readout says of a recording."""
+"""``taxel detect``: the detections of a readout in a recording."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def detect(
             tell(f"reading {one.path}")
             rest = tare_of(tare, one)
             found = run(loaded, one, frame_us=frame_us, tare=rest)
-            # What the readout cannot say it cannot miss.
+            # Labels that the readout does not have do not count as missed.
             wanted = None if happened is None else {label: happened.get(label, _NONE) for label in loaded.labels}
             scored = None if wanted is None else score(found, wanted, window_ms)
             heard.append(Outcome(str(one.path), Example(one, wanted or {}, rest), found, scored))

@@ -101,7 +101,7 @@ def train(
     if encoder is not None:
         changes["encoder.name"] = encoder
     if recipe is not None:
-        Recipe.load(recipe, changes)  # what is wrong with it is said before the recordings are read
+        Recipe.load(recipe, changes)  # reports errors of the recipe before the recordings are read
     elif "encoder.name" in changes:
         plan = Recipe.from_dict(changed({}, changes))
     opened = open_all(recordings)

@@ -37,6 +37,10 @@ class Example(NamedTuple):
     tare : Tare, optional
         The rest of the taxels, where the encoder needs it.
 
+    Raises
+    ------
+    ProblemError : values that make no sense, when `train`, `judge` or `choose` gets it
+
     Examples
     --------
     >>> spikes = SpikeTrains.from_lists([[10.0], [12.0]], stop=50.0)

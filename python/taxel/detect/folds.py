@@ -39,6 +39,10 @@ class Part(NamedTuple):
     start, stop : float, us
         What lies in ``start <= t < stop`` belongs to the part; all of it where they are left out.
 
+    Raises
+    ------
+    ProblemError : values that make no sense, when `judge` or `choose` gets it
+
     Examples
     --------
     >>> Part(0, stop=1000.0)
@@ -58,6 +62,10 @@ class Fold(NamedTuple):
     train, test : sequence of Part
     inner : sequence of Fold
         Folds of the training data that a search chooses in; three are made where there are none.
+
+    Raises
+    ------
+    ProblemError : values that make no sense, when `judge` or `choose` gets it
 
     Examples
     --------
@@ -362,7 +370,7 @@ def _sound(folds: Sequence[Fold], examples: int) -> None:
             raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold")
         train, test, inner = (several(f"fold {n}: {name}", getattr(fold, name)) for name in fold._fields)
         if not train or not test:
-            raise ProblemError(f"fold {n} is {shown(fold)}: must have parts to train on and parts to test")
+            raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold with parts to train on and parts to test")
         for part in (*train, *test):
             if not isinstance(part, Part) or not 0 <= whole(f"fold {n}: example", part.example) < examples:
                 raise ProblemError(f"fold {n}: {shown(part)} is no Part of {examples} examples")

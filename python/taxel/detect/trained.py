@@ -21,6 +21,10 @@ class TrainedNeuron(NamedTuple):
     weights : float64, shape (trains,), mV
     delay_ms : float, ms, 0 or more
         How much later than the event it was trained to fire.
+
+    Raises
+    ------
+    ProblemError : values that make no sense, when `Readout` gets it
     """
 
     neuron: Neuron

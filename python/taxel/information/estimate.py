@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import callback, number, shown, whole
 from taxel._core import ProblemError
-from taxel.information._labels import belonging, distinct, one_label_a_group, words
+from taxel.information._labels import belonging, distinct, numbered, one_label_a_group, words
 from taxel.information.bits import (
     label_entropy,
     local_information,
@@ -27,7 +27,7 @@ __all__ = ["Estimate", "ZeroTest", "estimate", "zero_test"]
 TRIALS_A_RESPONSE = 7
 #: Cells that are held at a time while trials are redrawn.
 _CELLS = 1 << 21
-#: Units that are redrawn by one call of NumPy.
+#: Units that are redrawn, or trials that are counted, by one call of NumPy.
 _DRAWN = 1 << 19
 #: Counts in which shares are told finely enough.
 _FINE = 1 << 36
@@ -175,7 +175,7 @@ def estimate(
     if (truth.dtype.kind == "U") != (said.dtype.kind == "U"):
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers")
     classes = np.unique(np.concatenate([distinct(truth), distinct(said.ravel())]))
-    row, column = np.searchsorted(classes, truth), np.searchsorted(classes, said)
+    row, column = numbered(classes, truth), numbered(classes, said)
     if len(np.unique(row)) < 2:
         raise ProblemError(
             f"labels are all {shown(truth[0].item())}: must be two at least, or there is nothing to tell"
@@ -294,7 +294,10 @@ def _tables(cells: NDArray[np.int64], weights: NDArray[Any], classes: int) -> ND
     found = np.empty((len(weights), len(draws), classes, classes), np.int64)
     for k, weight in enumerate(weights):
         for d, cell in enumerate(draws):
-            found[k, d] = np.rint(np.bincount(cell, weight, classes**2)).reshape(classes, classes)
+            # In pieces, as one NumPy call does not answer Ctrl-C; sums of whole numbers are exact.
+            pieces = (slice(first, first + _DRAWN) for first in range(0, len(cell), _DRAWN))
+            table = sum(np.bincount(cell[piece], weight[piece], classes**2) for piece in pieces)
+            found[k, d] = np.rint(table).reshape(classes, classes)
     return found if cells.ndim == 2 else found[:, 0]
 
 

@@ -45,7 +45,7 @@ def _without_a_time(of: Contents) -> list[str]:
 
 
 class Apart(Mapping[str, Contents]):
-    """Hold the names of sources of which a part by one clock says nothing, as each has its own."""
+    """Hold the names of sources that a part by one clock does not define, as each has its own clock; refuse access."""
 
     def __init__(self, path: Path, names: Iterable[str]) -> None:
         self._path, self._names = path, tuple(names)

@@ -1,4 +1,4 @@
-"""What a recording holds, whichever file it comes from: a field for each thing, read when it is first asked for."""
+"""The contents of a recording of any kind of file: one dataclass, each field read at its first access."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def once(read: Callable[[], T], holds: Callable[[], bool] | None = None) -> T:
 
 
 def anything(value: object) -> bool:
-    """Tell whether the value of a field says more than nothing at all."""
+    """Return whether the value of a field holds any information."""
     match value:
         case Clock():
             return len(value.board_us) > 0

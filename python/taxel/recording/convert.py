@@ -1,4 +1,4 @@
-"""From one kind of recording to another: lossless where the target can hold it, else what it cannot is said."""
+"""Conversion between kinds of recordings: lossless where the target can hold all; what it cannot hold is reported."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
     if (bottom - top, right - left) == array.shape:
         return of
     if of.is_several:
-        # Its events say which sources there are.
+        # Reading its events raises the error that lists its sources.
         _ = of.events
     exists = None if array.exists is None else array.exists[top:bottom, left:right]
     small = Array(bottom - top, right - left, array.pitch_mm, exists, array.name)

@@ -1,4 +1,4 @@
-"""What a table of events or pictures cannot hold, as JSON: the entry ``about`` of a .npz and of a .h5."""
+"""The description of a recording as JSON: the entry ``about`` of a .npz and of a .h5."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def _texts(said: Any) -> tuple[str, ...]:
     return tuple(text("entry", one) for one in said)
 
 
-#: How each entry is read, by its name; of the registers only later, as another entry says what they drive.
+#: How each entry is read, by its name; registers are checked later, as the array that they drive is another entry.
 _ENTRIES: dict[str, Any] = {
     "array": lambda said, place: sensor(place, array_of(said)),
     "source": lambda said, _: text("source", said),

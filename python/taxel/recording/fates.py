@@ -75,7 +75,7 @@ _DEFAULTS: dict[str, Callable[[], Any]] = {
 
 
 def sensor(array: Array) -> str:
-    """Return the line that says that a sensor is lost."""
+    """Return the line of `lost` for a sensor."""
     some = "" if array.exists is None else f", {array.taxels} exist"
     return f'the sensor ({array.rows} x {array.columns} taxels{some}, {array.pitch_mm:g} mm apart, "{array.name}")'
 
@@ -95,7 +95,7 @@ def _sources(of: Contents, _: str) -> list[str]:
     return [f"the source {name}" for name in of.sources if name != of.label]
 
 
-#: The line where a field is lost that held anything. None: it is part of another, or can be told from what is there.
+#: The line of `lost` for a field that held anything. None: it is part of another field, or follows from the others.
 LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "source": lambda of, _: f"where it came from ({of.source})",
     # A part that was written is a recording of its own.
@@ -114,7 +114,7 @@ LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "verdict": None,
     "datagrams": _datagrams,
     "payload": lambda _, __: "raw bytes (words that are no events)",
-    # These say how to read the datagrams; a .lsa has none, but their bytes.
+    # These describe how the datagrams are encoded; a .lsa has no datagrams, but their bytes.
     "version_2": None,
     "differences": lambda _, step: "that intensities are differences" if step == ".lsa" else [],
     "origin_us": None,

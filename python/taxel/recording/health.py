@@ -145,7 +145,7 @@ class Told(NamedTuple):
     values: NDArray[np.signedinteger] | None = None
     """How many different intensities its events showed: 0, 1, or 2 and more; None where events have none."""
     least: NDArray[np.signedinteger] | None = None
-    """The least that it is known to have held, ticks; -1 where it was not heard of."""
+    """The least value that it is known to have held, ticks; -1 of a taxel without any event."""
     greatest: NDArray[np.signedinteger] | None = None
     """The greatest, likewise."""
 
@@ -180,7 +180,7 @@ def judged(array: Array, told: Told) -> Health:
 
 
 def _told_of_events(events: Events) -> Told:
-    """Return what events say of each taxel; those that a state told say only what it holds."""
+    """Return the statistics of each taxel; an event that a state repaired counts for the held value only."""
     own = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
     index = events.array.index(events.x, events.y).astype(np.int64)
     activity, moved = _ways(index[own], np.where(events.p[own], 1, -1), events.array)

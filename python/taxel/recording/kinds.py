@@ -46,7 +46,7 @@ def kind_of_file(kind: str) -> str:
 
 
 def verdict_of(contents: Contents) -> str:
-    """Return in one line what was lost of a recording, or that its file does not say."""
+    """Return in one line what was lost of a recording, or that its file does not record it."""
     said = contents.verdict
     return f"the {kind_of_file(contents.kind)} does not say what was lost" if said is None else said
 
@@ -85,5 +85,5 @@ def kind_of(path: Path) -> str:
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
         raise FormatError(f"{path}, byte 0: starts with {begins}, not with {wanted[ending]} ({magic})")
-    # The compiled reader says what is wrong with a .mcap, the table's reader with a .csv.
+    # Errors of a .mcap come from the compiled reader, those of a .csv from the reader of tables.
     return ending

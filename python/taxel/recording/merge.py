@@ -138,7 +138,7 @@ def _at(t: int | None, shift: int, change: Any) -> Any:
 
 
 class _Common:
-    """Gives a field's value where all recordings have the same, else its empty value, and says so."""
+    """Merges a field: the common value where all recordings agree, else the empty value and a line of `lost`."""
 
     def __init__(self, parts: Sequence[Contents], lost: list[str]) -> None:
         self.parts, self.lost = parts, lost
@@ -179,7 +179,7 @@ def _same_calibration(a: Calibration | None, b: Calibration | None) -> bool:
 
 
 def _others(parts: Sequence[Contents]) -> list[str]:
-    """Say what all recordings but the first lose; the first one's is said by the table of fates."""
+    """Return the lines of `lost` for all recordings but the first, whose lines the table of fates gives."""
     lines: list[str] = []
     for part in parts[1:]:
         lines += ["raw datagrams"] * part.holds("datagrams")

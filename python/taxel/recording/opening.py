@@ -84,7 +84,7 @@ def open_any(
     how: dict[str, Any] = {"array": array, "pairing": pairing, "differences": differences}
     if place.is_dir():
         return _folder(place, how)
-    # What other people's files are called is asked first: a .h5 is read once more to know whose it is.
+    # Names of other people's formats are tested first, as telling whose a .h5 is means to read it once more.
     if place.exists() and (names := _formats(place)) and not _is_own(place):
         return [_of(trial, place, names[0]) for trial in formats.trials(place, names[0])]
     return open_recording(place, **how)

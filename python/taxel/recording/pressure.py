@@ -173,7 +173,7 @@ def readings(recording: Recording) -> tuple[Frames, NDArray[np.float64], float] 
 
 
 def _first_heard(events: Events) -> NDArray[np.int64]:
-    """Return when each taxel was first heard, us; far ahead where it never was."""
+    """Return the time of each taxel's first event, us; far ahead where there is none."""
     first = np.full(events.array.shape, np.iinfo(np.int64).max)
     there = events.present
     np.minimum.at(first, (events.y[there], events.x[there]), events.t[there])

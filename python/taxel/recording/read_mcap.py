@@ -1,4 +1,4 @@
-"""Reads the live format: each of its sources as contents, none of whose fields is read before it is asked for."""
+"""Reads the live format: each source as contents, whose fields are read at their first access."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def read_mcap(path: Path, pairing: str) -> Contents:
 
 
 class _Source:
-    """What the fields of one source share: what the file says of it, and what is read of it once."""
+    """Reader of one source of a file: its header and trailer, and what its fields read in common."""
 
     def __init__(self, path: Path, reader: _core.RecordingReader, sources: dict[str, Contents]) -> None:
         self.reader = reader

@@ -36,7 +36,7 @@ __all__ = ["Recording"]
 
 
 class Recording:
-    """Hold a file, opened: everything is read when it is first asked for.
+    """Hold an opened file: each attribute is read at its first access.
 
     Made by `taxel.open`.
 

@@ -1,4 +1,4 @@
-"""What lies beside a recording as a file of its own: labels that people set, and a calibration."""
+"""Sidecar files of a recording: labels that people set, and a calibration."""
 
 from __future__ import annotations
 

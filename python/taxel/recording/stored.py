@@ -24,7 +24,7 @@ __all__ = ["STAMP_US", "is_made", "stored"]
 #: The unit of the stamps of wire version 1, us.
 STAMP_US = 100
 
-#: What says how to read datagrams.
+#: Fields that describe how the datagrams are encoded.
 _OF_DATAGRAMS = ("version_2", "differences", "origin_us", "unmarked")
 
 #: So many numbers of repaired events at most stand in the description of a .mcap, which holds 16 MiB.
@@ -120,6 +120,8 @@ def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
         changed |= {name: vars(of)[name] for name in stay}
         bad = of.counts.get("lines_that_could_not_be_read", 0)
         lines = [f"{bad} lines that could not be read"] * bool(bad)
+        outside = of.clock is not None and len(of.clock.board_us) > len(of.samples)
+        lines += ["arrival times of lines outside the part"] * outside
         return after(ending, of, lambda: [*lines, *_mended(of), *_left_beside(of, place)], **(common | changed))
     events = _events(of, place)
     changed |= {"events": once(lambda: events), "frames": None, "payload": None}

@@ -64,7 +64,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
     if contents.held is not None:
         writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(contents.held).reshape(-1))
     done = 0
-    # What the host told the board stands between the datagrams before and after it, as decoding asks for it.
+    # Commands of the host stand between the datagrams before and after them: the decoder needs this order.
     for change in contents.board_changes:
         upto = int(np.searchsorted(datagrams.arrived_ns, change.at_ns, side="left"))
         _add_datagrams(writer, datagrams, arrived, done, max(done, upto))
