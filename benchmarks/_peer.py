@@ -20,13 +20,12 @@ from typing import Any
 
 from _rounds import processor, version
 
-from taxel.report import write_whole
-from taxel.report.provenance import Sources
+from taxel.report import Sources, write_whole
 
 #: Set where peers that need minutes are waited for.
 PATIENT = "TAXEL_BENCH_PEERS"
-#: CPU seconds of a peer that is not waited for; what took longer is kept.
-LONG_S = 60
+#: CPU seconds of a peer that is not waited for, and of one in a quick run; what took longer than the first is kept.
+LONG_S, QUICK_S = 60, 3
 KEPT = Path(__file__).parent / "results" / "peers.json"
 
 
@@ -45,7 +44,7 @@ def missing(peers: Mapping[str, str]) -> dict[str, str]:
 
 
 def ask(script: str, *arguments: object, packages: str, limit: int, quick: bool) -> dict[str, Any]:
-    """Run `script` in one thread; return what it says as JSON in its last line, or how it ended.
+    """Run `script` in one thread; return the JSON of its last line of output, or how it ended.
 
     Parameters
     ----------
@@ -71,7 +70,7 @@ def ask(script: str, *arguments: object, packages: str, limit: int, quick: bool)
     if name in kept and {part: kept[name][part] for part in key} == key:
         return kept[name]["found"] | {"kept": f"{kept[name]['date']}, {key['cpu']}"}
     patient = bool(os.environ.get(PATIENT)) and not quick
-    found = _run(script, arguments, limit if patient else LONG_S)
+    found = _run(script, arguments, limit if patient else QUICK_S if quick else LONG_S)
     if patient and ("stopped" in found or found.get("cpu_s", 0.0) > LONG_S):
         kept[name] = key | {"date": time.strftime("%Y-%m-%d", time.gmtime()), "found": found}
         text = json.dumps(kept, indent=1, sort_keys=True) + "\n"
@@ -99,7 +98,7 @@ def _run(script: str, arguments: tuple[object, ...], limit: int) -> dict[str, An
     def cap() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
 
-    said = subprocess.run(
+    ran = subprocess.run(
         [sys.executable, script, *map(str, arguments)],
         preexec_fn=cap,
         capture_output=True,
@@ -108,9 +107,9 @@ def _run(script: str, arguments: tuple[object, ...], limit: int) -> dict[str, An
         env=os.environ | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1"),
         cwd=Path(script).parent,
     )
-    if said.returncode == 0:
-        found: dict[str, Any] = json.loads(said.stdout.splitlines()[-1])
+    if ran.returncode == 0:
+        found: dict[str, Any] = json.loads(ran.stdout.splitlines()[-1])
         return found
-    if said.returncode in (-9, -24):
+    if ran.returncode in (-9, -24):
         return {"stopped": f"after {limit} s of CPU, without a verdict", "limit_s": limit}
-    return {"failed": said.stderr.strip().splitlines()[-1:] or [f"exit status {said.returncode}"]}
+    return {"failed": ran.stderr.strip().splitlines()[-1:] or [f"exit status {ran.returncode}"]}

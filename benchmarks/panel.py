@@ -18,15 +18,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from _peer import missing
 from _rounds import stamp, thread_seconds
 
 import taxel
+from taxel import ProblemError
 from taxel.live import Live, Panel
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
 
 SIDES, CHANGES_PER_S, OTHERS = (64,), 1e5, 99
+#: What the clients of the panel need.
+PEERS = {"all of it": "websockets"}
 
 #: Bytes of a datagram: 19 changes and their values, 192 us of them.
 EACH = 190
@@ -50,20 +54,20 @@ def events(side: int, count: int, seconds: float) -> taxel.Events:
     )
 
 
-def looking(panel: Panel) -> ClientConnection:
-    """Open a client's connection."""
+def connected(panel: Panel) -> ClientConnection:
+    """Connect a client; it has asked for two pictures."""
     from websockets.sync.client import connect  # noqa: PLC0415  an extra
 
     host = "{}:{}".format(*panel.address)
-    door = connect(
+    client = connect(
         f"ws://{host}/socket",
         origin=f"http://{host}",
         subprotocols=["taxel.panel.1", f"token.{panel.token}"],
         max_size=None,
         open_timeout=60,
     )
-    door.send(json.dumps({"type": "credit", "n": 2}))
-    return door
+    client.send(json.dumps({"type": "credit", "n": 2}))
+    return client
 
 
 def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str, Any]:
@@ -74,8 +78,8 @@ def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str
     payload.write_bytes(pickle.dumps(cut))
     array = taxel.Array(side, side, name="bench")
     with Live(0, host="127.0.0.1", array=array) as live, Panel(live, folder=scratch) as panel:
-        crowd = [looking(panel) for _ in range(others)]
-        good = looking(panel)
+        crowd = [connected(panel) for _ in range(others)]
+        good = connected(panel)
         arguments = [str(payload), str(live.address[1]), str(seconds + 1.0)]
         sender = subprocess.Popen([sys.executable, "-c", SEND, *arguments])
         time.sleep(0.5)
@@ -105,29 +109,29 @@ def seeking(count: int, seeks: int, scratch: Path) -> dict[str, Any]:
     taxel.convert(events(64, count, count / CHANGES_PER_S), path)
     size, random = path.stat().st_size, np.random.default_rng(1)
     with Panel(path) as panel:
-        door = looking(panel)
-        door.send(json.dumps({"type": "watch", "taxel": [32, 32]}))
+        client = connected(panel)
+        client.send(json.dumps({"type": "watch", "taxel": [32, 32]}))
         cpu = time.process_time()
         begun = time.perf_counter()
-        door.send(json.dumps({"type": "open", "name": path.name, "id": 1}))
+        client.send(json.dumps({"type": "open", "name": path.name, "id": 1}))
         opened: dict[str, Any] = {}
         while opened.get("type") != "opened":
-            said = door.recv(timeout=600)
-            opened = {} if isinstance(said, bytes) else json.loads(said)
+            message = client.recv(timeout=600)
+            opened = {} if isinstance(message, bytes) else json.loads(message)
         index = {"wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - cpu}
         walls, cpus = [], []
         for t_us in random.integers(opened["start_us"], opened["stop_us"], seeks):
             cpu, begun = time.process_time(), time.perf_counter()
-            door.send(json.dumps({"type": "seek", "t_us": int(t_us)}))
+            client.send(json.dumps({"type": "seek", "t_us": int(t_us)}))
             while True:
-                said = door.recv(timeout=60)
-                if isinstance(said, bytes):
-                    door.send(json.dumps({"type": "credit", "n": 1}))
-                    if int.from_bytes(said[16:24], "little", signed=True) == t_us:
+                message = client.recv(timeout=60)
+                if isinstance(message, bytes):
+                    client.send(json.dumps({"type": "credit", "n": 1}))
+                    if int.from_bytes(message[16:24], "little", signed=True) == t_us:
                         break
             walls.append(1e3 * (time.perf_counter() - begun))
             cpus.append(1e3 * (time.process_time() - cpu))
-        door.socket.close()
+        client.socket.close()
     return {
         "file_mb": size / 1e6,
         "changes": count,
@@ -137,6 +141,11 @@ def seeking(count: int, seeks: int, scratch: Path) -> dict[str, Any]:
 
 
 def run(*, quick: bool) -> dict[str, Any]:
+    absent = missing(PEERS)
+    if absent:
+        if not quick:
+            raise ProblemError("panel: its clients need websockets: pip install websockets")
+        return stamp() | {"left out": absent, "ratios": {}}
     seconds = 1.0 if quick else 5.0
     load = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:

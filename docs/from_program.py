@@ -1,13 +1,15 @@
-"""Parts of the documentation that are made of the program: the studies' figures, every command's options.
+"""Parts of the documentation that are made from the program: figures, options of commands, public names.
 
-A page asks for them by directives: ``.. studies::``, ``.. commands::`` and ``.. rivals::``.
+A page asks for them by directives: ``.. studies::``, ``.. commands::`` and ``.. names:: MODULE``.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import typer
@@ -15,14 +17,15 @@ from docutils import nodes
 from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
+from sphinx.pycode import ModuleAnalyzer
 
-from taxel import learn
-from taxel._base.parameters import Parameters
 from taxel.cli import app as command_line
 from taxel_studies import STUDIES
 from taxel_studies.kept import changed
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
+#: Characters; the values of longer constants are not shown.
+LONGEST_VALUE = 80
 VERDICTS = {True: "holds", False: "**does not hold**", None: "not judged"}
 
 
@@ -86,7 +89,8 @@ def study(section: dict[str, Any]) -> list[str]:
     ]
     parts = changed(section)
     if parts:
-        lines += ["", f"**Stale**: made by other code than this one; changed since: {literal(', '.join(parts))}.", ""]
+        first = ", ".join(parts[:3]) + ("" if len(parts) <= 3 else f" and {len(parts) - 3} more")
+        lines += ["", f"**Stale**: made by other code than this one; changed since: {literal(first)}.", ""]
     for picture in section["pictures"]:
         lines += ["", f".. image:: {where}/{picture}", f"   :alt: {name}: {section['title']}", "   :width: 100%", ""]
     rows = [[s["says"], s["published"], s["ours"], VERDICTS[s["holds"]], s["why"]] for s in section["statements"]]
@@ -94,18 +98,30 @@ def study(section: dict[str, Any]) -> list[str]:
     return [*lines, "", f"**Protocol.** {literal(section['protocol'])}", ""]
 
 
-class Rivals(FromProgram):
-    """Every learner of the registry that is not CONE."""
+class Names(FromProgram):
+    """What a module's ``__all__`` names: a table of classes and functions with their first lines, and some constants.
+
+    The directive ``automodule`` shows the rest, but no constant that was imported from another module.
+    """
+
+    required_arguments = 1
 
     def lines(self) -> list[str]:
-        """Return a class a learner."""
-        kinds = [kind for kind in vars(learn).values() if isinstance(kind, type) and issubclass(kind, Parameters)]
-        others = sorted(kind.__name__ for kind in kinds if "Cone" not in kind.__name__)
-        return [
-            line
-            for name in others
-            for line in (f".. autoclass:: taxel.learn.{name}", "   :members:", "   :inherited-members:", "")
+        """Return table and constants; modules have pages of their own."""
+        module = importlib.import_module(self.arguments[0])
+        held = {name: getattr(module, name) for name in module.__all__}
+        names = [name for name, what in held.items() if callable(what)]
+        own = {name for _, name in ModuleAnalyzer.for_module(module.__name__).find_attr_docs()}
+        constants = [
+            n for n, what in held.items() if not callable(what) and not isinstance(what, ModuleType) and n not in own
         ]
+        # Without a current module, else a second table of a page warns that it names that of the first.
+        head = [".. py:currentmodule:: None", "", ".. autosummary::", ""]
+        table = [*head, *(f"   ~{module.__name__}.{name}" for name in names), ""]
+        for name in constants:
+            long = ["   :no-value:"] if len(repr(held[name])) > LONGEST_VALUE else []
+            table += [f".. autodata:: {module.__name__}.{name}", *long, ""]
+        return table
 
 
 class Commands(FromProgram):
@@ -184,5 +200,5 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("studies", Studies)
     app.add_directive("commands", Commands)
-    app.add_directive("rivals", Rivals)
+    app.add_directive("names", Names)
     return {"parallel_read_safe": True}

@@ -1,4 +1,4 @@
-"""What all tests share: examples are drawn the same each time, and a busy machine is no failure."""
+"""Settings of all tests: random examples are the same each time, and a slow machine is no failure."""
 
 import signal
 
@@ -7,7 +7,7 @@ from hypothesis import settings
 settings.register_profile("taxel", deadline=None, derandomize=True)
 settings.load_profile("taxel")
 
-# A shell that starts the tests in the background has them ignore Ctrl-C, which some of them send.
+# A shell that starts the tests in the background makes them ignore Ctrl-C, which some tests send.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 #: Scripts that made kept data, or that other programs run, are no tests: they need what is not here.

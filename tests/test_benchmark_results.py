@@ -11,8 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
-#: Commits by the results that name them: they went when history was written anew, or were not clean. To be rerun;
-#: none may be added.
+#: Results whose commit is not in the history (rewritten, or not clean): to be measured again; none may be added.
 TO_BE_RERUN: dict[str, str] = {
     "demo.json": "325fc11",
 }

@@ -1,4 +1,4 @@
-"""Which results of benchmarks are older than what they measure: that the list is made right, never that it is short."""
+"""The list of benchmark results that are older than the code they measure: it is correct; its length is no failure."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def run(*, quick):
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A benchmark with a result of this very code, one without a result."""
+    """A benchmark with a result of the current code, and one without a result."""
     (tmp_path / "results").mkdir()
     (tmp_path / "fast.py").write_text(BENCHMARK.replace("distance_of", "victor_purpura"))
     (tmp_path / "other.py").write_text(BENCHMARK.replace("distance_of", "van_rossum"))
     (tmp_path / "_shared.py").write_text("def often(run):\n    return 3  # times\n")
-    from taxel.report.provenance import installed
+    from taxel.report import installed_sources
 
-    parts = installed(*sorted(tmp_path.glob("*.py"))).parts("fast")
+    parts = installed_sources(*sorted(tmp_path.glob("*.py"))).parts("fast")
     assert {"fast", "_shared", "taxel.metrics.victor_purpura"} <= parts.keys()
     (tmp_path / "results" / "fast.json").write_text(json.dumps({"made_of": parts}))
     return tmp_path
@@ -72,7 +72,7 @@ PEER = "import json, sys\nprint(json.dumps({'cpu_s': float(sys.argv[1]), 'verdic
 
 @pytest.fixture
 def peer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A peer that says how long it took, waited for; what is kept is a file of the test's."""
+    """A peer that reports its time, with a file of the test for saved times."""
     monkeypatch.setattr(_peer, "KEPT", tmp_path / "peers.json")
     monkeypatch.setenv(_peer.PATIENT, "1")
     (tmp_path / "slow.py").write_text(PEER)
@@ -83,7 +83,7 @@ def ask(peer: str, seconds: float, *, quick: bool = False) -> dict[str, object]:
     return _peer.ask(peer, seconds, packages="numpy", limit=900, quick=quick)
 
 
-def test_the_time_of_a_peer_that_needs_minutes_is_kept_and_said_to_be(peer: str) -> None:
+def test_the_time_of_a_peer_that_needs_minutes_is_saved_and_marked_as_saved(peer: str) -> None:
     assert "kept" not in ask(peer, 300.0)
     again = ask(peer, 300.0)
     assert again["cpu_s"] == 300.0
@@ -92,12 +92,12 @@ def test_the_time_of_a_peer_that_needs_minutes_is_kept_and_said_to_be(peer: str)
     assert "kept" not in ask(peer, 300.0, quick=True)
 
 
-def test_what_is_quick_is_measured_each_time(peer: str) -> None:
+def test_a_quick_peer_is_measured_each_time(peer: str) -> None:
     ask(peer, 3.0)
     assert "kept" not in ask(peer, 3.0)
 
 
-def test_a_kept_time_counts_on_its_processor_and_of_its_code_alone(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_saved_time_counts_only_on_its_processor_and_for_its_code(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
     ask(peer, 300.0)
     Path(peer).write_text(PEER + "# a comment\n")
     assert "kept" in ask(peer, 300.0)
@@ -113,7 +113,7 @@ def test_a_kept_time_counts_on_its_processor_and_of_its_code_alone(peer: str, mo
     assert ask(peer, 300.0)["verdict"] == "infeasible"
 
 
-def test_a_peer_that_is_not_waited_for_is_not_kept(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_time_of_a_peer_that_was_stopped_is_not_saved(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(_peer.PATIENT)
     ask(peer, 300.0)
     assert not _peer.KEPT.exists()

@@ -1,4 +1,4 @@
-"""The command line speaks of what was typed, in one line, and its exit codes are those of the docs."""
+"""Errors of the command line name the option that was typed, in one line; exit codes are those of the docs."""
 
 import os
 import re
@@ -18,7 +18,7 @@ from taxel.live import send
 
 DOCS = Path(__file__).parent.parent / "docs"
 
-#: Words of parsers and of Python that no user should have to know.
+#: Words of parsers and of Python that no message to a user should contain.
 FOREIGN = (
     r"invalid type|unable to parse|invalid value|expected|`|Traceback|_core|overwrite=|NoneType|Input should be|"
     r"taxel\.[A-Z]"
@@ -34,7 +34,7 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, s
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a recording, labels and a readout that wants a tare."""
+    """A folder with a recording, labels and a readout that needs a tare."""
     monkeypatch.chdir(tmp_path)
     array = taxel.Array(4, 4, name="small")
     t = np.arange(0, 2_000_000, 1000)
@@ -123,7 +123,7 @@ def test_an_error_names_what_was_typed(here: Path, capsys, arguments: tuple[str,
 
 
 @pytest.mark.usefixtures("here")
-def test_an_existing_file_stays_where_a_result_would_go(capsys) -> None:
+def test_an_existing_file_is_not_replaced_by_a_result(capsys) -> None:
     call(capsys, "train", "walk.npz", "--labels", "labels.csv", "-o", "there.json")
     assert Path("there.json").read_text() == "{}"
 
@@ -133,21 +133,21 @@ def test_exit_codes_are_those_of_the_docs() -> None:
     assert set(re.findall(r"^\| (\d+) \|", table, re.MULTILINE)) == {"0", "2", "3", "130"}
 
 
-def test_localhost_is_one_place_to_who_sends_and_who_listens() -> None:
+def test_localhost_is_the_same_address_for_sender_and_receiver() -> None:
     with taxel.live.Live(0, host="localhost") as live:
         assert live.address[0] == "127.0.0.1"
         sent = send([b"12345"], "localhost", live.address[1], seconds=0.01)
     assert live.stop().counters["capture"]["datagrams"] == sent["datagrams"]
 
 
-def test_a_datagram_that_udp_cannot_carry_is_said_as_such() -> None:
+def test_a_datagram_that_is_too_large_for_udp_is_named_in_the_error() -> None:
     with pytest.raises(OSError, match="a datagram of 70000 bytes: UDP carries at most 65507"):
         send([bytes(70_000)], port=9, seconds=0.01)
 
 
 @pytest.mark.parametrize("segment", [True, False])
-def test_a_datagram_larger_than_the_paths_mtu_is_said_as_such(segment: bool) -> None:
-    """In a network of its own, whose loopback takes 1000 bytes."""
+def test_a_datagram_larger_than_the_paths_mtu_is_named_in_the_error(segment: bool) -> None:
+    """In a network namespace whose loopback has an MTU of 1000 bytes."""
     script = (
         "import socket, taxel.live as live\n"
         "with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:\n"

@@ -1,4 +1,4 @@
-"""CONTRIBUTING is true: by its own pieces a copy gets a format, study and learner; without one a test says which."""
+"""The code in CONTRIBUTING works: added to a copy it gives a format, a study and a learner; a missing part is named."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 FORMAT, STUDY, LEARNER = "channel", "quiet", "echo"
-#: Where the laws and registries of formats, studies and learners are tried.
+#: The tests that check the laws and registries of formats, studies and learners.
 TESTS = {
     FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
     STUDY: [
-        f"studies/tests/{name}.py" for name in ("test_registry", "test_quiet", "test_studies", "test_public_names")
+        f"studies/tests/{name}.py"
+        for name in ("test_study_registry", "test_quiet", "test_studies", "test_public_names")
     ],
     LEARNER: ["tests/learn/test_manners.py", "tests/learn/test_echo.py"],
 }
 
 
 class Piece(NamedTuple):
-    """A fenced piece of CONTRIBUTING that begins with where it goes."""
+    """A fenced piece of CONTRIBUTING, whose first line names its file."""
 
     path: str
     after: str
@@ -47,7 +48,7 @@ def of(name: str) -> list[Piece]:
 
 
 def add(root: Path, piece: Piece) -> None:
-    """Do what CONTRIBUTING says."""
+    """Add a piece as CONTRIBUTING says."""
     file = root / piece.path
     if not piece.after:
         assert not file.exists(), f"{piece.path} is there already"
@@ -62,7 +63,7 @@ def add(root: Path, piece: Piece) -> None:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """A copy of what these tests need: the package, its tests, their settings."""
+    """A copy of the package, its tests and their settings."""
     unneeded = shutil.ignore_patterns("__pycache__", "*.so", ".hypothesis")
     shutil.copytree(ROOT / "python", tmp_path / "python", ignore=unneeded)
     for compiled in (ROOT / "python" / "taxel").glob("_core*.so"):
@@ -71,15 +72,15 @@ def copy(tmp_path: Path) -> Path:
     for room in ("formats", "learn"):
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    # Pages that studies name.
+    # Studies refer to pages of the documentation.
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("_build", "pictures"))
     return tmp_path
 
 
 def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
-    """Run the tests that it has to pass, as far as they are about it or about the registry."""
-    tests = [test for test in TESTS[name] if (root / test).exists()]
-    # A line that is left out may spoil one file's imports: the others say what is missing.
+    """Run the tests of a format, study or learner, and those of its registry."""
+    tests = [test for test in TESTS[name] if (root / test).exists() or name not in test]
+    # A missing line may break the imports of one test file; the other files then name it.
     quietly = ["-q", "-p", "no:cacheprovider", "--continue-on-collection-errors"]
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
     about = {STUDY: f"{name} or registry or without_weight", LEARNER: "echo or Echo or nothing_is_left_out"}
@@ -143,7 +144,7 @@ def test_a_part_that_is_left_out_is_named(copy: Path, name: str, without: str, s
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A whole copy with the learner's pieces, and its compiled part built from them."""
+    """A whole copy with the learner's pieces, whose extension is built from them."""
     root = tmp_path_factory.mktemp("built")
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     for name in tracked:
@@ -151,7 +152,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copy(ROOT / name, root / name)
     for piece in of(LEARNER):
         add(root, piece)
-    # What the checkout built of others' crates is built already.
+    # Dependencies are not built again: the copy uses the checkout's.
     made = ["build", "--release", "--quiet", "--target-dir", str(ROOT / "target"), "--out", str(root / "wheel")]
     subprocess.run([Path(sys.executable).with_name("maturin"), *made], cwd=root, check=True, capture_output=True)
     (wheel,) = (root / "wheel").glob("*.whl")

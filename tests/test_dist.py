@@ -1,4 +1,4 @@
-"""What `make dist` builds: a source package that is whole, a wheel that runs without cargo and the checkout."""
+"""`make dist` builds a complete source package, and a wheel that runs without cargo and without the checkout."""
 
 import os
 import re
@@ -64,7 +64,7 @@ def test_the_source_package_holds_what_a_build_needs_and_no_more() -> None:
 
 
 class Bare:
-    """An environment that has nothing but pip, and no view of the checkout."""
+    """An environment with pip alone, which cannot import from the checkout."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.bin = folder, folder / "bare" / "bin"

@@ -1,4 +1,4 @@
-"""The documentation's Python runs, each page in a folder of its own; tutorials show what they print and draw."""
+"""The Python code of the documentation runs, each page in its own folder; tutorials show its output and pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one door between Rust and Python: errors, panics, Ctrl-C, the GIL."""
+"""The boundary between Rust and Python: errors, panics, Ctrl-C, the GIL, threads and forks."""
 
 import json
 import os
@@ -38,7 +38,7 @@ def test_a_panic_is_an_error_that_asks_for_a_report(capfd):
     capfd.readouterr()
 
 
-def test_a_call_that_was_told_to_stop_raises_keyboard_interrupt():
+def test_a_stopped_call_raises_keyboard_interrupt():
     with pytest.raises(KeyboardInterrupt):
         _core.test_hook("interrupted")
 
@@ -56,7 +56,7 @@ def test_ctrl_c_ends_a_long_call_promptly():
 
 
 def test_another_thread_runs_while_a_call_waits():
-    """The GIL is let go: this thread wakes the signal that ends the wait of the main thread."""
+    """The GIL is released: this thread sends the signal that ends the wait of the main thread."""
     woken = []
 
     def interrupt():
@@ -258,7 +258,7 @@ def test_a_forked_child_neither_writes_its_parents_recording_nor_waits_for_it(tm
 
 
 def test_what_progress_raises_ends_a_fit_that_keeps_its_best():
-    """A fit stopped at its first round is not solved: it did not run on."""
+    """A fit stopped at its first round is not solved, which shows that it did not continue."""
     rng = np.random.default_rng(3)
     trains = taxel.SpikeTrains.from_lists([np.sort(rng.uniform(0, 2000, 12)) for _ in range(150)], stop=2000.0)
     targets = [np.arange(100.0, 1900.0, 45.0)]

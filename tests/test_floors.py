@@ -1,4 +1,4 @@
-"""The house stands: what `lint-imports` cannot see of the floors that pyproject.toml lists.
+"""The layers of imports that pyproject.toml lists, as far as `lint-imports` cannot check them.
 
 It takes imports of a package for imports of all that lies in it, so it is told to overlook those of `taxel` itself.
 """
@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PYTHON = ROOT / "python"
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
-#: Who may import `taxel` itself: those above all that it re-exports.
+#: Modules that may import `taxel` itself: those above all modules that it re-exports.
 TOP = ("taxel.cli", "taxel.demo")
 
 
@@ -52,8 +52,8 @@ def test_only_what_stands_on_top_imports_the_package_itself(module: str) -> None
         assert name != "taxel" or module.startswith(TOP), f"{module}, line {node.lineno}: imports taxel itself"
 
 
-def test_no_module_comes_back_to_itself_by_way_of_a_package() -> None:
-    """A package that takes from its modules must not be taken from by them, not for types either."""
+def test_no_module_imports_itself_by_way_of_a_package() -> None:
+    """The modules that a package imports from must not import from that package, not for types either."""
     above = {module: {name for name, _ in imports(module) if name != module} for module in MODULES}
     while above:
         done = [module for module, names in above.items() if not names & above.keys()]
@@ -62,7 +62,7 @@ def test_no_module_comes_back_to_itself_by_way_of_a_package() -> None:
             del above[module]
 
 
-#: Who reckons with thousands that are no us and ms, and why.
+#: Modules that multiply or divide by 1000 for another reason than us and ms, and the reason.
 THOUSANDS = {
     "taxel.spikes.units": "the home of us and ms",
     "taxel.spikes.exchange": "NWB counts in seconds",
@@ -91,12 +91,12 @@ def thousands(module: str) -> list[int]:
 
 
 @pytest.mark.parametrize("module", MODULES)
-def test_us_and_ms_are_turned_into_each_other_in_one_place(module: str) -> None:
-    """`taxel.spikes.to_ms` and `to_us`: whoever reckons with other thousands says so above."""
+def test_us_and_ms_are_converted_in_one_place(module: str) -> None:
+    """By `taxel.spikes.to_ms` and `to_us`; modules with other factors of 1000 are listed above."""
     known = any(f"{module}.".startswith(f"{name}.") for name in THOUSANDS)
     assert known or not thousands(module), f"{module}, lines {thousands(module)}: take to_ms or to_us of taxel.spikes"
 
 
-def test_who_is_listed_for_thousands_has_some() -> None:
+def test_a_module_that_is_listed_has_a_factor_of_1000() -> None:
     for name in THOUSANDS:
         assert any(thousands(module) for module in MODULES if f"{module}.".startswith(f"{name}."))

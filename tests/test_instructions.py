@@ -1,4 +1,4 @@
-"""TAXEL_INSTRUCTIONS names the widest vector instructions that may be used; what is not there is refused."""
+"""TAXEL_INSTRUCTIONS names the widest vector instructions to use; a set that the processor lacks is refused."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from taxel import _core
 
 NAMES = ["plain", "avx2", "avx512", "avx512_bytes"]
-#: Decodes words of both versions' kinds and encodes them, and prints what came out.
+#: A script that decodes words of both versions and encodes them, and prints the results.
 WORK = """
 import numpy as np, taxel
 from taxel import _core
@@ -39,7 +39,7 @@ def run(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_set_that_is_there_caps_the_dispatch_and_changes_no_result(name: str) -> None:
+def test_an_available_set_caps_the_dispatch_and_changes_no_result(name: str) -> None:
     done = run(name, "-c", WORK)
     widest = NAMES.index(subprocess.run(
         [sys.executable, "-c", "from taxel import _core; print(_core.instructions())"],

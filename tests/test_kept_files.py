@@ -1,4 +1,4 @@
-"""Files that an earlier taxel wrote (commit d9d9c97) are read as they stand: recordings, tare, recipes, readouts."""
+"""Files that an earlier taxel wrote (commit d9d9c97) can still be read: recordings, tare, recipes, readouts."""
 
 import json
 import warnings
@@ -20,7 +20,7 @@ def events() -> taxel.Events:
 
 
 @pytest.mark.parametrize("ending", ["csv", "lsa", "mcap"])
-def test_a_recording_holds_what_it_held(ending, events):
+def test_a_recording_has_the_same_contents(ending, events):
     held = taxel.open(KEPT / f"touches.{ending}", array=events.array).events
     for column in ("t", "x", "y", "p"):
         assert np.array_equal(getattr(held, column), getattr(events, column)), column
@@ -32,7 +32,7 @@ def test_a_tare_is_that_of_the_recording(events):
     assert tare == taxel.Tare.take(events, stop_us=1_500_000)
 
 
-def test_a_readout_says_what_it_said(events):
+def test_a_readout_gives_the_same_detections(events):
     readout = taxel.Readout.load(KEPT / "readout.json")
     found = taxel.detect.run(readout, events, tare=taxel.Tare.load(KEPT / "tare.json"))
     assert (list(found.label), found.t.tolist()) == (SAID["label"], SAID["t"])
@@ -43,7 +43,7 @@ def test_the_demo_s_readout_loads():
     assert set(taxel.Readout.load(KEPT / "demo_readout.json").neurons) == {"contact", "lift"}
 
 
-def test_a_recipe_trains_what_it_trained(events):
+def test_a_recipe_trains_the_same_weights(events):
     recipe = Recipe.load(KEPT / "touch.toml")
     example = Example(events, {"contact": [2_000_000, 3_000_000, 4_000_000]}, taxel.Tare.load(KEPT / "tare.json"))
     with warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""Parameters live once: defaults and ranges are the compiled part's, and every class with some has the manners."""
+"""Parameters are defined once, in the compiled part; every class with parameters follows scikit-learn's conventions."""
 
 import ast
 import copy
@@ -28,7 +28,7 @@ def of(kind: type[Parameters]) -> Iterator[type[Parameters]]:
 
 #: Every class with parameters.
 KINDS = sorted(set(of(Parameters)), key=lambda kind: kind.__name__)
-#: What has no default, for those that ask for some.
+#: Values for parameters without a default.
 REQUIRED: dict[str, Any] = {
     "levels": [1.0],
     "eta": 0.1,
@@ -57,7 +57,7 @@ def ranged() -> list[Any]:
 
 
 def test_every_class_with_parameters_is_found():
-    """What is public and has parameters is of the one base."""
+    """Every public class with parameters has the same base class."""
     named = {kind.__name__ for kind in KINDS}
     assert {"Neuron", "RunningRange", *Encoders} <= named
 
@@ -101,7 +101,7 @@ def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
 
 
 def documented(kind: Any, name: str) -> str:
-    """What the documentation says of a parameter, where need be that of the class that it refers to."""
+    """The documentation of a parameter, or that of the class that it refers to."""
     lines = inspect.getdoc(kind).split("Attributes\n")[0].split("Returns\n")[0].splitlines()
     (place,) = (k for k, line in enumerate(lines) if re.match(rf"(\w+, )*{name}\b(, \w+)*( : |$)", line))
     there = re.search(r"[Aa]s (?:in|for) `(\w+)`", " ".join(lines[place + 1 : place + 3]))
@@ -125,7 +125,7 @@ def test_the_documentation_says_the_table_s_range_and_unit(kind, name):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_words_of_a_choice_are_the_compiled_part_s(kind):
-    """A word that is none of those that the type names is refused by a list of just these."""
+    """A value that the type does not list is refused with the list of valid ones."""
     for name, hint in get_type_hints(kind).items():
         words = [word for part in (hint, *get_args(hint)) for word in get_args(part) if isinstance(word, str)]
         if not words or name not in inspect.signature(kind).parameters:
@@ -138,7 +138,7 @@ def test_the_words_of_a_choice_are_the_compiled_part_s(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_parameters_go_round(kind):
-    """`get_params` to a new one, a copy, a pickle; a constructor holds the very objects that it was given."""
+    """By `get_params`, a copy and a pickle; a constructor keeps the objects that it was given."""
     one = make(kind)
     again = type(one)(**one.get_params(deep=False))
     for other in (again, copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
@@ -151,7 +151,7 @@ def test_parameters_go_round(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_wrong_value_leaves_all_as_it_was(kind):
+def test_a_wrong_value_changes_nothing(kind):
     one = make(kind)
     known = described(kind._kind)
     before, name = one.get_params(), next(iter(known["ranges"] or known["defaults"]))
@@ -171,7 +171,7 @@ def test_a_group_that_two_share_is_never_changed():
     assert two.running_range is held
 
 
-def test_a_representation_tells_what_differs_from_the_default():
+def test_a_representation_shows_what_differs_from_the_default():
     assert repr(taxel.Neuron()) == "Neuron()"
     assert repr(taxel.Neuron(tau=15)) == "Neuron()"
     assert repr(taxel.Neuron(tau=10.0, time="grid")) == "Neuron(tau=10.0, time='grid')"
@@ -197,7 +197,7 @@ def test_python_types_no_default_of_a_parameter():
 
 
 def test_python_compares_no_parameter_with_a_number():
-    """A range is the compiled part's: no class with parameters compares one of its own with a number."""
+    """Ranges are checked in the compiled part: no Python class compares one of its parameters with a number."""
     typed = []
     for kind in KINDS:
         path = Path(inspect.getsourcefile(kind))

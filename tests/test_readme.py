@@ -1,4 +1,4 @@
-"""What the README and the docs tell to type: the README's way works, of every other line command and options exist."""
+"""Shell commands of README and docs: those of the README work in order; of all others command and options exist."""
 
 import os
 import re
@@ -22,7 +22,7 @@ LOOPBACK = "127.0.0.1"
 
 
 def shell_lines(page: Path) -> list[str]:
-    """Return what a page tells to type, without comments."""
+    """Return the shell commands of a page, without comments."""
     blocks = re.findall(r"^```(?:sh|bash|shell|console)?\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
     lines = [re.sub(r"\s+#.*", "", line).strip() for block in blocks for line in block.splitlines()]
     return [line for line in lines if re.match(r"(taxel|make|source|pip|cargo|\.venv/bin/taxel) ", line)]
@@ -46,7 +46,7 @@ CASES = [(page, line) for page in PAGES for line in [*shell_lines(page), *inline
 def test_a_line_to_type_names_a_command_and_options_that_exist(page: Path, line: str) -> None:
     program, *arguments = shlex.split(line.split(" | ", maxsplit=1)[0])
     if program == "make":
-        targets = re.findall(r"^([a-z0-9]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+        targets = re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
         assert {argument for argument in arguments if "=" not in argument} <= set(targets), page
     elif program.endswith("taxel"):
         check(typer.main.get_command(app), arguments, in_full=line in shell_lines(page))

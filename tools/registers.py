@@ -370,7 +370,7 @@ def javascript(source: Table) -> str:
                     said += f"${{{written}}}{words}"
             condition = broken(parsed(rule["holds"]), equal="===")
             lines.append(
-                f"  if ({condition}) said.push({{ rule: {rule['number']}, text: `{said} (rule {rule['number']})` }});"
+                f"  if ({condition}) broken.push({{ rule: {rule['number']}, text: `{said} (rule {rule['number']})` }});"
             )
         named = ", ".join(used(source, warns=warns))
         return f"  const {{ {named} }} = v;\n" + "\n".join(lines)
@@ -393,7 +393,7 @@ def javascript(source: Table) -> str:
  * @property {{string}} text
  *
  * @typedef {{Record<string, number>}} Values every field by name, in its unit, with steps, driven_lines and sense_lines
- * @typedef {{{{ rule: number, text: string }}}} Said
+ * @typedef {{{{ rule: number, text: string }}}} BrokenRule
  */
 
 /** @type {{readonly Field[]}} */
@@ -414,32 +414,32 @@ export const PRESETS = [
 const us = (units) => (units / 100).toFixed(2);
 
 /**
- * Every rule that refuses these registers, in the order in which the board tries them; it says the first.
+ * All rules that these registers break, in the order in which the board checks them; the board reports the first.
  * @param {{Values}} v
- * @returns {{Said[]}}
+ * @returns {{BrokenRule[]}}
  */
 export function refused(v) {{
-  /** @type {{Said[]}} */
-  const said = [];
+  /** @type {{BrokenRule[]}} */
+  const broken = [];
   for (const {{ name, least, greatest, unit }} of FIELDS) {{
     if (unit !== "flag" && (v[name] < least || v[name] > greatest)) {{
-      said.push({{ rule: 4, text: `${{name}} ${{v[name]}} does not fit: must be ${{least}} to ${{greatest}} (rule 4)` }});
+      broken.push({{ rule: 4, text: `${{name}} ${{v[name]}} does not fit: must be ${{least}} to ${{greatest}} (rule 4)` }});
     }}
   }}
 {rules(warns=False)}
-  return said;
+  return broken;
 }}
 
 /**
- * What is allowed but hardly meant.
+ * Rules that only warn: settings that are allowed but hardly intended.
  * @param {{Values}} v
- * @returns {{Said[]}}
+ * @returns {{BrokenRule[]}}
  */
 export function warned(v) {{
-  /** @type {{Said[]}} */
-  const said = [];
+  /** @type {{BrokenRule[]}} */
+  const broken = [];
 {rules(warns=True)}
-  return said;
+  return broken;
 }}
 """
 
@@ -471,23 +471,24 @@ def docs(source: Table) -> str:
     return f"""<!-- {HEAD} -->
 # Registers
 
-The board has eight 32-bit registers (thesis, Appendix 1, Table 5.5), each set as a whole by five bytes on the serial line
-(`taxel.wire.Command`). A *line* is the driven line, the outer step of the scan; a *step* is the multiplexer's, the inner
-one. The manual's names are aliases everywhere, in the manual's units.
+This page lists the board's registers, the rules that their values obey, and the presets. The board has eight 32-bit registers (thesis,
+Appendix 1, Table 5.5), each set as a whole by five bytes on the serial line (`taxel.wire.Command`). A *line* is a driven line, the outer
+loop of the scan; a *step* is one of the multiplexer, the inner loop. The manual's names are aliases everywhere, in the manual's units.
 
 | field | the manual's name | where | unit | at reset | range | what it is |
 |---|---|---|---|---|---|---|
 {newline.join(rows)}
 
-All other bits are reserved and written 0. REG6 holds nothing: writing a register's number (0 to 7) to it reads that register
-back, writing 8 makes the board greet again.
+All other bits are reserved and written 0. REG6 has no value: writing a register's number (0 to 7) to it reads that register back, and
+writing 8 makes the board identify itself as at reset.
 
 ## Rules
 
-The logic checks nothing; host and emulated board do, before a write. `steps` is how many multiplexer steps a line has,
-`driven_lines` and `sense_lines` are the array's columns and rows. Rule 4 is also that every value lies in its range.
+The logic of the board checks nothing; the host and the emulated board check these rules before a write. `steps` is the number of
+multiplexer steps for each line, `driven_lines` and `sense_lines` are the array's columns and rows. Rule 4 also says that every value is
+within its range.
 
-| rule | | what must hold |
+| rule | if broken | what must hold |
 |---|---|---|
 {newline.join(rules)}
 
@@ -497,18 +498,19 @@ The logic checks nothing; host and emulated board do, before a write. `steps` is
 |---|{"---|" * (len(keys) + 2)}
 {newline.join(presets)}
 
-A board of up to 64 lines resets to the first; a larger one to version 2 and *128 x 128, 1 kHz*, with 16 channels to
-*128 x 128, 1.3 kHz*, its lines and steps fitted to the array. *wire* is what a board speaks that begins with the preset. Who sets a board that
-runs to a preset by its name (`taxel device apply`, the panel) leaves the version that it speaks, and the channels, which are its build.
+A board of up to 64 lines resets to the first preset. A larger one resets to wire version 2 and *128 x 128, 1 kHz*, or with 16 channels to
+*128 x 128, 1.3 kHz*, with lines and steps fitted to the array. *wire* is the version of a board that starts with the preset. Applying a preset
+to a running board by its name (`taxel device apply`, the panel) changes neither its version nor its channels, which are fixed in hardware.
 
 ## FA-1 on the board
 
 With `mechanoreceptor` set each taxel is the FA-1 afferent of 5.4.2, in whole numbers of 2^-{law["fraction_bits"]}. The compression 5.1
-is a table of {law["entries"]} entries, `round(ticks ** {law["exponent"]} * 2 ** {law["fraction_bits"]})`; ticks beyond it count as the
-last. theta_0 is `threshold_rest` 1/1024; a spike raises the threshold by `threshold_jump * theta_0 / 256`, a quiet frame lowers
+is a table of {law["entries"]} entries, `round(ticks ** {law["exponent"]} * 2 ** {law["fraction_bits"]})`; larger values use the
+last entry. theta_0 is `threshold_rest` 1/1024; a spike raises the threshold by `threshold_jump * theta_0 / 256`, a quiet frame lowers
 it by `threshold_decay * theta_0 / 1024` while it lies above theta_0, else sets it to theta_0; both are rounded down. The first
-frame in this mode counts as what had always been. An event is a spike: `Pol` is its sign, the intensity word the size of the
-integral in 1/1024, 65535 at most. A spike that finds the queue full is dropped and counted; the afferent has fired all the same.
+frame in this mode is taken as the state since ever, so it gives no event. An event is a spike: `Pol` is its sign, the intensity word the size of the
+integral in 1/1024, 65535 at most. If the queue is full, the spike is dropped and counted, and the afferent is
+reset as after any spike.
 """
 
 

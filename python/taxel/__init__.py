@@ -8,10 +8,10 @@ from taxel._core import DeviceError, Error, FormatError, NotFittedError, Problem
 from taxel.array import Array
 from taxel.calibration import Calibration, Load
 from taxel.clock import Clock
-from taxel.detections import Detections
+from taxel.detections import Detection, Detections
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.labels import Label, Labels
+from taxel.labels import Labels, Note
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
@@ -19,7 +19,7 @@ from taxel.tare import Tare
 if TYPE_CHECKING:
     from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire
     from taxel.detect import Readout
-    from taxel.recording import BoardChange, Datagrams, Note, Recording, Zeroing
+    from taxel.recording import BoardChange, Datagrams, Recording, Zeroing
     from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
     from taxel.recording.convert import convert
     from taxel.recording.cut import cut
@@ -34,6 +34,7 @@ __all__ = [
     "Calibration",
     "Clock",
     "Datagrams",
+    "Detection",
     "Detections",
     "DeviceError",
     "Error",
@@ -41,7 +42,6 @@ __all__ = [
     "FormatError",
     "Frames",
     "Health",
-    "Label",
     "Labels",
     "Load",
     "Neuron",
@@ -79,7 +79,7 @@ _ROOMS = (
     "wire", "wire_v2",
 )  # fmt: skip
 _RECORDING = (
-    "BoardChange", "Datagrams", "Health", "Note", "Recording", "Zeroing", "convert", "cut", "health", "merge",
+    "BoardChange", "Datagrams", "Health", "Recording", "Zeroing", "convert", "cut", "health", "merge",
 )  # fmt: skip
 _ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
 _ELSEWHERE |= {"open": ("taxel.recording", "open_any"), "Readout": ("taxel.detect", "Readout")}
@@ -98,6 +98,8 @@ def __getattr__(name: str) -> Any:
         found = getattr(import_module(place), inside)
         globals()[name] = found
         return found
+    if name == "Label":  # its name until version 0.1
+        return import_module("taxel.labels")._label
     raise AttributeError(f"module 'taxel' has no attribute {name!r}")
 
 

@@ -91,7 +91,7 @@ class Array:
 
         Parameters
         ----------
-        x, y : int or int arrays
+        x, y : int or int64, shape (n,), taxels
             Column and row.
 
         Returns
@@ -101,6 +101,11 @@ class Array:
         Raises
         ------
         ProblemError : a column or row that the array has not, or shapes that do not fit
+
+        Examples
+        --------
+        >>> Array(4, 8).index([3, 0], [0, 1])
+        array([3, 8])
         """
         column, row = numbers("x", x, np.int64), numbers("y", y, np.int64)
         for name, place, end in (("x", column, self.columns), ("y", row, self.rows)):
@@ -113,6 +118,11 @@ class Array:
 
     def region(self, x: slice, y: slice) -> tuple[tuple[int, int], tuple[int, int]]:
         """Return first and last (exclusive) column and row of a rectangle of columns `x` and rows `y`.
+
+        Parameters
+        ----------
+        x, y : slice
+            Columns and rows, from the first to before the last; without a step.
 
         Raises
         ------

@@ -1,9 +1,10 @@
-"""What a readout said, and when it could have said it."""
+"""Detections of a readout: what, when, and when it could first be known."""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,57 +25,70 @@ from taxel._core import FormatError, ProblemError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Detections"]
+__all__ = ["Detection", "Detections"]
 
 _CSV = ("label", "t_us", "known_us", "slope_mv_per_ms")
 _SAID, _REPAIRED = "said_us", "repaired"
 
 
 class Detection(NamedTuple):
-    """Hold one thing that a readout said.
+    """Hold one detection of a readout, live or from a recording.
 
-    Attributes
+    Parameters
     ----------
     label : str
     t : int, us
-        When the event was.
+        When the event was, by the board's clock: the crossing less the encoder's latency and the trained delay.
     known : int, us
-        When it could first be said.
+        When it could first be detected: the end of the board's frame in which the potential crosses.
     slope : float, mV/ms
-        How steeply the potential rose above its threshold; NaN where that is not known.
-    said : int, us, or None
-        When it was said, where that is known.
+        How steeply the potential crossed its threshold, as a measure of how sure; NaN where that is not known.
+    said : int, us, optional
+        When it was reported, by the host's clock less the estimated offset between the clocks.
+    said_ns : int, ns since 1970, optional
+        The same by the host's clock; of a detection that is reported live.
     repaired : bool
-        Whether it may rest on values that states repaired after a loss.
+        Whether it may rest on values that states of wire version 2 repaired after a loss.
+
+    Examples
+    --------
+    >>> Detection("contact", 1000, 1344, 0.8, said=1500).latency
+    156
     """
 
     label: str
     t: int
     known: int
-    slope: float
-    said: int | None
+    slope: float = math.nan
+    said: int | None = None
+    said_ns: int | None = None
     repaired: bool = False
+
+    @property
+    def latency(self) -> int | None:
+        """How long after `known` it was reported, us; None where that is not known."""
+        return None if self.said is None else self.said - self.known
 
 
 class Detections(Columns):
-    """Hold what a readout said: label, time of the event, time at which it could be said, and how surely.
+    """Hold what a readout detected: label, time of the event, time at which it could be known, and how surely.
 
     All times are us of the board's clock.
 
     Parameters
     ----------
-    label : str, shape (n,)
+    label : str, shape (n,), text
     t : int64, shape (n,), us
         When the event was: the crossing less the encoder's latency and the trained delay.
     known : int64, shape (n,), us
-        When it could first be said: the end of the frame in which the potential crosses.
+        When it could first be known: the end of the frame in which the potential crosses.
     slope : float, shape (n,), mV/ms, optional
         How steeply the potential rose above its threshold, as a measure of how sure; None for one that has none. Read
         back as NaN, also where it is left out.
     said : int64, shape (n,), us, optional
-        When it was said, by the host's clock less the estimated offset.
+        When it was reported, by the host's clock less the estimated offset.
     repaired : bool, shape (n,), optional
-        Whether it may rest on values that states of wire version 2 repaired after a loss: what it tells may have
+        Whether it may rest on values that states of wire version 2 repaired after a loss: what it reports may have
         happened before `t`. None where it is left out.
 
     Raises
@@ -161,7 +175,9 @@ class Detections(Columns):
     def __iter__(self) -> Iterator[Detection]:
         said = [None] * len(self) if self.said is None else self.said.tolist()
         columns = (self.label, self.t, self.known, self.slope)
-        return map(Detection, *(column.tolist() for column in columns), said, self.repaired.tolist())
+        return map(
+            Detection, *(column.tolist() for column in columns), said, [None] * len(self), self.repaired.tolist()
+        )
 
     @overload
     def __getitem__(self, chosen: int) -> Detection: ...
@@ -184,7 +200,21 @@ class Detections(Columns):
         return Detections._of(label, t, known, slope, said, self.repaired[places])
 
     def between(self, start: float, stop: float) -> Detections:
-        """Return the detections of ``start <= t < stop`` (us)."""
+        """Return the detections of ``start <= t < stop`` (us).
+
+        Parameters
+        ----------
+        start, stop : float, us
+
+        Raises
+        ------
+        ProblemError : a start that lies after the stop, or is no number
+
+        Examples
+        --------
+        >>> len(Detections(["a", "b"], [10, 20], [11, 22]).between(15, 25))
+        1
+        """
         start, stop = window("us", start, stop)
         return self[(self.t >= start) & (self.t < stop)]
 
@@ -238,9 +268,19 @@ class Detections(Columns):
     def from_numpy(cls, records: NDArray[np.void]) -> Detections:
         """Build detections from records with the fields ``label t known slope``, and ``said``, ``repaired`` if there.
 
+        Parameters
+        ----------
+        records : structured array, shape (n,), with the units of the columns
+
         Raises
         ------
         ProblemError : a field is missing (names it)
+
+        Examples
+        --------
+        >>> found = Detections(["a"], [10], [11])
+        >>> Detections.from_numpy(found.to_numpy())
+        Detections(1: a 1; 10 to 10 us)
         """
         names = fields(records, ("label", "t", "known", "slope"))
         said, repaired = (records[name] if name in names else None for name in ("said", _REPAIRED))
@@ -248,6 +288,16 @@ class Detections(Columns):
 
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write a table ``label,t_us,known_us,slope_mv_per_ms[,said_us][,repaired]`` and return its path.
+
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
 
         Raises
         ------
@@ -272,10 +322,21 @@ class Detections(Columns):
     def from_csv(cls, path: str | os.PathLike[str]) -> Detections:
         """Read a table that `to_csv` wrote.
 
+        Parameters
+        ----------
+        path : path
+
         Raises
         ------
         FormatError : another header, or a value that makes no sense (names the line)
         FileNotFoundError : no such file
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> place = Detections(["a"], [10], [11]).to_csv(Path(tempfile.mkdtemp()) / "found.csv")
+        >>> Detections.from_csv(place)
+        Detections(1: a 1; 10 to 10 us)
         """
         place = Path(checked_path("path", path))
         table = HeaderTable.read(place, text_of(place))
@@ -313,6 +374,10 @@ class Detections(Columns):
     @classmethod
     def from_neo(cls, events: Any) -> Detections:
         """Build detections from a ``neo.Event`` of any time unit that `to_neo` made.
+
+        Parameters
+        ----------
+        events : neo.Event
 
         Raises
         ------

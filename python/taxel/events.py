@@ -52,7 +52,7 @@ class Events(Columns):
     ----------
     t : int64, shape (events,), us
         Unwrapped time.
-    x, y : uint16, shape (events,)
+    x, y : uint16, shape (events,), taxels
         Column and row.
     p : bool, shape (events,)
         Polarity: more pressure (true) or less.
@@ -63,7 +63,7 @@ class Events(Columns):
     present : bool, shape (events,), optional
         Which events came with an intensity; all where it is left out.
     repaired : bool, shape (events,), optional
-        Which events a state of wire version 2 gave, because it differed from the held value: what they tell happened
+        Which events a state of wire version 2 gave, because it differed from the held value: what they report happened
         some time before `t`. None where no event is of that kind.
     markers : sequence of (t us, start), optional
         Starts (true) and stops (false) of a recording, as the board marked them.
@@ -130,14 +130,45 @@ class Events(Columns):
         return int(self.t.max() - self.t.min()) if len(self) else 0
 
     def between(self, start: float, stop: float) -> Events:
-        """Return the events of ``start <= t < stop`` (us), with the markers of that time."""
+        """Return the events of ``start <= t < stop`` (us), with the markers of that time.
+
+        Parameters
+        ----------
+        start, stop : float, us
+
+        Raises
+        ------
+        ProblemError : a start that lies after the stop, or is no number
+
+        Examples
+        --------
+        >>> events = Events([0, 192], [3, 4], [5, 5], [True, False], array=Array(8, 8))
+        >>> events.between(100, 200).t
+        array([192])
+        """
         start, stop = window("us", start, stop)
         kept = self[(self.t >= start) & (self.t < stop)]
         kept.markers = tuple(m for m in self.markers if start <= m[0] < stop)
         return kept
 
     def region(self, x: slice, y: slice) -> Events:
-        """Return the events of a rectangle of columns `x` and rows `y` (slices without a step); the array stays."""
+        """Return the events of a rectangle of columns `x` and rows `y` (slices without a step); the array stays.
+
+        Parameters
+        ----------
+        x, y : slice
+            Columns and rows, without a step.
+
+        Raises
+        ------
+        ProblemError : no slices of whole numbers, or one with a step
+
+        Examples
+        --------
+        >>> events = Events([0, 192], [3, 4], [5, 5], [True, False], array=Array(8, 8))
+        >>> events.region(slice(4, 8), slice(None)).x
+        array([4], dtype=uint16)
+        """
         columns, rows = self.array.region(x, y)
         inside = (self.x >= columns[0]) & (self.x < columns[1]) & (self.y >= rows[0]) & (self.y < rows[1])
         return self[inside]
@@ -260,9 +291,20 @@ class Events(Columns):
     def from_numpy(cls, records: NDArray[np.void], array: Array) -> Events:
         """Build events from records with the fields ``t x y p``, and ``intensity present repaired`` if there.
 
+        Parameters
+        ----------
+        records : structured array, shape (events,), with the units of the columns
+        array : Array
+
         Raises
         ------
         ProblemError : a field is missing (names it)
+
+        Examples
+        --------
+        >>> events = Events([0, 192], [3, 4], [5, 5], [True, False], array=Array(8, 8))
+        >>> Events.from_numpy(events.to_numpy(), Array(8, 8)) == events
+        True
         """
         names = fields(records, ("t", "x", "y", "p"))
         extra: dict[str, Any] = {n: records[n] for n in ("intensity", "present", "repaired") if n in names}
@@ -285,7 +327,23 @@ class Events(Columns):
 
     @classmethod
     def from_tonic(cls, records: NDArray[np.void], array: Array) -> Events:
-        """Build events from tonic's event array."""
+        """Build events from tonic's event array.
+
+        Parameters
+        ----------
+        records : structured array, shape (events,), t in us
+        array : Array
+
+        Raises
+        ------
+        ProblemError : a field is missing (names it), or an event outside the array
+
+        Examples
+        --------
+        >>> events = Events([0, 192], [3, 4], [5, 5], [True, False], array=Array(8, 8))
+        >>> Events.from_tonic(events.to_tonic(), Array(8, 8)) == events
+        True
+        """
         return cls.from_numpy(records, array)
 
     def to_faery(self) -> NDArray[np.void]:
@@ -305,7 +363,23 @@ class Events(Columns):
 
     @classmethod
     def from_faery(cls, records: NDArray[np.void], array: Array) -> Events:
-        """Build events from faery's event array."""
+        """Build events from faery's event array.
+
+        Parameters
+        ----------
+        records : structured array, shape (events,), t in us
+        array : Array
+
+        Raises
+        ------
+        ProblemError : a field is missing (names it), or an event outside the array
+
+        Examples
+        --------
+        >>> events = Events([0, 192], [3, 4], [5, 5], [True, False], array=Array(8, 8))
+        >>> Events.from_faery(events.to_faery(), Array(8, 8)) == events
+        True
+        """
         fields(records, ("t", "x", "y", "on"))
         return cls(records["t"], records["x"], records["y"], records["on"], array=array)
 

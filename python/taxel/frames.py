@@ -98,6 +98,15 @@ class Frames(Columns):
         Raises
         ------
         ProblemError : events without intensities, a period below 1 us, or held values of another array
+
+        Examples
+        --------
+        >>> from taxel.events import Events
+        >>> events = Events([0, 150], [0, 1], [0, 0], [True, True], array=Array(1, 2), intensity=[5, 7])
+        >>> Frames.from_events(events, 100, 0, 250).values[:, 0]
+        array([[5., 0.],
+               [5., 0.],
+               [5., 7.]], dtype=float32)
         """
         instance("events", events, Events)
         if events.intensity is None or events.present is None:
@@ -114,24 +123,11 @@ class Frames(Columns):
                 f"shorter stretch or a period longer than {period} us"
             )
         t = np.arange(pictures, dtype=np.int64) * period + first
-        values = _zeros(len(t), array)
-        there = np.flatnonzero(events.present)
-        order = there[np.argsort(events.t[there], kind="stable")]
-        index = array.index(events.x[order], events.y[order])
-        place = np.searchsorted(t, events.t[order], side="left")
-        now = np.zeros(array.rows * array.columns, np.float32)
-        if held is not None:
-            begins = kept_numbers("held", held, np.float32)
-            if begins.shape != array.shape:
-                raise ProblemError(f"held has shape {begins.shape}: must have the array's, {array.shape}")
-            now[:] = begins.reshape(-1)
-        bounds = np.searchsorted(place, np.arange(len(t) + 1), side="left")
-        for k in range(len(t)):
-            new = slice(bounds[k], bounds[k + 1])
-            now[index[new]] = events.intensity[order[new]]
-            values[k] = now
-        pictures_of = frozen(values).reshape(len(t), array.rows, array.columns)
-        return cls(pictures_of, frozen(t), unit="ticks", array=array)
+        begins = None if held is None else kept_numbers("held", held, np.float32)
+        if begins is not None and begins.shape != array.shape:
+            raise ProblemError(f"held has shape {begins.shape}: must have the array's, {array.shape}")
+        values = _core.HeldValues(events._parts(), None, None if begins is None else begins.reshape(-1)).at(t)
+        return cls(frozen(values).reshape(len(t), *array.shape), frozen(t), unit="ticks", array=array)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -143,12 +139,41 @@ class Frames(Columns):
         return Frames(self.values[chosen], self.t[chosen], unit=self.unit, array=self.array)
 
     def between(self, start: float, stop: float) -> Frames:
-        """Return the pictures of ``start <= t < stop`` (us)."""
+        """Return the pictures of ``start <= t < stop`` (us).
+
+        Parameters
+        ----------
+        start, stop : float, us
+
+        Raises
+        ------
+        ProblemError : a start that lies after the stop, or is no number
+
+        Examples
+        --------
+        >>> len(Frames([[[1.0]], [[2.0]]], [0, 100]).between(50, 150))
+        1
+        """
         first, last = np.searchsorted(self.t, window("us", start, stop))
         return self[int(first) : int(last)]
 
     def region(self, x: slice, y: slice) -> Frames:
-        """Return the pictures of a rectangle of columns `x` and rows `y`, as a smaller array."""
+        """Return the pictures of a rectangle of columns `x` and rows `y`, as a smaller array.
+
+        Parameters
+        ----------
+        x, y : slice
+            Columns and rows, without a step.
+
+        Raises
+        ------
+        ProblemError : no slices of whole numbers, one with a step, or no taxel
+
+        Examples
+        --------
+        >>> Frames([[[1.0, 2.0]]], [0]).region(slice(1, 2), slice(None)).values
+        array([[[2.]]], dtype=float32)
+        """
         columns, rows = self.array.region(x, y)
         values = self.values[:, slice(*rows), slice(*columns)]
         exists = None if self.array.exists is None else self.array.exists[slice(*rows), slice(*columns)]
@@ -169,6 +194,10 @@ class Frames(Columns):
         Returns
         -------
         float64, shape (n,), mm2
+
+        Raises
+        ------
+        ProblemError : a level below 0, or taxels whose pitch is not known
 
         Examples
         --------
@@ -199,6 +228,10 @@ class Frames(Columns):
         float64, shape (n, 2), mm
             x to the right and y downwards from the middle of the taxel in the first column and row; NaN where no taxel
             counts.
+
+        Raises
+        ------
+        ProblemError : a level below 0, or taxels whose pitch is not known
         """
         if not number("above", above) >= 0:
             raise ProblemError(f"above is {shown(above)}: must be 0 or more, as values are weights")
@@ -209,6 +242,11 @@ class Frames(Columns):
         centre = np.full(moments.shape, np.nan)
         np.divide(moments * self.array.pitch_mm, total, out=centre, where=total > 0)
         return centre
+
+    def _above(self, rest: NDArray[np.float64]) -> Frames:
+        """Return what the pictures read above the rest of each taxel, which is infinite where it is not known."""
+        above = _core.above_rest(np.ascontiguousarray(self.values).reshape(-1), np.ascontiguousarray(rest).reshape(-1))
+        return Frames(above.reshape(self.values.shape), self.t, unit=self.unit, array=self.array)
 
     def _loaded(self, above: float) -> NDArray[np.bool_]:
         threshold = number("above", above)
@@ -258,10 +296,3 @@ class Frames(Columns):
     def __repr__(self) -> str:
         time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
         return f"Frames({len(self)} pictures of {self.array.rows} x {self.array.columns} taxels, {time}, {self.unit})"
-
-
-def _zeros(pictures: int, array: Array) -> NDArray[np.float32]:
-    try:
-        return np.zeros((pictures, array.rows * array.columns), np.float32)
-    except MemoryError as error:
-        raise ProblemError(f"{pictures} pictures of {array!r} do not fit the memory ({error})") from None

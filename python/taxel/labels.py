@@ -1,12 +1,14 @@
-"""Reference events: what really happened when, as a table that a person or `taxel emulate --truth` wrote."""
+"""Notes and labels: what happened when, as people wrote it down, and tables of such reference events."""
 
 from __future__ import annotations
 
 import csv
 import os
+import warnings
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
 
-__all__ = ["TURN_US", "Label", "Labels", "ahead_us", "beside", "write_labels"]
+__all__ = ["TURN_US", "Labels", "Note", "ahead_us", "beside", "write_labels"]
 
 #: A whole turn of the board's 16-bit clock of 100 us, us.
 TURN_US = 6_553_600
@@ -28,24 +30,52 @@ TURN_US = 6_553_600
 _WANTED, _OTHERS = ("label", "t_us"), ("recording", "host_ns")
 
 
-class Label(NamedTuple):
-    """Say what happened when.
+@dataclass(frozen=True)
+class Note:
+    """Hold what happened when: a person's note in a recording, or the label of an event in a table.
 
-    Attributes
+    Parameters
     ----------
+    text : str
+        The note, or the label.
+    t : int, us, optional
+        By the board's clock, where that is known.
+    at_ns : int, ns since 1970
+        By the host's clock; 0 where that is not known.
     recording : str
-        Path, name or stem of the file in which it is; "" where the table is about one recording.
-    label : str
-    t_us : int, us
-        By the board's clock.
-    host_ns : int or None, ns since 1970
-        By the host's.
+        In a table of several recordings (`Labels`) the path, name or stem of the file; else "".
+
+    Examples
+    --------
+    >>> Note("left heel", 5000)
+    Note(text='left heel', t=5000, at_ns=0, recording='')
     """
 
-    recording: str
-    label: str
-    t_us: int
-    host_ns: int | None = None
+    text: str
+    t: int | None = None
+    at_ns: int = 0
+    recording: str = ""
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a field by the name that it had in `taxel.Label`, for one version."""
+        if name not in _OF_LABEL:
+            raise AttributeError(f"a Note has no {name!r}")
+        _warn(f"Label.{name} is Note.{_OF_LABEL[name]} now")
+        return getattr(self, _OF_LABEL[name])
+
+
+#: Fields of `Note` by the names that they had in `taxel.Label`.
+_OF_LABEL = {"label": "text", "t_us": "t", "host_ns": "at_ns"}
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, DeprecationWarning, stacklevel=3)
+
+
+def _label(recording: str, label: str, t_us: int, host_ns: int | None = None) -> Note:
+    """Return what was a `taxel.Label`, for one version."""
+    _warn("taxel.Label is taxel.Note now, whose fields are text, t, at_ns, recording")
+    return Note(label, t_us, host_ns or 0, recording)
 
 
 class Labels:
@@ -59,7 +89,7 @@ class Labels:
     Attributes
     ----------
     path : Path
-    rows : tuple of Label
+    rows : tuple of Note
 
     Raises
     ------
@@ -89,7 +119,16 @@ class Labels:
         return tuple(sorted({row.recording for row in self.rows} - {""}))
 
     def named(self, recording: str | os.PathLike[str]) -> str | None:
-        """Return as what the table names a recording: by its path, its name or its stem; None where it does not."""
+        """Return as what the table names a recording: by its path, its name or its stem; None where it does not.
+
+        Parameters
+        ----------
+        recording : path
+
+        Raises
+        ------
+        ProblemError : no path
+        """
         place = Path(checked_path("recording", recording))
         names = {row.recording for row in self.rows}
         return next((name for name in ("", str(recording), place.name, place.stem) if name in names), None)
@@ -99,6 +138,14 @@ class Labels:
 
         A recording that began in mid-stream counts from its first stamp, which is whole turns of the board's clock
         (6.5536 s) behind the board. Where both know the host's time, that settles how many.
+
+        Parameters
+        ----------
+        recording : Recording
+
+        Returns
+        -------
+        dict from str to int64, shape (events,), us
 
         Raises
         ------
@@ -113,30 +160,30 @@ class Labels:
         """Return the events of a recording of this path, whose clock is asked for where it matters."""
         name = self.named(path)
         rows = [row for row in self.rows if row.recording == name]
-        clock = clock_of() if any(row.host_ns is not None for row in rows) else None
+        clock = clock_of() if any(row.at_ns for row in rows) else None
         found: dict[str, list[int]] = {}
         for row in rows:
             ahead = ahead_us(row, path, clock, self.path)
-            found.setdefault(row.label, []).append(row.t_us - ahead)
+            found.setdefault(row.text, []).append((row.t or 0) - ahead)
         return {label: np.sort(np.array(times, np.int64)) for label, times in found.items()}
 
     def __repr__(self) -> str:
         return f"Labels({len(self.rows)} events of {', '.join(self.recordings) or 'one recording'}, {self.path})"
 
 
-def ahead_us(row: Label, recording: Path, clock: Clock | None, table: Path) -> int:
+def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> int:
     """Return by how many us (whole turns of its clock) a board is ahead of a recording's time; 0 where none can tell.
 
     Raises
     ------
     ProblemError : the host's time and the board's do not fit this recording
     """
-    if row.host_ns is None or clock is None or not len(clock.board_us):
+    if not row.at_ns or row.t is None or clock is None or not len(clock.board_us):
         return 0
-    turns = (row.t_us - clock.board_us_at(row.host_ns)) / TURN_US
+    turns = (row.t - clock.board_us_at(row.at_ns)) / TURN_US
     if abs(turns - round(turns)) > 0.25:
         raise ProblemError(
-            f"{table}: {row.label} at {row.t_us} us and {row.host_ns} ns is of another run than "
+            f"{table}: {row.text} at {row.t} us and {row.at_ns} ns is of another run than "
             f"{recording}: board's and host's time do not fit together"
         )
     return int(round(turns) * TURN_US)
@@ -176,7 +223,7 @@ def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int]]
         table.writerows(rows)
 
 
-def _row(place: str, cells: Mapping[str, str]) -> Label:
+def _row(place: str, cells: Mapping[str, str]) -> Note:
     values = {name: cell.strip() for name, cell in cells.items()}
     times: dict[str, int] = {}
     for name in ("t_us", "host_ns"):
@@ -191,4 +238,4 @@ def _row(place: str, cells: Mapping[str, str]) -> Label:
         raise FormatError(f"{place}: must name a label, and a time within 2^52 us")
     if not 0 <= times.get("host_ns", 0) < 2**63:
         raise FormatError(f"{place}: host_ns must be ns since 1970")
-    return Label(values.get("recording", ""), values["label"], times["t_us"], times.get("host_ns"))
+    return Note(values["label"], times["t_us"], times.get("host_ns", 0), values.get("recording", ""))

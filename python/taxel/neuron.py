@@ -44,12 +44,12 @@ class Neuron(Value):
     first_threshold : {"theta_0", "printed"}
         The threshold before the first spike: `theta_0`, or raised from the start as 6.9 prints it.
     time : {"continuous", "grid"}
-        Crossings are found exactly, or looked for at the points ``start + k * step_ms``.
+        Crossings are found exactly, or sought at the points ``start + k * step_ms``.
     step_ms : float, ms, above 0
         Step of the grid.
     kernel : {"alpha", "double_exponential", "exponential"}
-        What an input does to the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))``, its
-        largest value 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential only jumps, at inputs.
+        The effect of an input on the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))``,
+        its largest value 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential only jumps, at inputs.
     tau_s : float, ms, above 0 and below `tau`, optional
         Synaptic time constant of the double exponential; ``tau / 4`` where left out.
 
@@ -60,6 +60,10 @@ class Neuron(Value):
     Notes
     -----
     Thesis 6.3.1, equations 6.4 to 6.8. The choices that it leaves open stand on the page *Readings*.
+
+    Times are in double precision: at 2**33 ms (100 days) neighbouring ones are 1.9e-6 ms apart. On a grid a potential
+    counts as reaching the threshold within its slope times four such distances, so that far from 0 a neuron may fire at
+    a point that is up to that long before its crossing. Times that count from the start of a recording avoid both.
 
     Examples
     --------
@@ -107,6 +111,12 @@ class Neuron(Value):
         Notes
         -----
         In continuous time each crossing is the root of the potential less threshold, to rounding. Cost: O(1) a spike.
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[0.0], [2.0]], stop=50.0)
+        >>> Neuron(tau=10.0, after_spike="reset").run([1.0, 0.5], trains).round(3)
+        array([3.366])
         """
         return self._run(weights, trains, threshold)[0]
 
@@ -169,7 +179,7 @@ class Neuron(Value):
         weights : float64, shape (trains,), mV
         trains : SpikeTrains
         times : float64, shape (n,), ms, ascending
-        spikes : float64, ms, ascending
+        spikes : float64, shape (m,), ms, ascending
             When the neuron fired; without any, the linear sum 6.4. With them 6.7: 0 in the refractory time, then what
             `after_spike` leaves; at a spike itself, what the potential came up to.
 
@@ -180,6 +190,12 @@ class Neuron(Value):
         Raises
         ------
         ProblemError : times that do not ascend, or not one weight a train
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[0.0], [2.0]], stop=50.0)
+        >>> Neuron(tau=10.0).potential([1.0, 0.5], trains, [0.0, 3.0, 10.0], spikes=[2.5]).round(3)
+        array([0.   , 0.   , 0.548])
         """
         return _core.neuron_potential(
             self._json(),

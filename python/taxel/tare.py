@@ -95,6 +95,10 @@ class Tare:
     def off(self, frames: Frames) -> Frames:
         """Return pictures with each taxel's rest subtracted: 0 where it reads less, or where its rest is not known.
 
+        Parameters
+        ----------
+        frames : Frames
+
         Raises
         ------
         ProblemError : pictures of an array of another shape
@@ -103,13 +107,15 @@ class Tare:
         if frames.array.shape != self.array.shape:
             (rows, columns), (of_rows, of_columns) = frames.array.shape, self.array.shape
             raise ProblemError(f"pictures of {rows} x {columns} taxels: the tare is of {of_rows} x {of_columns}")
-        rest = np.where(np.isnan(self.rest), np.inf, self.rest)
-        values = np.maximum(frames.values - rest, 0.0)
-        return Frames(values.astype(np.float32), frames.t, unit=frames.unit, array=frames.array)
+        return frames._above(np.where(np.isnan(self.rest), np.inf, self.rest))
 
     @classmethod
     def from_json(cls, text: str) -> Tare:
         """Return the tare that `to_json` wrote.
+
+        Parameters
+        ----------
+        text : str
 
         Raises
         ------
@@ -134,6 +140,16 @@ class Tare:
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the tare to a JSON file, whole or not at all.
 
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
+
         Raises
         ------
         FileExistsError : the file is there already and `overwrite` is false
@@ -144,9 +160,21 @@ class Tare:
     def load(cls, path: str | os.PathLike[str]) -> Tare:
         """Read a tare from the file that `save` wrote.
 
+        Parameters
+        ----------
+        path : path
+
         Raises
         ------
         FormatError : no tare (names the file)
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from taxel.frames import Frames
+        >>> rest = Tare.take(Frames([[[5.0]], [[7.0]]], [0, 100]))
+        >>> Tare.load(rest.save(Path(tempfile.mkdtemp()) / "tare.json")).rest
+        array([[5.]])
         """
         place = Path(checked_path("path", path))
         try:

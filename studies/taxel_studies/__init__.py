@@ -45,7 +45,7 @@ STUDIES = {
     "delays": "what learnt delays buy: copies of every input, chosen from by l1",
     "gait": "gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",
     "touch": "contact and lift, and which of two spheres fell, learnt from labels alone",
-    "information": "how many bits real touches hold, and what else tells as much",
+    "information": "how many bits real touches hold, and which simpler measurements hold as many",
     "asynchronous": "an array whose taxels compare by themselves: bits of a touch, and what they cost",
     "codes": "what a touch's rate, first-spike latencies, relative latencies and rank order tell",
     "receptors": "what SA-1, FA-1, SA-2 and FA-2 answer to: phases of a ramp-and-hold, thresholds against frequency",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +31,7 @@ PARAMETERS: dict[str, Any] = {
     "fine_ms": 500.0,
     "realisations": 10,
 }
-#: What is called seen: so much more than before a tap, V (the least load that the thesis tells, 4.4.1).
+#: A tap counts as seen from this rise on, V (the least load that the thesis resolves, 4.4.1).
 SEEN_V = 0.1
 #: Silence before the first tap and between two, ms.
 APART_MS = 40.0
@@ -81,7 +81,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         ramp = AdaptiveRamp(converter=converter, steepest=fixed, gentlest=fixed)
     seen = ramp.convert(volts, period_us=every)
     line_us = converter.line_us + converter.steps * (seen.ramp.astype(float) - converter.ramp) / 300.0
-    felt = np.argwhere(share > 0.2)
+    loaded = np.argwhere(share > 0.2)
     ends = every * int(1e3 * params["fine_ms"] / every)
     # What the host holds at each time: the last reading that was taken before.
     t = every * np.arange(len(loads))
@@ -90,21 +90,21 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     tapped = np.zeros(len(t), bool)
     for tap in taps:
         tapped |= (t >= tap) & (t < tap + 1e3 * params["tap_ms"])
-    for y, x in felt.tolist():
-        taken = seen.t_us + x * line_us
-        last = np.searchsorted(taken, t, side="right") - 1
+    for y, x in loaded.tolist():
+        sampled_us = seen.t_us + x * line_us
+        last = np.searchsorted(sampled_us, t, side="right") - 1
         known = last >= 0
         wrong = seen.volts[last[known], y, x] - volts[known, y, x]
         for phase, when in (("fine", t[known] < ends), ("gross", tapped[known])):
             squares[phase][0] += float((wrong[when] ** 2).sum())
             squares[phase][1] += int(when.sum())
-    y, x = felt[np.argmax(share[felt[:, 0], felt[:, 1]])].tolist()
-    taken = seen.t_us + x * line_us
+    y, x = loaded[np.argmax(share[loaded[:, 0], loaded[:, 1]])].tolist()
+    sampled_us = seen.t_us + x * line_us
     for tap in taps:
-        before = seen.volts[max(0, int(np.searchsorted(taken, tap)) - 1), y, x]
-        after = np.flatnonzero((taken >= tap) & (seen.volts[:, y, x] > before + SEEN_V))
-        late.append(float(taken[after[0]] - tap) if len(after) else float("nan"))
-    said: dict[str, Any] = {
+        before = seen.volts[max(0, int(np.searchsorted(sampled_us, tap)) - 1), y, x]
+        after = np.flatnonzero((sampled_us >= tap) & (seen.volts[:, y, x] > before + SEEN_V))
+        late.append(float(sampled_us[after[0]] - tap) if len(after) else float("nan"))
+    result: dict[str, Any] = {
         "rms_mv": {phase: 1e3 * float(np.sqrt(s / max(1, n))) for phase, (s, n) in squares.items()},
         "late_us": late,
         "frames_a_s": {
@@ -114,34 +114,34 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     }
     if seed == 0:
         near = (seen.t_us > taps[0] - 2e3) & (seen.t_us < taps[0] + 1e3 * params["tap_ms"] + 6e3)
-        said["course"] = {
-            "t_ms": (1e-3 * (taken[near] - taps[0])).round(4).tolist(),
+        result["course"] = {
+            "t_ms": (1e-3 * (sampled_us[near] - taps[0])).round(4).tolist(),
             "volts": seen.volts[near, y, x].round(5).tolist(),
             "ramp": seen.ramp[near].tolist(),
         }
-    return said
+    return result
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
-    """Tell of each converter how wrong it is in each phase, how late it sees a tap, and how often it scans."""
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
+    """Return of each converter how wrong it is in each phase, how late it sees a tap, and how often it scans."""
     del p
-    said: Said = {"ramps": {}}
+    summary: Summary = {"ramps": {}}
     for name in dict.fromkeys(row.params["ramp"] for row in rows):
         here = [row.result for row in rows if row.params["ramp"] == name]
         late = np.concatenate([one["late_us"] for one in here])
-        said["ramps"]["adaptive" if name is None else str(name)] = {
+        summary["ramps"]["adaptive" if name is None else str(name)] = {
             "rms_mv": {phase: float(np.median([one["rms_mv"][phase] for one in here])) for phase in PHASES},
             "late_us": float(np.nanmedian(late)),
             "unseen": int(np.isnan(late).sum()),
             "frames_a_s": {phase: float(np.median([one["frames_a_s"][phase] for one in here])) for phase in PHASES},
             "course": next((one["course"] for one in here if "course" in one), None),
         }
-    return said
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.3.2 says."""
-    ramps = dict(said["ramps"])
+    ramps = dict(summary["ramps"])
     own = ramps.pop("adaptive")
     gentle, steep = ramps[str(max(p["ramps"]))], ramps[str(min(p["ramps"]))]
 
@@ -187,7 +187,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     ]
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List all converters."""
     del p
     return [
@@ -208,20 +208,20 @@ def tables(p: Parameters, said: Said) -> list[Table]:
                     f"{one['late_us']:.0f}",
                     f"{one['frames_a_s']['fine']:.0f}, {one['frames_a_s']['gross']:.0f}",
                 ]
-                for name, one in said["ramps"].items()
+                for name, one in summary["ramps"].items()
             ],
             "What a host that holds the last reading of each taxel is wrong by, while pressed and while tapped.",
         )
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the two errors against each other, and a tap as the adaptive ramp and the gentlest read it."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
-    for name, one in said["ramps"].items():
+    for name, one in summary["ramps"].items():
         own = name == "adaptive"
         at = (one["rms_mv"]["fine"], one["rms_mv"]["gross"])
         left.plot(*at, "o" if own else "s", color="C3" if own else "C0")
@@ -230,7 +230,7 @@ def draw(p: Parameters, said: Said) -> Figure:
     logarithmic(left, x=[1, 2, 5, 10, 20, 50], y=[20, 30, 50, 70, 100])
     left.margins(0.25, 0.2)
     for name, colour in (("adaptive", "C3"), (str(max(p["ramps"])), "C0")):
-        course = said["ramps"][name]["course"]
+        course = summary["ramps"][name]["course"]
         middle.step(
             course["t_ms"],
             course["volts"],
@@ -240,7 +240,7 @@ def draw(p: Parameters, said: Said) -> Figure:
         )
     middle.set(xlabel="time since a tap, ms", ylabel="what the host holds, V")
     middle.legend(fontsize="small")
-    course = said["ramps"]["adaptive"]["course"]
+    course = summary["ramps"]["adaptive"]["course"]
     right.step(course["t_ms"], course["ramp"], where="post", color="C3")
     right.set(xlabel="time since a tap, ms", ylabel="ramp, ticks")
     return figure

@@ -12,7 +12,7 @@ from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[float]]:
-    """Return when each taxel under the impact first told a rise after contact, ms; taxels by their index there."""
+    """Return when each taxel under the impact first sent a rise after contact, ms; taxels by their index there."""
     low = events.array.columns // 2 - SIDE // 2
     x, y = events.x.astype(int) - low, events.y.astype(int) - low
     since = to_ms(events.t - contact_us)
@@ -75,7 +75,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     acts: list[Act] = [Silence(BEFORE_MS), scene]
     contacts = truth(acts, preset=params["preset"])[0]
     contact, lasted = contacts[0].start_us, sum(c.stop_us - c.start_us for c in contacts)
-    said: dict[str, Any] = {"touched_ms": to_ms(lasted)}
+    result: dict[str, Any] = {"touched_ms": to_ms(lasted)}
     for array in ARRAYS:
         board: dict[str, Any] = {
             "seed": seed,
@@ -91,51 +91,51 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         touched = np.zeros(len(played.events), bool)
         for c in contacts:
             touched |= (played.events.t >= c.start_us - 200) & (played.events.t < c.stop_us + 1000)
-        said[array] = {
+        result[array] = {
             "first_ms": firsts(played.events, contact, params["listen_ms"]),
             "events": int(touched.sum()),
             "rest_kbit_s": 8e3 * rest / length_us,
             "touched_kbit_s": 8e3 * (rest / length_us + (played.bytes - rest) / lasted),
         }
-    return said
+    return result
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Estimate the bits of first-spike and relative latencies by window, and tell what the arrays cost."""
     labels = [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
-    said: Said = {"most": float(np.log2(len(set(labels)))), "bits": {}, "costs": {}}
+    summary: Summary = {"most": float(np.log2(len(set(labels)))), "bits": {}, "costs": {}}
     longest = max(p["windows_ms"])
     for array in ARRAYS:
         trials = [SpikeTrains.from_lists(r.result[array]["first_ms"], start=0.0, stop=longest + 1.0) for r in rows]
-        said["bits"][array] = {}
+        summary["bits"][array] = {}
         for window in p["windows_ms"]:
             codes: dict[str, information.Code] = {
                 "first": information.FirstSpikeLatency(window_ms=window),
                 "relative": information.RelativeLatency(window_ms=window),
             }
             found = information.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
-            said["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
-        told = [r.result[array] for r in rows]
+            summary["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
+        results = [r.result[array] for r in rows]
         touched_s = np.array([1e-3 * r.result["touched_ms"] for r in rows])
-        events = np.array([one["events"] for one in told])
-        moments = [len({t for train in one["first_ms"] for t in train}) for one in told]
-        said["costs"][array] = {
+        events = np.array([one["events"] for one in results])
+        moments = [len({t for train in one["first_ms"] for t in train}) for one in results]
+        summary["costs"][array] = {
             "events": float(np.median(events)),
             "events_a_s": float(np.median(events / touched_s)),
             "address_kbit_s": float(np.median(1e-3 * EVENT_BITS * events / touched_s)),
-            **{name: float(np.median([one[name] for one in told])) for name in ("rest_kbit_s", "touched_kbit_s")},
+            **{name: float(np.median([one[name] for one in results])) for name in ("rest_kbit_s", "touched_kbit_s")},
             "moments": float(np.median(moments)),
         }
-    return said
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.5 and Table 7.1 hope of an asynchronous array."""
-    bits, costs = said["bits"], said["costs"]
+    bits, costs = summary["bits"], summary["costs"]
     scanned, alone = (costs[array] for array in ARRAYS)
     soon, late = (f"{w:g}" for w in (min(p["windows_ms"]), max(p["windows_ms"])))
 
-    def told(window: str, code: str) -> str:
+    def bits_of(window: str, code: str) -> str:
         return ", ".join(
             f"{bits[array][window][code][0]:.2f} ({bits[array][window][code][1]:.2f} to "
             f"{bits[array][window][code][2]:.2f}) {array}"
@@ -161,8 +161,8 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         Statement(
             "Finer times tell more of ball and height.",
             "not stated",
-            f"first-spike latency in {soon} ms: {told(soon, 'first')} bits of {said['most']:.2f}; relative latency: "
-            f"{told(soon, 'relative')}; in {late} ms: {told(late, 'relative')}; the largest gain is "
+            f"first-spike latency in {soon} ms: {bits_of(soon, 'first')} bits of {summary['most']:.2f}; relative "
+            f"latency: {bits_of(soon, 'relative')}; in {late} ms: {bits_of(late, 'relative')}; the largest gain is "
             f"{gains[most]:+.2f} in {most} ms (relative)",
             apart if p["trials"] >= PARAMETERS["trials"] else None,
             "" if apart else "the intervals overlap in the shortest window, in one code or both",
@@ -175,28 +175,31 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             f"version 2 of the wire {alone['touched_kbit_s']:.0f} instead of {scanned['touched_kbit_s']:.0f}, of which "
             f"{alone['rest_kbit_s']:.0f} and {scanned['rest_kbit_s']:.0f} are sent at rest too",
             None,
-            "power is not simulated; a taxel by itself tells each step on the way, a scanned one only where a frame "
+            "power is not simulated; a taxel by itself sends each step on the way, a scanned one only where a frame "
             "finds it",
         ),
     ]
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List bits by window, and costs."""
     del p
     shown = {"first": "first-spike latency", "relative": "relative latency"}
     rows = [
         [
             f"{name}, {array}",
-            *(f"{one[code][0]:.2f} ({one[code][1]:.2f} to {one[code][2]:.2f})" for one in said["bits"][array].values()),
+            *(
+                f"{one[code][0]:.2f} ({one[code][1]:.2f} to {one[code][2]:.2f})"
+                for one in summary["bits"][array].values()
+            ),
         ]
         for code, name in shown.items()
         for array in ARRAYS
     ]
-    head = ["bits", *(f"{window} ms" for window in said["bits"]["scanned"])]
-    costs = [[array, *(f"{one[name]:.0f}" for name in COSTS)] for array, one in said["costs"].items()]
+    head = ["bits", *(f"{window} ms" for window in summary["bits"]["scanned"])]
+    costs = [[array, *(f"{one[name]:.0f}" for name in COSTS)] for array, one in summary["costs"].items()]
     return [
-        Table("Bits by time since contact", head, rows, f"Of {said['most']:.2f}; intervals from trials redrawn."),
+        Table("Bits by time since contact", head, rows, f"Of {summary['most']:.2f}; intervals from trials redrawn."),
         Table(
             "While touched",
             ["array", *COSTS.values()],
@@ -207,7 +210,7 @@ def tables(p: Parameters, said: Said) -> list[Table]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the bits over time since contact, of both arrays."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
@@ -218,12 +221,12 @@ def draw(p: Parameters, said: Said) -> Figure:
         axes, (("first", "first-spike latency"), ("relative", "relative latency")), strict=True
     ):
         for array, colour, beside in zip(ARRAYS, ("C0", "C3"), (0.98, 1.02), strict=True):
-            windows = [float(w) for w in said["bits"][array]]
-            found = np.array([one[code] for one in said["bits"][array].values()])
+            windows = [float(w) for w in summary["bits"][array]]
+            found = np.array([one[code] for one in summary["bits"][array].values()])
             off = np.abs(found[:, 1:] - found[:, :1]).T
             # A little apart, so that neither interval hides the other.
             ax.errorbar(np.multiply(windows, beside), found[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
-        ax.axhline(said["most"], color="0.6", ls=":", label="ceiling")
+        ax.axhline(summary["most"], color="0.6", ls=":", label="ceiling")
         ax.set(xlabel="time since contact, ms", title=title)
         logarithmic(ax, x=windows)
     axes[0].set_ylabel("bits")

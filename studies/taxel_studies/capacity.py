@@ -18,7 +18,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
 
-__all__ = ["DURATION_MS", "feasible", "largest", "met", "patterns", "realise", "weakest"]
+__all__ = ["DURATION_MS", "feasible", "largest", "patterns", "realise", "satisfied", "weakest"]
 
 DURATION_MS = 200.0
 #: Where rounding keeps the solver from a proof either way, rows met to this count as met, mV.
@@ -58,10 +58,10 @@ def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
         horizon=DURATION_MS,
         **margins,
     )
-    return met(cone.fit(*patterns(seed, params["inputs"], count, params["classes"])))
+    return satisfied(cone.fit(*patterns(seed, params["inputs"], count, params["classes"])))
 
 
-def met(cone: ConeX) -> bool:
+def satisfied(cone: ConeX) -> bool:
     """Return whether a fit found weights; where rounding forbids a proof either way, rows met to 1e-9 mV decide."""
     return bool(cone.status_ == "solved" or (cone.status_ == "stopped" and cone.violation_ <= MET_TO))
 

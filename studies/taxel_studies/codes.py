@@ -1,4 +1,4 @@
-"""What four codes tell of the same spikes: rate, first-spike latency, relative latency, rank order (thesis 2.3.2).
+"""The bits of four codes of the same spikes: rate, first-spike latency, relative latency, rank order (thesis 2.3.2).
 
 Balls of several radii fall from several heights on one place of the emulated board, its taxels and the ball's place
 drawn anew each time; FA-1 afferents under the impact fire; each code reads the same spikes, and linear discriminants
@@ -19,7 +19,7 @@ from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,35 +102,35 @@ def realise(params: dict[str, Any], seed: int) -> list[list[float]]:
     return since_contact(trains, contact, params["listen_ms"])
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Estimate the bits of each code by window, with the reference at contact and with one that slips."""
     labels = [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
     slips = np.random.default_rng(p["seed"]).uniform(0.0, p["slip_ms"], len(rows))
     folds = min(10, p["trials"])
-    said: Said = {"most": float(np.log2(len(set(labels)))), "spikes": {}, "bits": {}, "slipped": {}}
+    summary: Summary = {"most": float(np.log2(len(set(labels)))), "spikes": {}, "bits": {}, "slipped": {}}
     longest = max(p["windows_ms"]) + p["slip_ms"]
     trials = [SpikeTrains.from_lists(row.result, start=-p["slip_ms"], stop=longest) for row in rows]
     for window in p["windows_ms"]:
         every = codes(window)
         for name, onsets in (("bits", np.zeros(len(rows))), ("slipped", -slips)):
             found = information.compare_codes(trials, labels, every, onsets_ms=onsets, folds=folds, seed=p["seed"])
-            said[name][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
+            summary[name][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
         counted = np.mean([[np.count_nonzero(np.asarray(t) < window) for t in row.result] for row in rows])
-        said["spikes"][f"{window:g}"] = float(counted)
-    return said
+        summary["spikes"][f"{window:g}"] = float(counted)
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 2.3.2 says of the codes."""
     early, late = (f"{w:g}" for w in (min(p["windows_ms"]), max(p["windows_ms"])))
 
     def bits(kind: str, window: str, code: str) -> float:
-        return float(said[kind][window][code][0])
+        return float(summary[kind][window][code][0])
 
     whole = {code: bits("bits", late, code) for code in NAMES}
     best = max(("first", "relative", "rank"), key=whole.__getitem__)
     half = {
-        code: next((float(w) for w in said["bits"] if bits("bits", w, code) >= said["most"] / 2), float("inf"))
+        code: next((float(w) for w in summary["bits"] if bits("bits", w, code) >= summary["most"] / 2), float("inf"))
         for code in NAMES
     }
     lost = {code: bits("bits", early, code) - bits("slipped", early, code) for code in NAMES}
@@ -138,7 +138,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         Statement(
             "Temporal codes carry more information than a rate code.",
             "a clear advantage",
-            f"{late} ms: {NAMES[best]} {whole[best]:.2f}, rate {whole['rate']:.2f} of {said['most']:.2f} bits",
+            f"{late} ms: {NAMES[best]} {whole[best]:.2f}, rate {whole['rate']:.2f} of {summary['most']:.2f} bits",
             whole[best] > whole["rate"],
             "what linear discriminants find of FA-1's spikes; a rate counts all of them, the others one a train",
         ),
@@ -147,9 +147,9 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "one spike is enough",
             "half of the bits after "
             + ", ".join(f"{half[code]:g} ms ({NAMES[code]})" for code in NAMES)
-            + f"; {said['spikes'][early]:.2f} spikes a train in the first {early} ms",
+            + f"; {summary['spikes'][early]:.2f} spikes a train in the first {early} ms",
             min(half[code] for code in ("first", "relative", "rank")) < half["rate"],
-            "hardly a train fires twice so soon: a count then says which trains fired at all, and that tells as much",
+            "hardly a train fires twice so soon: a count then says which trains fired at all: it has as many bits",
         ),
         Statement(
             "First-spike latency needs a reliable reference; relative codes need none.",
@@ -161,7 +161,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw bits by how long is listened, with the reference at contact, and with one that slips."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
@@ -169,12 +169,12 @@ def draw(p: Parameters, said: Said) -> Figure:
     left, right = figure.subplots(1, 2, sharey=True)
     titles = ("reference: the moment of contact", f"reference: up to {p['slip_ms']:g} ms early")
     for axes, kind, title in ((left, "bits", titles[0]), (right, "slipped", titles[1])):
-        windows = [float(w) for w in said[kind]]
+        windows = [float(w) for w in summary[kind]]
         for code, name in NAMES.items():
-            values = np.array([said[kind][w][code] for w in said[kind]])
+            values = np.array([summary[kind][w][code] for w in summary[kind]])
             ends = [values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]]
             axes.errorbar(windows, values[:, 0], ends, marker="o", markersize=4, capsize=2, label=name)
-        axes.axhline(said["most"], color="0.7", linestyle=":")
+        axes.axhline(summary["most"], color="0.7", linestyle=":")
         axes.set(xlabel="listened, ms", title=title)
         logarithmic(axes, x=windows)
         axes.legend()

@@ -49,6 +49,8 @@ Confirm = Annotated[
 
 REPORT = Path("taxel-studies")
 KEPT = Path("benchmarks/results/figures")
+#: Changed sources of a stale figure that are named.
+MOST_NAMED = 6
 
 
 @app.callback(invoke_without_command=True)
@@ -70,7 +72,8 @@ def _root(
 
         found = stale_figures(figures)
         for name, parts in found.items():
-            typer.echo(f"{name}: {', '.join(parts)}")
+            more = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
+            typer.echo(f"{name}: {', '.join(parts[:MOST_NAMED])}{more}")
         typer.echo(
             f"{len(found)} kept figures are stale; taxel study NAME --confirm, or run them again"
             if found
@@ -96,7 +99,7 @@ def every(
 ) -> None:
     """Run every study and make one page of them; with --confirm, confirm those whose kept figures are stale.
 
-    Studies on recordings are left out, and said to be, where no recordings are; so are those whose packages are not
+    Studies on recordings are left out, and named, where no recordings are; so are those whose packages are not
     installed.
 
     Example: taxel study all --report figures --jobs 2
@@ -104,12 +107,21 @@ def every(
     if confirm:
         from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
 
+        moved = []
         for name in stale_figures(figures):
             if _left_out(name, _data(data)) is None:
-                _confirm(name, figures, data, strict)
+                try:
+                    _confirm(name, figures, data, strict)
+                except ProblemError as error:
+                    moved.append(name)
+                    typer.echo(str(error), err=True)
+        if moved:
+            raise ProblemError(
+                f"not confirmed: {', '.join(moved)}; run them again at full size, and say why they moved"
+            )
         return
     changes = {} if realisations is None else {"realisations": realisations}
-    said = {}
+    sections = {}
     try:
         for name in STUDIES:
             study = load(name)
@@ -117,7 +129,7 @@ def every(
             where = _data(data)
             if _left_out(name, where) is not None:
                 continue
-            said[name] = study.run(
+            sections[name] = study.run(
                 report,
                 size=size if size in study.sizes else "full",
                 changes=own,
@@ -130,9 +142,9 @@ def every(
         # Whatever stopped it: the page shows what was run, and names the rest.
         page = _page(report)
     if as_json:
-        typer.echo(json.dumps(said))
+        typer.echo(json.dumps(sections))
         return
-    for section in said.values():
+    for section in sections.values():
         _tell(section)
     typer.echo(f"page: {page}")
 
@@ -218,8 +230,8 @@ def _data(data: Path | None) -> Path | None:
     return data or (Path(named) if named else None)
 
 
-def _changes(said: list[str], realisations: int | None) -> dict[str, Any]:
-    return ({} if realisations is None else {"realisations": realisations}) | assignments(said)
+def _changes(given: list[str], realisations: int | None) -> dict[str, Any]:
+    return ({} if realisations is None else {"realisations": realisations}) | assignments(given)
 
 
 def _tell(section: dict[str, Any]) -> None:
@@ -231,12 +243,12 @@ def _tell(section: dict[str, Any]) -> None:
         holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
         typer.echo(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
         typer.echo(f"    published: {s['published']}\n    ours: {s['ours']}")
-    for said in section["tables"]:
-        if not said["folded"]:
-            table = Table(title=said["title"], title_justify="left")
-            for k, name in enumerate(said["head"]):
+    for shown in section["tables"]:
+        if not shown["folded"]:
+            table = Table(title=shown["title"], title_justify="left")
+            for k, name in enumerate(shown["head"]):
                 table.add_column(name, justify="right" if k else "left", no_wrap=not k)
-            for row in said["rows"]:
+            for row in shown["rows"]:
                 table.add_row(*row)
             Console().print(table)
     for file, why in section["unread"].items():

@@ -15,7 +15,7 @@ from taxel.simulate.fem import Course, KeptCourses, SamplingGrid, Yeoh, bodies
 from taxel.simulate.fem.solids import Solids
 from taxel_studies import indented
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +30,7 @@ PARAMETERS: dict[str, Any] = {
     "alpha": 0.7,
     "seed": 1,
 }
-#: Forces that are given back to this share of them count as given back.
+#: A force on the base counts as equal to the one on the disc within this share of it.
 ROUNDING = 1e-8
 #: Samples of figure 5.3's picture, ms and mm (the thesis recorded every 0.2 ms), and its grids.
 PICTURE_MS, PICTURE_MM, GRIDS = 0.4, 0.1, 3
@@ -52,7 +52,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     most = max(float(np.abs(course.reaction).max()), 1e-300)
     mirrored = course.pressure_kpa - course.pressure_kpa[:, ::-1]
     return {
-        **indented.told(course),
+        **indented.course_summary(course),
         "force": [round(f, 4) for f in course.reaction[-1]],
         "unbalanced": float(np.abs(course.reaction - course.base).max()) / most,
         "asymmetry": round(float(np.abs(mirrored[-1]).max() / course.pressure_kpa[-1].max()), 9),
@@ -61,16 +61,16 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the courses; keep what the pictures show of one of them."""
-    told = [{**row.params["course"], **row.result} for row in rows]
+    paths = [{**row.params["course"], **row.result} for row in rows]
     wanted = p["drawn"]
     asked = indented.courses_of(p)
     shown = asked[wanted["diameter_mm"], wanted["modulus_kpa"], wanted["angle_deg"]]
     course = KeptCourses(courses).made(shown)
     most = max(row.result["most_kpa"] for row in rows)
     return {
-        "paths": [{k: v for k, v in one.items() if k != "silicone"} for one in told],
+        "paths": [{k: v for k, v in one.items() if k != "silicone"} for one in paths],
         "conditions": len(indented.table_of(p).conditions()),
         "most_kpa": most,
         "model": _shape(course, wanted["depth_mm"]),
@@ -135,9 +135,9 @@ def _least_change(rho: NDArray[np.float64], spikes: Any, period: float) -> float
     return least
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 5.4.1 and the captions say."""
-    paths = said["paths"]
+    paths = summary["paths"]
     short = [one for one in paths if one["fault"]]
     slanted = [one["asymmetry"] for one in paths if one["angle_deg"]]
     straight = [one["asymmetry"] for one in paths if not one["angle_deg"]]
@@ -145,10 +145,10 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         Statement(
             "Table 5.1: every combination of diameter, modulus, depth and angle is simulated.",
             "300 conditions",
-            f"{said['conditions']} conditions of {len(paths)} paths; {len(paths) - len(short)} reach their depth, "
+            f"{summary['conditions']} conditions of {len(paths)} paths; {len(paths) - len(short)} reach their depth, "
             f"{sum(one['factorisations'] for one in paths)} matrices solved, {sum(one['cuts'] for one in paths)} steps "
             "halved",
-            False if short else True if said["conditions"] == 300 else None,
+            False if short else True if summary["conditions"] == 300 else None,
             "; ".join(f"{one['diameter_mm']:g} mm, {one['modulus_kpa']:g} kPa: {one['fault']}" for one in short)
             or f"mesh {p['mesh_mm']:g} mm, steps of {p['step_um']:g} um",
         ),
@@ -171,7 +171,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
                 "pressure at the base, at full depth",
             )
         )
-    drawn = said["sampled"]
+    drawn = summary["sampled"]
     count = sum(map(len, drawn["times"]))
     found.append(
         Statement(
@@ -185,9 +185,9 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 5.2 (the model; pressed), 5.1 and 5.4 (pressure and spikes), and 5.3 (the grid)."""
-    return [_draw_model(p, said["model"]), _draw_spikes(said["sampled"], p), _draw_grid(said["sampled"])]
+    return [_draw_model(p, summary["model"]), _draw_spikes(summary["sampled"], p), _draw_grid(summary["sampled"])]
 
 
 def _draw_model(p: Parameters, model: dict[str, Any]) -> Figure:

@@ -10,7 +10,7 @@ from taxel.encode import FA1
 from taxel.simulate.fem import DRAGON_SKIN_10, Indentation, SamplingGrid, Yeoh
 from taxel_studies import indented
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -85,7 +85,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     """Press once; or sample all contacts under one choice, and see what discriminants make of the spikes."""
     course = indented.make(params, courses)
     if course is not None:
-        return indented.told(course)
+        return indented.course_summary(course)
     choice = CHOICES[params["choice"]]
     conditions, samples = indented.reached(params), params["samples"]
     asked = courses_under(params, params["choice"])
@@ -101,7 +101,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     return indented.bits_of(indented.summed(x, len(conditions), samples, seed), samples)
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by choice and period."""
     del courses
     found = {(r.params["choice"], r.params["period_ms"]): r.result["bits"] for r in rows if "choice" in r.params}
@@ -113,17 +113,16 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
     }
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Say which choice moves most, and whether the thesis' claim stands under each."""
-    size = (
-        f"{said['conditions']} conditions, {p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
-    )
-    first, *others = said["lines"]
+    of_each = f"{p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
+    size = f"{summary['conditions']} conditions, {of_each}"
+    first, *others = summary["lines"]
     moved = {
         line["choice"]: max((b - a for a, b in zip(first["bits"], line["bits"], strict=True)), key=abs)
         for line in others
     }
-    falls = [line["choice"] for line in said["lines"] if line["bits"][-1] < line["bits"][0]]
+    falls = [line["choice"] for line in summary["lines"] if line["bits"][-1] < line["bits"][0]]
     most = max(moved, key=lambda c: abs(moved[c]))
     return [
         Statement(
@@ -137,17 +136,17 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         Statement(
             "Under every choice the information falls from the shortest to the longest period (figure 5.5).",
             "falls",
-            f"under {len(falls)} of {len(said['lines'])}",
-            len(falls) == len(said["lines"]),
+            f"under {len(falls)} of {len(summary['lines'])}",
+            len(falls) == len(summary["lines"]),
             size,
         ),
     ]
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
-    """Tell each choice's bits as they differ from the first's."""
+def tables(p: Parameters, summary: Summary) -> list[Table]:
+    """Return each choice's bits as they differ from the first's."""
     del p
-    first, *others = said["lines"]
+    first, *others = summary["lines"]
     rows = [
         [first["choice"], *(f"{b:.2f}" for b in first["bits"])],
         *(
@@ -155,19 +154,21 @@ def tables(p: Parameters, said: Said) -> list[Table]:
             for line in others
         ),
     ]
-    return [Table("bits, and what each choice changes", ["choice", *(f"{t:g} ms" for t in said["periods_ms"])], rows)]
+    return [
+        Table("bits, and what each choice changes", ["choice", *(f"{t:g} ms" for t in summary["periods_ms"])], rows)
+    ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the curve of 5.5 under each choice."""
     del p
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(8, 4.5), layout="constrained")
     ax = figure.subplots()
-    for k, line in enumerate(said["lines"]):
+    for k, line in enumerate(summary["lines"]):
         ax.plot(
-            said["periods_ms"],
+            summary["periods_ms"],
             line["bits"],
             marker=".",
             lw=2 if k == 0 else 1,
@@ -175,7 +176,7 @@ def draw(p: Parameters, said: Said) -> Figure:
             ls="-" if k <= 10 else "--",
             label=line["choice"],
         )
-    logarithmic(ax, x=said["periods_ms"])
+    logarithmic(ax, x=summary["periods_ms"])
     ax.set_xlabel("sampling period, ms")
     ax.set_ylabel("bits")
     ax.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5))

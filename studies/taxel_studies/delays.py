@@ -10,10 +10,10 @@ import numpy as np
 from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
-from taxel_studies.capacity import DURATION_MS, met, patterns, weakest
+from taxel_studies.capacity import DURATION_MS, patterns, satisfied, weakest
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,11 +93,11 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         chosen = (np.abs(cone.weights_) > NONE).reshape(-1, inputs)
         return {"p": count, "solved": True, "weights": int(chosen.sum()), "heard": int(chosen.any(axis=0).sum())}
 
-    limits = weakest(lambda of, count: met(fit(params, count, of, (0.0, 1.0, 0.0))), params, seed)
+    limits = weakest(lambda of, count: satisfied(fit(params, count, of, (0.0, 1.0, 0.0))), params, seed)
     return {"p": limits[-1][1]}
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List by arm and N the largest load, and by load the mean of the weights that l1 leaves."""
     lines = []
     for arm in arms(p):
@@ -131,9 +131,9 @@ def _of(row: Row, inputs: int, asks: str) -> bool:
     return bool(row.params["inputs"] == inputs and row.params["asks"] == asks)
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what is asked of delays; none of it stands in the thesis, which has no delays."""
-    lines = {line["arm"]: line for line in said["lines"]}
+    lines = {line["arm"]: line for line in summary["lines"]}
     most = f"{max(p['copies'])} copies"
     last = -1  # the most inputs
     plain, random, copied = (lines[arm]["load"][last] for arm in ("none", "random", most))
@@ -153,7 +153,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "not in the thesis",
             f"{random:g} beside {plain:g} at {at}",
             bool(random <= plain + p["classes"] / p["inputs"][last]),
-            "it costs: fewer inputs are heard before an early target, and what is put off beyond the last one is lost",
+            "it costs: fewer inputs arrive before an early target, and what is put off beyond the last one is lost",
         ),
     ]
     chosen = {
@@ -164,12 +164,12 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         here = {arm: next((s for s in some if s["share"] == share), None) for arm, some in chosen.items()}
         known = {arm: s for arm, s in here.items() if s is not None}
         if {"none", most} <= set(known):
-            told = ", ".join(f"{arm} {s['by_weight']:.2f} ({s['weights']:.0f} weights)" for arm, s in known.items())
+            by_arm = ", ".join(f"{arm} {s['by_weight']:.2f} ({s['weights']:.0f} weights)" for arm, s in known.items())
             found.append(
                 Statement(
                     f"At a load of {share:g}, l1 over all copies learns with fewer weights than over the inputs alone.",
                     "not in the thesis",
-                    f"patterns a weight at {at}: {told}",
+                    f"patterns a weight at {at}: {by_arm}",
                     bool(known[most]["by_weight"] > known["none"]["by_weight"]),
                     "so what the copies buy is the choice of delays, and not the number of weights alone",
                 )
@@ -195,13 +195,13 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw loads by inputs, and patterns a weight by load."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for line in said["lines"]:
+    for line in summary["lines"]:
         left.plot(line["inputs"], line["load"], ".-", lw=1.2, label=line["arm"])
         some = [s for s in line["selected"] if s["inputs"] == p["inputs"][-1] and s["by_weight"] is not None]
         right.plot([s["share"] for s in some], [s["by_weight"] for s in some], ".-", lw=1.2, label=line["arm"])

@@ -19,8 +19,7 @@ from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.information import NearestNeighbours
-from taxel.report import write_whole
-from taxel.report.provenance import installed
+from taxel.report import installed_sources, write_whole
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US, Registers
@@ -49,7 +48,6 @@ __all__ = [
     "sampled",
     "smoothed",
     "spatial_grams",
-    "told",
 ]
 
 #: 5.6.2's experiment: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
@@ -162,8 +160,8 @@ def play_tasks(p: Mapping[str, Any]) -> list[Task]:
     return [Task({**named(p), "condition": list(one)}, p["seed"]) for one in conditions(p)]
 
 
-def told(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
-    """Return what a realisation of `play_tasks` tells of its drops; None where it is another's."""
+def played_summary(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
+    """Return the events and contact times of the drops of a realisation of `play_tasks`; None for another one."""
     if "condition" not in params:
         return None
     drops = played(params, Condition(*params["condition"]), seed, folder, rig)
@@ -172,7 +170,7 @@ def told(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS)
 
 def played(p: Mapping[str, Any], condition: Condition, seed: int, folder: Path, rig: Rig = IMPACTS) -> Drops:
     """Return a condition's drops from the folder, or drop the ball and keep them there."""
-    code = installed("taxel_studies").digest(__name__)
+    code = installed_sources("taxel_studies").digest(__name__)
     made_by = json.dumps([named(p), condition, rig, seed, code], sort_keys=True)
     digest = hashlib.sha256(made_by.encode()).hexdigest()[:16]
     b, h, s = condition

@@ -13,7 +13,7 @@ from taxel.wire import FRAME_US
 from taxel_studies import dropped
 from taxel_studies.dropped import FRAMES, REGION, Condition
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,11 +37,11 @@ def tasks(p: Parameters, courses: Path) -> list[Task]:
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any] | None:
     """Drop a ball so many times, and count."""
-    return dropped.told(params, seed, courses)
+    return dropped.played_summary(params, seed, courses)
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
-    """Tell each drop's data rate, and the events of one."""
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
+    """Return each drop's data rate, and the events of one."""
     shown = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses)
     spikes = dropped.sampled(shown.ticks[:1], to_ms(FRAME_US), np.zeros(1))[0]
     sample, sign, taxel = np.nonzero(spikes)
@@ -63,13 +63,15 @@ def _frames_kbit_s(bits: int) -> float:
     return bits * REGION**2 / to_ms(FRAME_US)
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 5.7 says."""
     del p
-    rates = np.array(said["rates_kbit_s"])
+    rates = np.array(summary["rates_kbit_s"])
     intensity, change = _frames_kbit_s(INTENSITY_BITS), _frames_kbit_s(CHANGE_BITS)
-    low, middle, high = said["events"]
-    why = f"{len(rates)} drops of {low} to {high} events (median {middle:g}) in {said['lasted_ms'][1]:.0f} ms (median)"
+    low, middle, high = summary["events"]
+    why = (
+        f"{len(rates)} drops of {low} to {high} events (median {middle:g}) in {summary['lasted_ms'][1]:.0f} ms (median)"
+    )
     return [
         Statement(
             "Figure 5.14: change events need some hundred kbit/s at most, frames of change and of intensity a fixed "
@@ -92,9 +94,9 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 5.10 (events of a drop by time) and 5.14 (rates)."""
-    return [_draw_one(p, said["one"]), _draw_rates(said)]
+    return [_draw_one(p, summary["one"]), _draw_rates(summary)]
 
 
 def _draw_one(p: Parameters, one: dict[str, Any]) -> Figure:
@@ -124,12 +126,12 @@ def _draw_one(p: Parameters, one: dict[str, Any]) -> Figure:
     return figure
 
 
-def _draw_rates(said: Said) -> Figure:
+def _draw_rates(summary: Summary) -> Figure:
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(7, 3.5), layout="constrained")
     ax = figure.subplots()
-    rates = np.array(said["rates_kbit_s"])
+    rates = np.array(summary["rates_kbit_s"])
     edges = np.geomspace(rates.min() * 0.9, rates.max() * 1.1, 25)
     ax.hist(rates, edges.tolist(), color="C0", label="events (EC)")
     ax.axvline(PRINTED_KBIT_S, color="C0", ls=":", label=f"largest in the thesis, {PRINTED_KBIT_S:g}")

@@ -13,7 +13,7 @@ from taxel.neuron import Neuron
 from taxel_studies import capacity, mapping
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,7 +92,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _beside(spikes: NDArray[np.float64], targets: NDArray[np.float64], step: float) -> dict[str, Any]:
-    """Tell whether there is a spike a target, and how far it is off, ms."""
+    """Return whether there is a spike a target, and how far it is off, ms."""
     right = len(spikes) == len(targets)
     off = float(np.max(np.abs(spikes - targets))) if right else None
     return {
@@ -103,7 +103,7 @@ def _beside(spikes: NDArray[np.float64], targets: NDArray[np.float64], step: flo
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up shares by case and margin, and loads."""
     cases = []
     for count in p["counts"]:
@@ -153,9 +153,9 @@ def _over(solved: Sequence[dict[str, Any]], k: int, step: float) -> dict[str, An
     }
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge our own statements; the thesis has none on this."""
-    cases = said["cases"]
+    cases = summary["cases"]
     fine = min(p["steps_ms"])
     several = max(p["counts"])
     hard = [c for c in cases if c["count"] == several and c["theta_plus"] == max(p["theta_plus"])]
@@ -183,20 +183,20 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "none",
             f"share within one step of {fine:g} ms by slope (mV/ms): {listed}",
             bool(shares[-1] > shares[0]) if len(shares) > 1 else None,
-            "each spike is said late, the threshold recovers that much later, and where the slope is small the next "
+            "each spike comes late, the threshold recovers that much later, and where the slope is small the next "
             "crossing moves by more than that",
         ),
     ]
-    grid = {c["inputs"]: c for c in said["loads"] if c["time"] == "grid"}
+    grid = {c["inputs"]: c for c in summary["loads"] if c["time"] == "grid"}
     priced = [
         f"N = {n}: {grid[n]['load']:.3f} on the grid, "
         + ", ".join(
-            f"{c['load']:.3f} at {c['margin']:g}" for c in said["loads"] if c["inputs"] == n and c["time"] != "grid"
+            f"{c['load']:.3f} at {c['margin']:g}" for c in summary["loads"] if c["inputs"] == n and c["time"] != "grid"
         )
         for n in sorted(grid)
     ]
     small = [
-        c["p"] / grid[c["inputs"]]["p"] for c in said["loads"] if 0 < c["margin"] <= 1e-3 and grid[c["inputs"]]["p"]
+        c["p"] / grid[c["inputs"]]["p"] for c in summary["loads"] if 0 < c["margin"] <= 1e-3 and grid[c["inputs"]]["p"]
     ]
     found.append(
         Statement(
@@ -215,14 +215,14 @@ def _share(case: dict[str, Any], step: float) -> float:
     return run["within_a_step"] / case["solved"] if case["solved"] else 0.0
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the share within one step by slope, and the load by margin."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(13, 4), layout="constrained")
     within, late, load = figure.subplots(1, 3)
     for number, (count, rise) in enumerate((c, r) for c in p["counts"] for r in p["theta_plus"]):
-        here = [c for c in said["cases"] if (c["count"], c["theta_plus"]) == (count, rise)]
+        here = [c for c in summary["cases"] if (c["count"], c["theta_plus"]) == (count, rise)]
         label = f"{count} target{'s' if count > 1 else ''}, theta+ {rise:g}"
         for k, step in enumerate(p["steps_ms"]):
             # What comes first is drawn broader: at 100 % lines lie on each other.
@@ -243,8 +243,10 @@ def draw(p: Parameters, said: Said) -> Figure:
         ylabel="largest error of a spike, ms (where none is lost)",
     )
     for number, inputs in enumerate(p["capacity"]["inputs"]):
-        here = sorted((c["margin"], c["load"]) for c in said["loads"] if c["inputs"] == inputs and c["time"] != "grid")
-        grid = next(c["load"] for c in said["loads"] if c["inputs"] == inputs and c["time"] == "grid")
+        here = sorted(
+            (c["margin"], c["load"]) for c in summary["loads"] if c["inputs"] == inputs and c["time"] != "grid"
+        )
+        grid = next(c["load"] for c in summary["loads"] if c["inputs"] == inputs and c["time"] == "grid")
         load.plot(*zip(*here, strict=True), ".-", color=f"C{number}", label=f"N = {inputs}")
         load.axhline(grid, color=f"C{number}", ls="--", lw=max(2.4 - 0.8 * number, 0.8))
     load.set(xscale="log", xlabel="margin (mV) and slope (mV/ms)", ylabel="largest load p / N", ylim=(0, None))
@@ -260,7 +262,7 @@ STUDY = Study(
     protocol=(
         "Poisson inputs of 5 to 25 Hz over 200 ms, random targets at least 12 ms apart, CONE-X (l2, continuous time) "
         "with margin m0 mV and slope m0 mV/ms. Each solution runs freely on clocks of 1, 10 and 100 us steps, that is "
-        "with the threshold's recovery from the spikes it said itself. Beside it the search of figure 6.7 (C = 3, 30 "
+        "with the threshold's recovery from its own spikes. Beside it the search of figure 6.7 (C = 3, 30 "
         "realisations) on the grid and at every instant, by margin."
     ),
     parameters=PARAMETERS,

@@ -17,7 +17,7 @@ from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
 from taxel_studies.codes import PERIOD_US, SIDE, drop, since_contact
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,9 +53,9 @@ def spikes(frames: Frames, without: str, spread: float) -> SpikeTrains:
     drawn = np.random.default_rng(SKIN).normal(0.0, spread, (SIDE, SIDE))
     alpha = 1.0 if without == "power" else FA1().alpha
     gain = np.ones((SIDE, SIDE)) if without == "spread" else np.exp(-drawn / alpha)
-    felt = Frames((frames.values * gain).astype(np.float32), frames.t, unit=frames.unit)
+    scaled = Frames((frames.values * gain).astype(np.float32), frames.t, unit=frames.unit)
     a, b = (0.0, 0.0) if without == "threshold" else (FA1().a, FA1().b)
-    trains = FA1(alpha=alpha, a=a, b=b, period_ms=PERIOD_US * 1e-3).encode(felt)
+    trains = FA1(alpha=alpha, a=a, b=b, period_ms=PERIOD_US * 1e-3).encode(scaled)
     if without != "polarity":
         return trains.split_by_sign()
     return SpikeTrains.from_lists(list(trains), start=trains.start, stop=trains.stop)
@@ -84,14 +84,14 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, list[list[float]]]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Estimate bits and count events by what was taken away and by window."""
     labels = [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
     folds, resolution = min(10, p["trials"]), PERIOD_US * 1e-3
-    said: Said = {"most": float(np.log2(len(set(labels)))), "bits": {}, "events": {}}
+    summary: Summary = {"most": float(np.log2(len(set(labels)))), "bits": {}, "events": {}}
     for without in VARIANTS:
         trials = [SpikeTrains.from_lists(row.result[without], start=0.0, stop=max(p["windows_ms"])) for row in rows]
-        said["bits"][without], said["events"][without] = {}, {}
+        summary["bits"][without], summary["events"][without] = {}, {}
         for window in p["windows_ms"]:
             codes = {
                 "rate": information.RateCode(window_ms=window, most_hz=1e6 / PERIOD_US),
@@ -101,21 +101,21 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                 trials, labels, codes, onsets_ms=np.zeros(len(rows)), folds=folds, seed=p["seed"]
             )
             best = max(found.values(), key=lambda one: one.bits)
-            said["bits"][without][f"{window:g}"] = [best.bits, *best.interval]
+            summary["bits"][without][f"{window:g}"] = [best.bits, *best.interval]
             events = [np.count_nonzero(one.times < window) for one in trials]
-            said["events"][without][f"{window:g}"] = float(np.mean(events))
-    return said
+            summary["events"][without][f"{window:g}"] = float(np.mean(events))
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Say of each property what it is worth at the longest window."""
     late = f"{max(p['windows_ms']):g}"
-    whole, bottom, top = said["bits"]["all"][late]
-    events = said["events"]["all"][late]
+    whole, bottom, top = summary["bits"]["all"][late]
+    events = summary["events"]["all"][late]
     found = []
     for without, name in list(VARIANTS.items())[1:]:
-        bits, low, high = said["bits"][without][late]
-        cost = said["events"][without][late] / max(events, 1e-9)
+        bits, low, high = summary["bits"][without][late]
+        cost = summary["events"][without][late] / max(events, 1e-9)
         found.append(
             Statement(
                 f"It is to be found out whether FA-1's {name} is worth keeping.",
@@ -123,29 +123,29 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
                 f"without it {bits - whole:+.2f} bits of {whole:.2f} and {cost:.2f} times the events, {late} ms",
                 None,
                 ("intervals lie apart" if high < bottom or low > top else "intervals overlap")
-                + "; of two codes, counts and first spikes, the one that tells more",
+                + "; of two codes, counts and first spikes, the one with more bits",
             )
         )
     return found
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List bits, events and bits an event by window."""
     del p
     rows = []
     for without, name in VARIANTS.items():
         cells = []
-        for window, (bits, low, high) in said["bits"][without].items():
-            events = said["events"][without][window]
+        for window, (bits, low, high) in summary["bits"][without].items():
+            events = summary["events"][without][window]
             cells += [f"{bits:.2f} ({low:.2f} to {high:.2f})", f"{events:.0f}"]
         rows.append([name, *cells])
     head = ["taken away"]
-    for window in said["bits"]["all"]:
+    for window in summary["bits"]["all"]:
         head += [f"bits in {window} ms", "events"]
-    return [Table("what each property of FA-1 is worth", head, rows, f"of {said['most']:.2f} bits; 95 % intervals")]
+    return [Table("what each property of FA-1 is worth", head, rows, f"of {summary['most']:.2f} bits; 95 % intervals")]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw bits over events."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
@@ -153,12 +153,12 @@ def draw(p: Parameters, said: Said) -> Figure:
     figure = Figure(figsize=(6.5, 4), layout="constrained")
     axes = figure.subplots()
     for without, name in VARIANTS.items():
-        values = np.array(list(said["bits"][without].values()))
+        values = np.array(list(summary["bits"][without].values()))
         ends = [values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]]
-        events = list(said["events"][without].values())
+        events = list(summary["events"][without].values())
         label = "all properties" if without == "all" else f"without {name}"
         axes.errorbar(events, values[:, 0], ends, marker="o", markersize=4, capsize=2, label=label)
-    axes.axhline(said["most"], color="0.7", linestyle=":")
+    axes.axhline(summary["most"], color="0.7", linestyle=":")
     axes.set(xscale="log", xlabel="events of a touch, in windows of rising length", ylabel="bits")
     axes.legend(loc="lower right")
     return figure

@@ -71,14 +71,14 @@ def pressed(
     layer, gap = _layer(p["foam_kpa"], p["foam_mm"]), _gap(diameter_mm, x_mm, y_mm)
     layer.forget()
     depths = np.linspace(0.0, depth_mm, _STEPS + 1)
-    felt = [np.zeros(ARRAY.shape)]
+    pressures = [np.zeros(ARRAY.shape)]
     for depth in depths[1:]:
         fine = layer.press(depth - gap).pressure_kpa
-        felt.append(fine.reshape(8, _FINE, 8, _FINE).mean(axis=(1, 3)))
-    return depths, np.array(felt)
+        pressures.append(fine.reshape(8, _FINE, 8, _FINE).mean(axis=(1, 3)))
+    return depths, np.array(pressures)
 
 
-def read(p: Mapping[str, Any], depths: Values, felt: Values, course_mm: Values, seed: int) -> Frames:
+def read(p: Mapping[str, Any], depths: Values, pressures: Values, course_mm: Values, seed: int) -> Frames:
     """Return what the dividers read (V) along a course of depths, a sample each 0.1 ms.
 
     Fabric conducts by pressure: a crossing of n times the area is n crossings side by side. The taxels' spread is of
@@ -88,7 +88,7 @@ def read(p: Mapping[str, Any], depths: Values, felt: Values, course_mm: Values, 
     gain = np.exp(p["gain_spread"] * np.random.default_rng(3).standard_normal(ARRAY.shape))
     fabric = Fabric()
     # kPa mm^2 is mN; conductances of the course's depths, then straight between them.
-    known = fabric.rest_us + gain * (fabric.conductance(felt * _STATED_MM**2 / 1000.0) - fabric.rest_us)
+    known = fabric.rest_us + gain * (fabric.conductance(pressures * _STATED_MM**2 / 1000.0) - fabric.rest_us)
     lines = Divider(resistor_kohm=p["resistor_kohm"])
     volts = lines.volts(times * known).reshape(len(depths), -1)
     place = np.interp(course_mm, depths, np.arange(len(depths)))

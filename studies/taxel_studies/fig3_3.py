@@ -10,7 +10,7 @@ import numpy as np
 from taxel.encode import ThresholdIzhikevich
 from taxel_studies.fabric_array import ARRAY, PERIOD_US, SENSOR, depth_of, pressed, read
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,7 +26,7 @@ PARAMETERS: dict[str, Any] = {
     "presses": 3,
     "realisations": 10,
 }
-#: What the neurons need to hear of one state before the next, ms (a step is told after some 20 ms).
+#: How long a state must last for the neurons, ms (a step shows after some 20 ms).
 STEADY_MS = 60.0
 
 
@@ -47,7 +47,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     frames = read(p, *pressed(p, p["diameter_mm"], depth, x, y), course, seed)
     digital = frames.values.reshape(len(frames), -1) > p["threshold_v"]
     spikes = ThresholdIzhikevich([p["threshold_v"]], published="3.4.3").encode(frames)
-    told, steps = np.zeros(2, int), np.zeros(2, int)
+    counts, steps = np.zeros(2, int), np.zeros(2, int)
     wrong = 0
     for taxel in range(ARRAY.rows * ARRAY.columns):
         lasting = _lasting(digital[:, taxel])
@@ -56,13 +56,13 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         rises, falls = int((np.diff(lasting.astype(int)) > 0).sum()), int((np.diff(lasting.astype(int)) < 0).sum())
         ups, downs = int((values > 0).sum()), int((values < 0).sum())
         steps += (rises, falls)
-        told += (ups, downs)
+        counts += (ups, downs)
         wrong += int((rises, falls) != (ups, downs))
     busy = np.argsort(digital.sum(axis=0), kind="stable")[::-1][:12]
     every = 20
     return {
         "steps": steps.tolist(),
-        "spikes": told.tolist(),
+        "spikes": counts.tolist(),
         "wrong": wrong,
         "active": int(digital.any(axis=0).sum()),
         "drawn": {
@@ -89,7 +89,7 @@ def _lasting(digital: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     return out
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up over places."""
     del p
     results = [r.result for r in rows]
@@ -102,28 +102,28 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
     }
 
 
-def statements(_p: Parameters, said: Said) -> list[Statement]:
+def statements(_p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 3.4.3 says."""
-    (rises, falls), (ups, downs) = said["steps"], said["spikes"]
+    (rises, falls), (ups, downs) = summary["steps"], summary["spikes"]
     return [
         Statement(
             "A single spike is fired for each change from low to high, and by the other neuron from high to low.",
             "one spike a rise, one a fall",
             f"{rises} rises and {falls} falls that last {STEADY_MS:g} ms; {ups} and {downs} spikes; "
-            f"{said['wrong']} of {said['active']} taxels differ",
-            said["wrong"] == 0,
+            f"{summary['wrong']} of {summary['active']} taxels differ",
+            summary["wrong"] == 0,
             "a state shorter than some 20 ms may be lost, and behind a short gap a spike comes late",
         )
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 3.3: analog, digital, spikes, of the twelve taxels that are on for longest."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(11, 3.6), layout="constrained")
     left, middle, right = figure.subplots(1, 3, sharey=True)
-    seen = said["drawn"]
+    seen = summary["drawn"]
     t = np.array(seen["t_ms"])
     for row, (volts, digital, spikes) in enumerate(zip(seen["volts"], seen["digital"], seen["spikes"], strict=True)):
         left.plot(t, row + 0.8 * np.array(volts) / max(map(max, seen["volts"])), color="C0", lw=0.8)

@@ -14,7 +14,7 @@ from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
 from taxel_studies.fabric_array import PERIOD_US, SENSOR, depth_of, pressed, read
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,9 +61,9 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 @cache
-def _trials(said: str) -> list[SpikeTrains]:
+def _trials(text: str) -> list[SpikeTrains]:
     """Return the recordings of one force, sphere after sphere."""
-    p = json.loads(said)
+    p = json.loads(text)
     found = []
     for sphere, diameter in enumerate(p["diameters_mm"]):
         depth = depth_of(diameter, p["force_n"], p["foam_kpa"], p["foam_mm"])
@@ -103,7 +103,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up a force: accuracy, and the training error by epoch; and the same with other values."""
     return {
         "forces": [_line([r for r in rows if not r.params["reading"]], force) for force in p["forces_n"]],
@@ -135,11 +135,11 @@ def _line(rows: Sequence[Row], force: float) -> dict[str, Any]:
     }
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 3.6.1 says."""
     full = p["realisations"] >= PARAMETERS["realisations"] and p["trials"] >= PARAMETERS["trials"]
     found = []
-    for line in said["forces"]:
+    for line in summary["forces"]:
         force = line["force_n"]
         if force not in PUBLISHED:
             continue
@@ -154,7 +154,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
                 "speed and foam are not stated, and decide it (the table); these were chosen before anything ran",
             )
         )
-    for line in _best(said["others"]):
+    for line in _best(summary["others"]):
         if line["force_n"] in PUBLISHED:
             mean, sd = PUBLISHED[line["force_n"]]
             found.append(
@@ -175,7 +175,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             line["below"] is not None and line["below"] <= TENS if full else None,
             "the threshold and the first weights are not stated: 1, and normal with a spread of 0.001",
         )
-        for line in said["forces"]
+        for line in summary["forces"]
     ]
     return found
 
@@ -192,9 +192,9 @@ def _after(line: dict[str, Any]) -> str:
     return "never" if line["below"] is None else f"after {line['below']} epochs"
 
 
-def tables(_p: Parameters, said: Said) -> list[Table]:
-    """Tell the accuracy with each of the other values."""
-    lines = [{**line, "reading": "as above"} for line in said["forces"]] + said["others"]
+def tables(_p: Parameters, summary: Summary) -> list[Table]:
+    """Return the accuracy with each of the other values."""
+    lines = [{**line, "reading": "as above"} for line in summary["forces"]] + summary["others"]
     return [
         Table(
             "accuracy with other values of what the thesis leaves open",
@@ -213,13 +213,13 @@ def tables(_p: Parameters, said: Said) -> list[Table]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 3.5, accuracy by force, and 3.6, training error over epochs."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     accuracy, curves = (Figure(figsize=(6, 3.6), layout="constrained") for _ in range(2))
     ax = accuracy.subplots()
-    lines = [{**line, "reading": "ours"} for line in said["forces"]] + said["others"]
+    lines = [{**line, "reading": "ours"} for line in summary["forces"]] + summary["others"]
     readings = list(dict.fromkeys(line["reading"] for line in lines))
     for k, force in enumerate(p["forces_n"]):
         here = [line for line in lines if line["force_n"] == force]
@@ -240,7 +240,7 @@ def draw(p: Parameters, said: Said) -> list[Figure]:
     ax.set_ylabel("accuracy, % (mean, sd over splits)")
     accuracy.legend(fontsize="small", loc="outside upper center", ncols=3)
     ax = curves.subplots()
-    for k, line in enumerate(said["forces"]):
+    for k, line in enumerate(summary["forces"]):
         epochs, error = np.arange(1, len(line["error"]) + 1), 100 * np.array(line["error"])
         sd = 100 * np.array(line["error_sd"])
         ax.plot(epochs, error, color=f"C{k}", label=f"{line['force_n']:g} N")

@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel.simulate.circuit import Converter
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,27 +52,27 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
-    """Tell of each shape whether the time grows, up to which input, and how far it is from straight."""
-    said: Said = {"shapes": {}}
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
+    """Return of each shape whether the time grows, up to which input, and how far it is from straight."""
+    summary: Summary = {"shapes": {}}
     for row in rows:
         volts, elapsed = np.array(row.result["volts"]), np.array(row.result["elapsed_us"])
         whole = p["ramp"] / TICKS_A_US
         within = elapsed < whole - 1e-9
         line = np.polyfit(volts[within], elapsed[within], 1)
-        said["shapes"][row.params["shape"]] = {
+        summary["shapes"][row.params["shape"]] = {
             **row.result,
             "grows": bool((np.diff(elapsed[within]) > 0).all() and (np.diff(elapsed) >= -1e-9).all()),
             "ends_v": round(float(volts[within].max()), 3),
             "bent_us": round(float(np.abs(np.polyval(line, volts[within]) - elapsed[within]).max()), 5),
         }
-    return said
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.3.2 says."""
     found = []
-    for shape, one in said["shapes"].items():
+    for shape, one in summary["shapes"].items():
         name = "the board's RC ramp" if shape == "rc" else "a linear ramp"
         found.append(
             Statement(
@@ -82,7 +82,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
                 one["grows"],
             )
         )
-    for shape, one in said["shapes"].items():
+    for shape, one in summary["shapes"].items():
         straight = one["bent_us"] < 1e-3
         found.append(
             Statement(
@@ -90,25 +90,27 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
                 "proportional",
                 f"within {1e3 * one['bent_us']:.1f} ns of a straight line",
                 straight,
-                "" if straight else "an RC ramp flattens: later voltages are finer told (Appendix 1, 2.2.3 has the RC)",
+                ""
+                if straight
+                else "an RC ramp flattens: later voltages are resolved more finely (Appendix 1, 2.2.3 has the RC)",
             )
         )
     return found
 
 
-def draw(_p: Parameters, said: Said) -> Figure:
+def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw one conversion as 4.3 does, and the time against the input for both ramps."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(9, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
-    seen = next(iter(said["shapes"].values()))["trace"]
+    seen = next(iter(summary["shapes"].values()))["trace"]
     left.plot(seen["t_us"], seen["ramp_v"], color="C3", label="V_ramp")
     left.plot(seen["t_us"], seen["input_v"], color="C2", label="V_in")
     left.step(seen["t_us"], seen["high"], color="C0", where="post", label="V_comp (high: 1)")
     left.set(xlabel="time, us", ylabel="V")
     left.legend(fontsize="small", loc="upper right")
-    for number, (shape, one) in enumerate(said["shapes"].items()):
+    for number, (shape, one) in enumerate(summary["shapes"].items()):
         right.plot(one["volts"], one["elapsed_us"], color=f"C{number}", label=f"{shape} ramp")
     right.set(xlabel="V_in, V", ylabel="t_elapsed, us")
     right.legend(fontsize="small")

@@ -10,7 +10,7 @@ import numpy as np
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel.wire import Registers
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,10 +64,10 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
-    """Tell of each voltage: the law's curve, who sees 0.02 N, where the ramp and the amplifier end."""
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
+    """Return of each voltage: the law's curve, which taxels see 0.02 N, where the ramp and the amplifier end."""
     floor, ramp = Registers().noise_floor, Registers().ramp
-    said: Said = {"floor": floor, "ramp": ramp, "lines": []}
+    summary: Summary = {"floor": floor, "ramp": ramp, "lines": []}
     for v_trans in p["v_trans"]:
         here = [r.result for r in rows if r.params["v_trans"] == v_trans]
         loads = np.array(here[0]["loads"])
@@ -76,7 +76,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
         # An event is a change by more than the noise floor.
         first = [loads[np.argmax(t - t[0] > floor)] if (t - t[0] > floor).any() else np.nan for t in ticks]
         ends = [loads[np.argmax(t >= ramp)] if (t >= ramp).any() else np.nan for t in ticks]
-        said["lines"].append(
+        summary["lines"].append(
             {
                 "v_trans": v_trans,
                 "loads": loads.tolist(),
@@ -90,7 +90,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                 "straight": round(_straight(loads, volts[0]), 5),
             }
         )
-    return said
+    return summary
 
 
 def _straight(loads: np.ndarray[Any, Any], volts: np.ndarray[Any, Any]) -> float:
@@ -99,9 +99,9 @@ def _straight(loads: np.ndarray[Any, Any], volts: np.ndarray[Any, Any]) -> float
     return float(np.corrcoef(np.log(loads[below]), volts[below])[0, 1] ** 2)
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.4.1 says."""
-    lines = {line["v_trans"]: line for line in said["lines"]}
+    lines = {line["v_trans"]: line for line in summary["lines"]}
     high, low = lines[max(lines)], lines[min(lines)]
     full = p["realisations"] >= PARAMETERS["realisations"]
     return [
@@ -109,7 +109,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             f"With V_trans = {high['v_trans']:g} V a load of {SEEN_N:g} N is reliably detected.",
             f"{SEEN_N:g} N",
             f"{high['gained_v']:.3f} V and {high['gained_ticks']} ticks more than at rest; {100 * high['seen']:.0f} % "
-            f"of taxels say so beyond a noise floor of {said['floor']} ticks, the median one from "
+            f"of taxels say so beyond a noise floor of {summary['floor']} ticks, the median one from "
             f"{high['least_n']:.3g} N on",
             high["seen"] >= 0.95 if full else None,
             "the fabric's law is laid through this figure (0.1 V at 0.02 N), so what is tested is the converter and "
@@ -139,13 +139,13 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 4.6: V_in over load, semi-log; 90 % of taxels in the band."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(6.5, 4.2), layout="constrained")
     ax = figure.subplots()
-    for line, colour in zip(said["lines"], ("C0", "C3", "C2", "C1"), strict=False):
+    for line, colour in zip(summary["lines"], ("C0", "C3", "C2", "C1"), strict=False):
         ax.semilogx(line["loads"][1:], line["volts"][1:], color=colour, label=f"V_trans = {line['v_trans']:g} V")
         ax.fill_between(line["loads"][1:], *(edge[1:] for edge in line["between"]), color=colour, alpha=0.2, lw=0)
     ax.axhline(3.0, color="0.6", lw=0.8)

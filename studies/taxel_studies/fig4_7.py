@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,7 +75,7 @@ def _scan(params: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Keep the impact and the scans by time constant."""
     (impact,) = [r.result for r in rows if "impact_n" in r.params]
     scans = [{"amplifier_us": tau, **r.result} for tau in p["amplifiers_us"] for r in _of(rows, tau)]
@@ -86,18 +86,18 @@ def _of(rows: Sequence[Row], tau: float) -> list[Row]:
     return [r for r in rows if r.params.get("amplifier_us") == tau]
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.4.1 says."""
     found = [
         Statement(
             "The sensor responds at approximately 50 us.",
             "50 us",
-            f"V_in begins to move {said['impact']['moved_us']:g} us after the impact",
+            f"V_in begins to move {summary['impact']['moved_us']:g} us after the impact",
             None,
             "the fabric's delay is taken over from here, so it is no test; on the board the scan adds 0 to 192 us",
         )
     ]
-    for scan in said["scans"]:
+    for scan in summary["scans"]:
         worst = max(scan["settles_us"])
         if scan["amplifier_us"] == 0:
             found.append(
@@ -124,16 +124,16 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(_p: Parameters, said: Said) -> Figure:
+def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw 4.7: the impact, and one comparator's input, ramp and output over a column."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=[1, 1.6])
-    left.plot(said["impact"]["t_us"], said["impact"]["volts"], color="C2")
+    left.plot(summary["impact"]["t_us"], summary["impact"]["volts"], color="C2")
     left.axvline(0.0, color="k", ls=":", lw=0.9)
     left.set(xlabel="time since the impact, us", ylabel="V_in, V", title="(a)")
-    seen = said["scans"][0]["trace"]
+    seen = summary["scans"][0]["trace"]
     t = np.array(seen["t_us"]) - seen["t_us"][0]
     right.plot(t, seen["ramp_v"], color="C3", label="V_ramp")
     right.plot(t, seen["input_v"], color="C2", label="V_in")

@@ -13,7 +13,7 @@ from taxel.information import confusion_matrix, nested_predictions, panzeri_trev
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,10 +57,10 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     """Drop the ball so many times; or see what discriminants make of all films at a period."""
-    told = dropped.told(params, seed, courses, TENNIS)
-    if told is not None:
-        return told
-    x, y = films(params, seed, courses, params["period_ms"], TENNIS.length_ms, aligned=params["aligned"])
+    drops = dropped.played_summary(params, seed, courses, TENNIS)
+    if drops is not None:
+        return drops
+    x, y = sampled_drops(params, seed, courses, params["period_ms"], TENNIS.length_ms, aligned=params["aligned"])
     x -= x.mean(0)
     named = nested_predictions([x @ x.T], [int(x.any(0).sum())], y, count=10, seed=seed)
     return {
@@ -69,7 +69,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     }
 
 
-def films(
+def sampled_drops(
     p: Parameters, seed: int, courses: Path, period_ms: float, length_ms: float, *, aligned: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return all drops' films at a period, one a row, and the number of each one's condition."""
@@ -83,16 +83,16 @@ def films(
     return np.concatenate(parts), np.repeat(np.arange(len(parts)), [len(part) for part in parts])
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by period; keep one drop's pictures."""
     asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
     one = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses, TENNIS).ticks[:1]
     frame_ms = TENNIS.frame_us / 1000
-    shown = dropped.pictures(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
+    whole = dropped.pictures(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
     shown = dropped.pictures(one, PICTURE_MS, np.zeros(1), TENNIS, (PICTURES + 1) * PICTURE_MS)[0]
     x = np.arange(TENNIS.region**2) % TENNIS.region - TENNIS.region // 2
     y = np.arange(TENNIS.region**2) // TENNIS.region - TENNIS.region // 2
-    most = np.clip(shown[int(shown.sum(1).argmax())], 0, None)
+    most = np.clip(whole[int(whole.sum(1).argmax())], 0, None)
     return {
         "lines": [
             {
@@ -103,23 +103,23 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
             for period in sorted(p["periods_ms"])
         ],
         "conditions": len(dropped.conditions(p)),
-        "sum": [[round(frame_ms * k, 3), round(float(total))] for k, total in enumerate(shown.sum(1))],
+        "sum": [[round(frame_ms * k, 3), round(float(total))] for k, total in enumerate(whole.sum(1))],
         "middle": [round(float(np.average(of, weights=most)), 2) for of in (x, y)],
         "full": int(one.max()),
         "pictures": shown.round().astype(int).tolist(),
     }
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.4.2 says."""
-    lines, most = said["lines"], float(np.log2(said["conditions"]))
-    size = f"{said['conditions']} conditions, {p['drops']} drops each"
+    lines, most = summary["lines"], float(np.log2(summary["conditions"]))
+    size = f"{summary['conditions']} conditions, {p['drops']} drops each"
     listed = ", ".join(f"{line['bits']:.2f} at {_hz(line)}" for line in lines)
     any_phase = ", ".join(f"{line['any_phase_bits']:.2f}" for line in lines)
-    total = np.array(said["sum"])
+    total = np.array(summary["sum"])
     at, over = float(total[total[:, 1].argmax(), 0]), total[:, 1] < 0.1 * total[:, 1].max()
-    ended = next((t for (t, _), low in zip(said["sum"], over, strict=True) if low and t > at), float("inf"))
-    apart = float(np.hypot(*said["middle"]))
+    ended = next((t for (t, _), low in zip(summary["sum"], over, strict=True) if low and t > at), float("inf"))
+    apart = float(np.hypot(*summary["middle"]))
     found = [
         Statement(
             "Figure 4.8: pressure grows and decays around the taxel that answered first.",
@@ -127,7 +127,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             f"largest after {at:.1f} ms, below a tenth of that after {ended:.1f} ms, its middle {apart:.1f} taxels off "
             "the first",
             bool(0 < at < ended < TENNIS.length_ms and apart < AROUND),
-            f"around: within {AROUND:g} taxels; taxels under the ball reach the ramp's end ({said['full']} ticks)",
+            f"around: within {AROUND:g} taxels; taxels under the ball reach the ramp's end ({summary['full']} ticks)",
         )
     ]
     slow = [line for line in lines if line["period_ms"] > SLOW_MS]
@@ -167,17 +167,17 @@ def _hz(line: dict[str, Any]) -> str:
     return f"{1000 / line['period_ms']:g} Hz"
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 4.8 (the pictures) and 4.10 (bits)."""
-    return [_draw_film(p, said), _draw_bits(said)]
+    return [_draw_pictures(p, summary), _draw_bits(summary)]
 
 
-def _draw_film(p: Parameters, said: Said) -> Figure:
+def _draw_pictures(p: Parameters, summary: Summary) -> Figure:
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(9, 5), layout="constrained")
     axes = figure.subplots(2, PICTURES // 2).ravel()
-    pictures = np.array(said["pictures"])[1:].reshape(PICTURES, TENNIS.region, TENNIS.region)
+    pictures = np.array(summary["pictures"])[1:].reshape(PICTURES, TENNIS.region, TENNIS.region)
     for k, ax in enumerate(axes):
         shown = ax.imshow(pictures[k], cmap="viridis", vmin=0, vmax=pictures.max())
         ax.set_title(f"{PICTURE_MS * (k + 1):g} ms", fontsize="medium")
@@ -189,15 +189,15 @@ def _draw_film(p: Parameters, said: Said) -> Figure:
     return figure
 
 
-def _draw_bits(said: Said) -> Figure:
+def _draw_bits(summary: Summary) -> Figure:
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(6, 4), layout="constrained")
     ax = figure.subplots()
-    rates = [1000 / line["period_ms"] for line in said["lines"]]
-    ax.plot(rates, [line["bits"] for line in said["lines"]], "o-", label="sampled from the impact on")
-    ax.plot(rates, [line["any_phase_bits"] for line in said["lines"]], "s--", mfc="w", label="at any phase")
-    ax.axhline(np.log2(said["conditions"]), color="0.6", ls=":", label="ceiling")
+    rates = [1000 / line["period_ms"] for line in summary["lines"]]
+    ax.plot(rates, [line["bits"] for line in summary["lines"]], "o-", label="sampled from the impact on")
+    ax.plot(rates, [line["any_phase_bits"] for line in summary["lines"]], "s--", mfc="w", label="at any phase")
+    ax.axhline(np.log2(summary["conditions"]), color="0.6", ls=":", label="ceiling")
     ax.axvline(1000 / SLOW_MS, color="0.8")
     logarithmic(ax, x=rates)
     ax.set_ylim(0, None)

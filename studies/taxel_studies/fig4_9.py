@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from taxel_studies import dropped, fig4_8
 from taxel_studies.dropped import TENNIS
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,14 +51,14 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     """Drop the ball so many times; or lay all films at a rate out on a plane, and look at each one's neighbours."""
-    told = dropped.told(params, seed, courses, TENNIS)
-    if told is not None:
-        return told
+    drops = dropped.played_summary(params, seed, courses, TENNIS)
+    if drops is not None:
+        return drops
     from sklearn.manifold import TSNE  # noqa: PLC0415  an extra
 
     found: dict[str, Any] = {}
     for how, aligned in (("", True), ("any_phase_", False)):
-        x, y = fig4_8.films(params, seed, courses, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
+        x, y = fig4_8.sampled_drops(params, seed, courses, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
         laid = TSNE(perplexity=params["perplexity"], init="pca", random_state=seed).fit_transform(x)
         found[f"{how}own"] = round(own_neighbours(np.asarray(laid, np.float64), y), 4)
         if aligned:
@@ -75,7 +75,7 @@ def own_neighbours(places: NDArray[np.float64], y: NDArray[np.int64]) -> float:
     return float(np.mean(y[near] == y[:, None]))
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the maps by rate."""
     del courses
     maps = {row.params["rate_hz"]: row.result for row in rows if "rate_hz" in row.params}
@@ -83,9 +83,9 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
     return {"lines": [{"rate_hz": rate, **maps[rate]} for rate in sorted(maps)], "classes": names}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.4.2 says of the maps."""
-    lines = said["lines"]
+    lines = summary["lines"]
     fast = [line["own"] for line in lines if line["rate_hz"] >= CLEAR_HZ]
     slow = [line["own"] for line in lines if line["rate_hz"] < CLEAR_HZ]
     if not (fast and slow):
@@ -98,25 +98,25 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "the picture",
             f"of the {NEIGHBOURS} nearest in the map are of one's own class: {listed}",
             bool(min(fast) >= CLEAR and max(slow) < min(fast)),
-            f"clearly: {CLEAR:.0%} or more; by chance {1 / len(said['classes']):.2f}; sampling begun at any "
+            f"clearly: {CLEAR:.0%} or more; by chance {1 / len(summary['classes']):.2f}; sampling begun at any "
             f"phase instead of at the impact: {any_phase}; {p['drops']} drops a class, perplexity {p['perplexity']:g}",
         )
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw a map a rate."""
     del p
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
-    lines = said["lines"]
+    lines = summary["lines"]
     columns = min(3, len(lines))
     figure = Figure(figsize=(3 * columns, 3 * -(-len(lines) // columns) + 0.5), layout="constrained")
     axes = np.ravel(figure.subplots(-(-len(lines) // columns), columns, squeeze=False))
-    size = len(lines[0]["map"]) // len(said["classes"])
+    size = len(lines[0]["map"]) // len(summary["classes"])
     for ax, line in zip(axes, lines, strict=False):
         places = np.array(line["map"])
-        for k, name in enumerate(said["classes"]):
+        for k, name in enumerate(summary["classes"]):
             ax.plot(*places[k * size : (k + 1) * size].T, ".", ms=4, color=f"C{k}", label=name)
         ax.set_title(f"{line['rate_hz']:g} Hz", fontsize="medium")
     for ax in axes:

@@ -16,7 +16,7 @@ from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,7 +57,7 @@ PRINTED = {"period_ms": 1.0, "tau_ms": 0.4, "sigma_mm": 2.0}
 PLATEAU, PLATEAU_MS, FAST_MS = 0.9, 10.0, 2.0
 #: Above this period the loss should be marked.
 MARKED_MS = 5.0
-#: Bits, and shares of what can be told, that differ by less are alike: one drop of a class of 100 is some .01.
+#: Bits, and shares of the largest possible bits, that differ by less are alike: one drop of a class of 100 is some .01.
 ALIKE = 0.02
 
 
@@ -97,9 +97,9 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> Any:
     """Drop a ball so many times; or compare all drops at a period, and see what their neighbours make of them."""
-    told = dropped.told(params, seed, courses)
-    if told is not None:
-        return told
+    drops = dropped.played_summary(params, seed, courses)
+    if drops is not None:
+        return drops
     spikes, y = _spikes(params, seed, courses, aligned=params["ask"] != "any phase")
     period, tau, pitch = params["period_ms"], params["tau_ms"], Array.thesis().pitch_mm
     if params["ask"] == "search":
@@ -120,10 +120,10 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> Any:
             strict=True,
         )
     )
-    said = _bits(distances_of(by_end[spikes.shape[1]]), y, params, by=True)
+    whole = _bits(distances_of(by_end[spikes.shape[1]]), y, params, by=True)
     times = {end: _bits(distances_of(gram), y, params)["bits"] for end, gram in by_end.items()}
     return {
-        **said,
+        **whole,
         "events": round(float(spikes.sum()) / len(spikes), 1),
         "times": [[t, times[end]] for t, end in zip(params["times_ms"], ends, strict=True)],
     }
@@ -151,19 +151,19 @@ def _bits(
     distances: NDArray[np.float64], y: NDArray[np.int64], params: dict[str, Any], *, by: bool = False
 ) -> dict[str, Any]:
     """Return the information of what the neighbours say, and of each parameter in it."""
-    said = dropped.named_by_neighbours(distances, y, params["neighbours"])
-    found: dict[str, Any] = kept_bits.information(y, said, "bits", "right")
+    answers = dropped.named_by_neighbours(distances, y, params["neighbours"])
+    found: dict[str, Any] = kept_bits.information(y, answers, "bits", "right")
     if by:
         all_of_them = dropped.conditions(params)
         found["by"] = {}
         for name in VARIED:
             values = np.array([f"{getattr(one, name):g}" for one in all_of_them])
             if len(set(values.tolist())) > 1:
-                found["by"][name] = kept_bits.information(values[y], values[said], "bits", "most")
+                found["by"][name] = kept_bits.information(values[y], values[answers], "bits", "most")
     return found
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by period."""
     del courses
     lines = []
@@ -186,11 +186,11 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
     return {"lines": lines, "conditions": len(dropped.conditions(p))}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 5.6.4 says."""
-    lines, most = said["lines"], float(np.log2(said["conditions"]))
+    lines, most = summary["lines"], float(np.log2(summary["conditions"]))
     by = {line["period_ms"]: line for line in lines}
-    size = f"{said['conditions']} conditions, {p['drops']} drops each, {p['neighbours']} neighbours"
+    size = f"{summary['conditions']} conditions, {p['drops']} drops each, {p['neighbours']} neighbours"
     best = max(lines, key=lambda line: line["bits"])
     shorter = [line for line in lines if line["period_ms"] < PRINTED["period_ms"]]
     less = best["bits"] - max((line["bits"] for line in shorter), default=float("nan"))
@@ -304,8 +304,8 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
     ]
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
-    """Tell the search, period by period."""
+def tables(p: Parameters, summary: Summary) -> list[Table]:
+    """Return the search as a table, period by period."""
     return [
         Table(
             f"bits at a period of {_ms(line['period_ms'])} by tau and sigma",
@@ -313,14 +313,14 @@ def tables(p: Parameters, said: Said) -> list[Table]:
             [[f"{tau:g} ms", *(f"{b:.2f}" for b in bits)] for tau, bits in line["searched"]],
             folded=True,
         )
-        for line in said["lines"]
+        for line in summary["lines"]
     ]
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 5.11, 5.12 and 5.13."""
     return kept_bits.by_period_parameter_and_time(
-        said,
+        summary,
         figures=("5.11", "5.12", "5.13"),
         curves={"bits": "sampled from the impact on", "any_phase_bits": "at any phase"},
         named=VARIED,
@@ -335,7 +335,7 @@ STUDY = Study(
     where="thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13",
     protocol=(
         "The drops of the study drops. What the host holds is looked at every so often from the impact's first frame "
-        "on; a change above the board's noise floor since the last one that was told is an event, rises and falls "
+        "on; a change above the board's noise floor since the last one that was sent is an event, rises and falls "
         "apart. Trains are smoothed in time (5.8) and over taxels (5.11, a train counting twice at its own taxel, as "
         "printed), and compared by the Euclidean norm over taxels and time that 5.12's left side names; each drop is "
         "named by most of its 5 nearest others (the thesis gives no number). Bits of these answers, corrected by "

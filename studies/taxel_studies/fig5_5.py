@@ -13,7 +13,7 @@ from taxel.encode import FA1
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented, kept_bits
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -106,7 +106,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     """Press once; or sample all contacts at a period, and see what discriminants make of the spikes."""
     course = indented.make(params, courses)
     if course is not None:
-        return indented.told(course)
+        return indented.course_summary(course)
     conditions = indented.reached(params)
     grid, period, samples = SamplingGrid(), params["period_ms"], params["samples"]
     encoder = FA1(alpha=params["alpha"], range=params["range_kpa"], period_ms=period)
@@ -130,18 +130,18 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     sums = indented.summed(x, len(conditions), samples, seed)
     if params["ask"] == "bits":
         return indented.bits_of(sums, samples)
-    told = indented.told_apart(x, sums.folds)
+    varies = indented.varying(x, sums.folds)
     times = [
-        [t, indented.bits_of(sums, samples, features=k)["bits"] if told[:k].any() else 0.0]
+        [t, indented.bits_of(sums, samples, features=k)["bits"] if varies[:k].any() else 0.0]
         for t in params["times_ms"]
         if (k := round(t / period) * grid.taxels) and abs(k * period - t * grid.taxels) < 1e-6
     ]
     if params["ask"] == "part":
         return {"times": times}
-    said: dict[str, Any] = indented.bits_of(sums, samples)
+    whole: dict[str, Any] = indented.bits_of(sums, samples)
     spikes = np.count_nonzero(x.reshape(len(x), -1, grid.taxels), axis=1)
     return {
-        **said,
+        **whole,
         "rate_hz": round(float(spikes.mean()) / grid.duration_ms * 1000, 2),
         "most_rate_hz": round(float(spikes.reshape(len(conditions), -1).mean(1).max()) / grid.duration_ms * 1000, 2),
         "by": {
@@ -153,7 +153,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by period, alpha and question."""
     del courses
     lines = []
@@ -182,11 +182,11 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
     }
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 5.5.1, 5.5.3 and Table 5.3 say."""
-    lines, most = said["lines"], np.log2(said["conditions"])
+    lines, most = summary["lines"], np.log2(summary["conditions"])
     bits = [line["bits"] for line in lines]
-    size = f"{said['conditions']} conditions, {p['samples']} samples each, mesh {p['mesh_mm']:g} mm"
+    size = f"{summary['conditions']} conditions, {p['samples']} samples each, mesh {p['mesh_mm']:g} mm"
     short, long = lines[0], lines[-1]
     found = [
         Statement(
@@ -216,7 +216,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         ),
     ]
     found += _by_parameter(short, long, size) + _by_time(lines, size)
-    return [*found, _finer(short, said["part"], p["part_until_ms"], size)]
+    return [*found, _finer(short, summary["part"], p["part_until_ms"], size)]
 
 
 def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
@@ -276,26 +276,26 @@ def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: s
     )
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
-    """Tell the search over alpha."""
+def tables(p: Parameters, summary: Summary) -> list[Table]:
+    """Return the search over alpha, as a table."""
     del p
-    alphas = sorted({a for line in said["lines"] for a, _ in line["searched"]})
-    known = [dict(map(tuple, line["searched"])) for line in said["lines"]]
+    alphas = sorted({a for line in summary["lines"] for a, _ in line["searched"]})
+    known = [dict(map(tuple, line["searched"])) for line in summary["lines"]]
     rows = [[f"{a:g}", *(f"{bits[a]:.2f}" if a in bits else "-" for bits in known)] for a in alphas]
     return [
         Table(
             "bits by period and alpha",
-            ["alpha", *(f"{line['period_ms']:g} ms" for line in said["lines"])],
+            ["alpha", *(f"{line['period_ms']:g} ms" for line in summary["lines"])],
             rows,
             "below 2 ms only the best of the longer periods, its neighbours, and the printed 0.7 were tried",
         )
     ]
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 5.5, 5.6 and 5.8."""
     return kept_bits.by_period_parameter_and_time(
-        said,
+        summary,
         figures=("5.5", "5.6", "5.8"),
         curves={"bits": "A T as printed", "even_bits": f"A T of {p['even_ms']:g} ms"},
         named=VARIED,

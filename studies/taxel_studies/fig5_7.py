@@ -12,7 +12,7 @@ from taxel.encode import FA1
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     """Press once; or sample all contacts, and see what discriminants make of spikes with so many bits."""
     course = indented.make(params, courses)
     if course is not None:
-        return indented.told(course)
+        return indented.course_summary(course)
     conditions, samples = indented.reached(params), params["samples"]
     encoder = FA1(
         alpha=params["alpha"],
@@ -74,7 +74,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
     return indented.bits_of(indented.summed(x, len(conditions), samples, seed), samples)
 
 
-def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by period and bits an event."""
     del courses
     found = {
@@ -90,14 +90,13 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
     }
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 5.5.2 says."""
-    by = {line["event_bits"]: dict(zip(said["periods_ms"], line["bits"], strict=True)) for line in said["lines"]}
+    by = {line["event_bits"]: dict(zip(summary["periods_ms"], line["bits"], strict=True)) for line in summary["lines"]}
     few, many = min(by), max(by)
-    short, long = said["periods_ms"][0], said["periods_ms"][-1]
-    size = (
-        f"{said['conditions']} conditions, {p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
-    )
+    short, long = summary["periods_ms"][0], summary["periods_ms"][-1]
+    of_each = f"{p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
+    size = f"{summary['conditions']} conditions, {of_each}"
     gain = {period: by[many][period] - by[few][period] for period in (short, long)}
     found = [
         Statement(
@@ -109,7 +108,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             size,
         )
     ]
-    if {1, 10} <= set(by) and {2.0, 20.0} <= set(said["periods_ms"]):
+    if {1, 10} <= set(by) and {2.0, 20.0} <= set(summary["periods_ms"]):
         slow, quick = by[10][20.0], by[1][2.0]
         found.append(
             Statement(
@@ -123,19 +122,19 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 5.7: a line a number of bits."""
     del p
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(6, 4), layout="constrained")
     ax = figure.subplots()
-    for line in said["lines"]:
+    for line in summary["lines"]:
         ax.plot(
-            said["periods_ms"], line["bits"], ".-", label=f"{line['event_bits']} bit{'s' * (line['event_bits'] > 1)}"
+            summary["periods_ms"], line["bits"], ".-", label=f"{line['event_bits']} bit{'s' * (line['event_bits'] > 1)}"
         )
-    ax.axhline(np.log2(said["conditions"]), color="0.6", ls=":")
-    logarithmic(ax, x=said["periods_ms"])
+    ax.axhline(np.log2(summary["conditions"]), color="0.6", ls=":")
+    logarithmic(ax, x=summary["periods_ms"])
     ax.set_xlabel("sampling period, ms")
     ax.set_ylabel("bits")
     ax.legend(title="an event", fontsize="small")

@@ -14,7 +14,7 @@ from taxel.spikes import SpikeTrains
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE, thresholds
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,33 +72,33 @@ def _sum_of_kernels(
     return total
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Keep the one neuron's story."""
     del p
-    said: Said = rows[0].result
-    return said
+    summary: Summary = rows[0].result
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.3.1 and the caption say."""
-    times, potential = np.array(said["times"]), np.array(said["potential"])
+    times, potential = np.array(summary["times"]), np.array(summary["potential"])
     theta = thresholds(np.array(p["targets"]), p["targets"])
-    off = np.max(np.abs(np.array(said["at_targets"]) - theta))
+    off = np.max(np.abs(np.array(summary["at_targets"]) - theta))
     quiet = np.any([(times > t) & (times <= t + TABLE["refractory"]) for t in p["targets"]], axis=0)
     raised = thresholds(np.array([t + TABLE["refractory"] for t in p["targets"]]), p["targets"])
-    exact = len(said["spikes"]) == len(p["targets"])
+    exact = len(summary["spikes"]) == len(p["targets"])
     return [
         Statement(
             "The membrane potential is the sum of all postsynaptic potentials (6.4, 6.5).",
             "the printed sum",
-            f"neuron against the printed sum: {said['worst_of_sum']:.0e} mV at most",
-            said["worst_of_sum"] < 1e-12,
+            f"neuron against the printed sum: {summary['worst_of_sum']:.0e} mV at most",
+            summary["worst_of_sum"] < 1e-12,
         ),
         Statement(
             "A spike is discharged where the potential meets the threshold: U is at it at each target.",
             "U = theta",
-            f"|U - theta| at the targets: {off:.0e} mV; fires at {', '.join(f'{t:.6f}' for t in said['spikes'])} ms",
-            bool(off < 1e-12) and exact and bool(np.max(np.abs(np.subtract(said["spikes"], p["targets"]))) < 1e-6),
+            f"|U - theta| at the targets: {off:.0e} mV; fires at {', '.join(f'{t:.6f}' for t in summary['spikes'])} ms",
+            bool(off < 1e-12) and exact and bool(np.max(np.abs(np.subtract(summary["spikes"], p["targets"]))) < 1e-6),
         ),
         Statement(
             "The neuron then holds its resting potential for the absolute refractory period.",
@@ -116,7 +116,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.1: input trains, output train, and the dynamics in the lower right panel."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
@@ -125,8 +125,8 @@ def draw(p: Parameters, said: Said) -> Figure:
         [["inputs", "output"], ["inputs", "dynamics"]], height_ratios=[1, 5], width_ratios=[2, 3]
     )
     inputs, output, dynamics = axes["inputs"], axes["output"], axes["dynamics"]
-    weights = np.array(said["weights"])
-    inputs.eventplot(said["trains"], colors=_by_sign(weights), linewidths=1.0, linelengths=0.8)
+    weights = np.array(summary["weights"])
+    inputs.eventplot(summary["trains"], colors=_by_sign(weights), linewidths=1.0, linelengths=0.8)
     inputs.set(
         xlabel="time, ms",
         ylabel="input",
@@ -134,18 +134,18 @@ def draw(p: Parameters, said: Said) -> Figure:
     )
     inputs.set_xlim(0, p["stop"])
     output.eventplot(
-        [p["targets"], said["spikes"]], colors=["0.6", "k"], linewidths=2.0, lineoffsets=[1, 0], linelengths=0.8
+        [p["targets"], summary["spikes"]], colors=["0.6", "k"], linewidths=2.0, lineoffsets=[1, 0], linelengths=0.8
     )
     output.set(yticks=[0, 1], yticklabels=["neuron", "target"], title="output spike train")
     output.set_xlim(0, p["stop"])
-    times = np.array(said["times"])
+    times = np.array(summary["times"])
     largest = np.argsort(-np.abs(weights))[:12]
     for n in largest:
-        for spike in said["trains"][n]:
+        for spike in summary["trains"][n]:
             x = np.maximum(times - spike, 0.0) / TABLE["tau"]
             dynamics.plot(times, weights[n] * x * np.exp(-x), color="C1", lw=0.8, alpha=0.8)
     dynamics.plot([], [], color="C1", lw=0.8, label="postsynaptic potentials")
-    dynamics.plot(times, said["potential"], "k", lw=1.4, label="membrane potential U")
+    dynamics.plot(times, summary["potential"], "k", lw=1.4, label="membrane potential U")
     dynamics.plot(times, thresholds(times, p["targets"]), "C2--", lw=1.2, label="threshold")
     for k, target in enumerate(p["targets"]):
         spike, quiet = ("output spike", "absolute refractory period") if k == 0 else ("", "")

@@ -8,7 +8,7 @@ import numpy as np
 
 from taxel_studies import waves
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Said, Statement, Study
+from taxel_studies.study import Parameters, Statement, Study, Summary
 from taxel_studies.waves import NOISES, READINGS, TRAINED_AT, realise
 
 if TYPE_CHECKING:
@@ -39,11 +39,11 @@ def tasks(p: Parameters) -> list[Task]:
     return waves.tasks(p, settings, settings, "cone_r")
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
     found = []
     for reading in p["readings"]:
-        curves = said["curves"][reading]
+        curves = summary["curves"][reading]
         why = waves.why(reading)
         clean = curves["clean"]
         claims = (
@@ -107,7 +107,7 @@ def _spread(curves: dict[str, Any]) -> float:
     return float(np.mean(spreads))
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.10 once a reading: left noise-free, right noisy training; rows jitter, background, shunting."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
@@ -118,7 +118,7 @@ def draw(p: Parameters, said: Said) -> Figure:
         axes = part.subplots(len(p["levels"]), 2, squeeze=False)
         for row, noise in enumerate(p["levels"]):
             for column, training in enumerate(("clean", "noisy")):
-                curve = said["curves"][reading][training][noise]
+                curve = summary["curves"][reading][training][noise]
                 for k, ratio in enumerate(p["ratios"]):
                     label = f"{ratio[0]:g} : {ratio[1]:g}"
                     axes[row, column].errorbar(curve["levels"], curve["mean"][k], curve["sem"][k], label=label, lw=1.2)

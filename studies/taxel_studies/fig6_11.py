@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taxel_studies import waves
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 from taxel_studies.waves import READINGS, realise
 
 if TYPE_CHECKING:
@@ -54,15 +54,15 @@ def tasks(p: Parameters) -> list[Task]:
     ]
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Average the histograms over trials, as shares of the weights."""
     bound = waves.LEARN["ub"]
     half = round(bound / p["bin_mv"])
     # A bin is centred at 0, where l1 leaves many weights.
     edges = (np.arange(-half, half + 2) - 0.5) * p["bin_mv"]
-    said: Said = {"centres": ((edges[:-1] + edges[1:]) / 2).round(6).tolist(), "shares": {}}
+    summary: Summary = {"centres": ((edges[:-1] + edges[1:]) / 2).round(6).tolist(), "shares": {}}
     for reading in p["readings"]:
-        said["shares"][reading] = {}
+        summary["shares"][reading] = {}
         for training in p["trainings"]:
             weights = [
                 r.result["found"][0]["weights"]
@@ -70,8 +70,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                 if r.params["divide_b_by"] == reading and r.params["training"] == training
             ]
             counts = np.histogram(np.clip(weights, edges[0], edges[-1]), edges)[0]
-            said["shares"][reading][training] = (counts / counts.sum()).round(6).tolist()
-    return said
+            summary["shares"][reading][training] = (counts / counts.sum()).round(6).tolist()
+    return summary
 
 
 def modes(shares: NDArray[np.float64]) -> list[int]:
@@ -96,14 +96,14 @@ def modes(shares: NDArray[np.float64]) -> list[int]:
     return found
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
     found = []
-    centres = np.array(said["centres"])
+    centres = np.array(summary["centres"])
     for reading in p["readings"]:
         why = READINGS[reading]
         for training in p["trainings"]:
-            shares = np.array(said["shares"][reading][training])
+            shares = np.array(summary["shares"][reading][training])
             where = [float(centres[k]) for k in modes(shares)]
             ours = "modes at " + ", ".join(f"{w:.3f}" for w in where) + " mV"
             if training == "clean":
@@ -119,7 +119,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.11: a row a training, a column a reading."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
@@ -128,13 +128,15 @@ def draw(p: Parameters, said: Said) -> Figure:
     for column, reading in enumerate(p["readings"]):
         axes[0, column].set_title(READINGS[reading])
         for row, training in enumerate(p["trainings"]):
-            shares = 100 * np.array(said["shares"][reading][training])
-            edges = np.append(np.array(said["centres"]) - 0.5 * p["bin_mv"], said["centres"][-1] + 0.5 * p["bin_mv"])
+            shares = 100 * np.array(summary["shares"][reading][training])
+            edges = np.append(
+                np.array(summary["centres"]) - 0.5 * p["bin_mv"], summary["centres"][-1] + 0.5 * p["bin_mv"]
+            )
             axes[row, column].stairs(shares, edges, fill=True, color="C0" if row else "0.4")
             axes[row, column].set_ylabel(f"{'no noise' if training == 'clean' else training}\n% of weights")
         axes[-1, column].set_xlabel("weight, mV")
-    held = np.array([shares for trainings in said["shares"].values() for shares in trainings.values()]).max(axis=0)
-    drawn = np.array(said["centres"])[held > DRAWN_FROM]
+    held = np.array([shares for trainings in summary["shares"].values() for shares in trainings.values()]).max(axis=0)
+    drawn = np.array(summary["centres"])[held > DRAWN_FROM]
     axes[0, 0].set_xlim(drawn[0] - 2 * p["bin_mv"], drawn[-1] + 2 * p["bin_mv"])
     return figure
 

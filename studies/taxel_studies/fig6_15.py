@@ -17,7 +17,7 @@ from taxel_studies.gait.recipes import NOTES, PRINTED
 from taxel_studies.gait.sources import SOURCES, fingerprint
 from taxel_studies.gait.statements import STANDS_FOR
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,10 +71,10 @@ def unread(p: Parameters, data: Path) -> dict[str, str]:
     return sources.unread(data, p["sources"])
 
 
-def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
     """Add up the folds; of SKIM's thresholds the one with the fewest missed and false over all of them, as 6.5.4."""
     del p, data
-    said: Said = {"rows": []}
+    summary: Summary = {"rows": []}
     keys = dict.fromkeys((r.params["source"], r.params["recipe"], r.params["event"]) for r in rows)
     for source, recipe, event in keys:
         for kind in LEARNERS:
@@ -90,8 +90,8 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
                 found = added[threshold] | {"threshold": float(threshold)}
             else:
                 found = _added([r.result["tested"] for r in here])
-            said["rows"].append({"source": source, "recipe": recipe, "event": event, "learner": kind, **found})
-    return said
+            summary["rows"].append({"source": source, "recipe": recipe, "event": event, "learner": kind, **found})
+    return summary
 
 
 def _added(tested: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -109,16 +109,16 @@ def _added(tested: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.5.4 says, in each recipe and source."""
     found = []
     for recipe in p["recipes"]:
         about = RECIPES[recipe][0]
-        for source, event in dict.fromkeys((r["source"], r["event"]) for r in said["rows"] if r["recipe"] == recipe):
+        for source, event in dict.fromkeys((r["source"], r["event"]) for r in summary["rows"] if r["recipe"] == recipe):
             cone, skim = (
                 next(
                     r
-                    for r in said["rows"]
+                    for r in summary["rows"]
                     if (r["source"], r["event"], r["recipe"], r["learner"]) == (source, event, recipe, kind)
                 )
                 for kind in LEARNERS
@@ -157,14 +157,14 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.15: top what was found, below it what was false, bottom the error; a column a recipe."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(6.5 * len(p["recipes"]), 7.5), layout="constrained")
     axes = figure.subplots(3, len(p["recipes"]), sharex="col", squeeze=False)
     for column, recipe in enumerate(p["recipes"]):
-        rows = [r for r in said["rows"] if r["recipe"] == recipe]
+        rows = [r for r in summary["rows"] if r["recipe"] == recipe]
         groups = list(dict.fromkeys((r["source"], r["event"]) for r in rows))
         for row in rows:
             skim = row["learner"] == "skim"

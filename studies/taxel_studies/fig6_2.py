@@ -10,7 +10,7 @@ import numpy as np
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,16 +55,16 @@ def tasks(p: Parameters) -> list[Task]:
     ]
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up a kappa: the slope at the target, and how far the potential stays above threshold within delta t."""
     times = np.array(rows[0].params["times"])
     at = int(np.searchsorted(times, p["target"]))
     behind = int(np.searchsorted(times, p["target"] + DELTA_T))
-    said: Said = {"times": times.tolist(), "kappas": []}
+    summary: Summary = {"times": times.tolist(), "kappas": []}
     for kappa in p["kappas"]:
         here = [r.result for r in rows if r.params["learn"]["kappa"] == kappa]
         potential = np.array([r["potential"] for r in here])
-        said["kappas"].append(
+        summary["kappas"].append(
             {
                 "kappa": kappa,
                 **mapping.timing(here, [p["target"]]),
@@ -75,18 +75,18 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                 "potential": here[0]["potential"],
             }
         )
-    return said
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.3.2 says."""
-    all_ = said["kappas"]
+    all_ = summary["kappas"]
     slopes, rises = [c["slope"] for c in all_], [c["rise"] for c in all_]
     return [
         Statement(
             "The same output spike time is maintained.",
             "the target",
-            *mapping.told(all_),
+            *mapping.exactness(all_),
         ),
         Statement(
             "The potential crosses the threshold more steeply for kappa > 1.",
@@ -108,15 +108,15 @@ def _by_kappa(p: Parameters, values: Sequence[float], form: str) -> str:
     return ", ".join(f"{format(v, form)} at kappa {k:g}" for k, v in zip(p["kappas"], values, strict=True))
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.2: the potential around the target, without and with kappa."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
     ax = figure.subplots()
     theta, target = TABLE["theta_0"], p["target"]
-    for number, c in enumerate(said["kappas"]):
-        ax.plot(said["times"], c["potential"], color=f"C{number}", lw=1.6, label=f"kappa = {c['kappa']:g}")
+    for number, c in enumerate(summary["kappas"]):
+        ax.plot(summary["times"], c["potential"], color=f"C{number}", lw=1.6, label=f"kappa = {c['kappa']:g}")
         if c["kappa"] > 1:
             ax.axhline(c["kappa"] * theta, color=f"C{number}", ls=":", lw=1.0)
             ax.annotate("kappa theta", (p["drawn"][0], c["kappa"] * theta), va="bottom", fontsize="small")

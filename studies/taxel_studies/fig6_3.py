@@ -13,7 +13,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -131,15 +131,15 @@ class _Rows:
         }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Keep both surfaces."""
     del p
     return {row.params["learner"]: row.result for row in rows}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.3.4 says."""
-    x, r = said["cone_x"], said["cone_r"]
+    x, r = summary["cone_x"], summary["cone_r"]
     surface, axis = np.array(r["objective"]), np.array(r["axis"])
     least = np.unravel_index(np.argmin(surface), surface.shape)
     rows = _Rows({**p})
@@ -196,13 +196,13 @@ def _bend(surface: NDArray[np.float64]) -> float:
     return float(min((a + b - 2 * middle).min() for a, b in pairs))
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.3: left CONE-X with its line, right CONE-R; below them the same from above."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(12, 10.5), layout="constrained")
     for number, (learner, title) in enumerate((("cone_x", "CONE-X"), ("cone_r", "CONE-R")), 1):
-        found = said[learner]
+        found = summary[learner]
         axis, surface = np.array(found["axis"]), np.array(found["objective"])
         first, second = np.meshgrid(axis, axis, indexing="ij")
         line, height = np.array(found["line"]["weights"]), np.array(found["line"]["objective"])

@@ -10,7 +10,7 @@ import numpy as np
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE, realise
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 from taxel_studies.waves import READINGS
 
 if TYPE_CHECKING:
@@ -66,13 +66,13 @@ def tasks(p: Parameters) -> list[Task]:
     ]
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up a reading and a kappa: spikes, potential behind the target, weights by distance from it."""
     times = _times(p)
     behind = times.index(p["target"] + DELTA_T)
-    said: Said = {"times": times, "readings": {}}
+    summary: Summary = {"times": times, "readings": {}}
     for reading in p["readings"]:
-        said["readings"][reading] = []
+        summary["readings"][reading] = []
         for kappa in p["kappas"]:
             here = [
                 r for r in rows if (r.params["learn"]["divide_b_by"], r.params["learn"]["kappa"]) == (reading, kappa)
@@ -83,7 +83,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                 for r in solved
             ]
             first = here[0].result
-            said["readings"][reading].append(
+            summary["readings"][reading].append(
                 {
                     "kappa": kappa,
                     **mapping.timing([r.result for r in here], [p["target"]]),
@@ -96,13 +96,13 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                     "at": first["at"],
                 }
             )
-    return said
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.1 says."""
     found = []
-    for reading, all_ in said["readings"].items():
+    for reading, all_ in summary["readings"].items():
         behind = [c["behind"] for c in all_]
         weights = [c["near_weight"] for c in all_]
         why = READINGS[reading]
@@ -110,7 +110,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             Statement(
                 "The potential crosses the threshold at 100 ms for every kappa: all sets of solutions are feasible.",
                 "100 ms",
-                *mapping.told(all_),
+                *mapping.exactness(all_),
                 why,
             ),
             Statement(
@@ -137,17 +137,17 @@ def _by_kappa(p: Parameters, values: Sequence[float | None], form: str) -> str:
     )
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.4 once a reading: left potential without spiking, right weights by spike time."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(11, 3.6 * len(p["readings"])), layout="constrained")
     axes = figure.subplots(len(p["readings"]), 2, squeeze=False)
     weighed = f"lambda ({', '.join(f'{v:g}' for v in p['lambdas'])})"
-    for row, (reading, all_) in enumerate(said["readings"].items()):
+    for row, (reading, all_) in enumerate(summary["readings"].items()):
         left, right = axes[row]
         for c in all_:
-            left.plot(said["times"], c["potential"], label=f"{c['kappa']:g}", lw=1.3)
+            left.plot(summary["times"], c["potential"], label=f"{c['kappa']:g}", lw=1.3)
             right.plot(c["at"], c["weights"], ".", ms=5, label=f"{c['kappa']:g}")
         left.axhline(TABLE["theta_0"], color="k", ls="--", lw=0.8)
         left.axvline(p["target"], color="0.6", lw=0.8)

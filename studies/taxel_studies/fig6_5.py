@@ -10,7 +10,7 @@ import numpy as np
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE, realise
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,16 +57,16 @@ def tasks(p: Parameters) -> list[Task]:
     ]
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Sum up a ratio: spikes, zero weights, where the largest weight sits."""
-    said: Said = {"times": rows[0].params["times"], "ratios": []}
+    summary: Summary = {"times": rows[0].params["times"], "ratios": []}
     for ratio in p["ratios"]:
         here = [r.result for r in rows if r.params["learn"]["lambdas"][:2] == ratio]
         weights = np.array([r["weights"] for r in here])
         at = np.array([r["at"] for r in here])
         largest = p["target"] - at[np.arange(len(here)), np.argmax(weights, axis=1)]
         size = np.abs(weights)
-        said["ratios"].append(
+        summary["ratios"].append(
             {
                 "ratio": ratio,
                 **mapping.timing(here, [p["target"]]),
@@ -78,12 +78,12 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                 "at": here[0]["at"],
             }
         )
-    return said
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.2 and the caption say."""
-    all_ = said["ratios"]
+    all_ = summary["ratios"]
     zeros = [c["zeros"] for c in all_]
     listed = ", ".join(f"{z:g} at {c['ratio'][0]:g} : {c['ratio'][1]:g}" for z, c in zip(zeros, all_, strict=True))
     dense = next(c for c in all_ if c["ratio"][0] == 0)
@@ -92,7 +92,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         Statement(
             "The output spike time remains unchanged.",
             "100 ms",
-            *mapping.told(all_),
+            *mapping.exactness(all_),
         ),
         Statement(
             "With l2 all synapses contribute; with l1 only the most significant ones.",
@@ -118,15 +118,15 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.5: left potential without spiking, right weights by spike time."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(11, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for c in said["ratios"]:
+    for c in summary["ratios"]:
         label = f"{c['ratio'][0]:g} : {c['ratio'][1]:g}"
-        left.plot(said["times"], c["potential"], label=label, lw=1.3)
+        left.plot(summary["times"], c["potential"], label=label, lw=1.3)
         at, weights = np.array(c["at"]), np.array(c["weights"])
         used = np.abs(weights) >= ZERO
         right.plot(at[used], weights[used], ".", ms=6, label=f"{label} ({used.sum()} used)")

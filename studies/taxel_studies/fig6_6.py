@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE, realise, thresholds
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,13 +66,13 @@ def _silent(p: Parameters, times: NDArray[np.float64]) -> NDArray[np.bool_]:
     return free
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Average the potentials, by reading and norm."""
     times = np.array(rows[0].params["times"])
     silent = _silent(p, times)
-    said: Said = {"times": times.tolist(), "readings": {}}
+    summary: Summary = {"times": times.tolist(), "readings": {}}
     for reading in p["readings"]:
-        said["readings"][reading] = {}
+        summary["readings"][reading] = {}
         for norm, lambdas in p["norms"].items():
             here = [
                 r.result
@@ -81,7 +81,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
             ]
             solved = [r for r in here if r["status"] == "solved"]
             between = np.array([r["between"] for r in solved]).reshape(len(solved), len(times))
-            said["readings"][reading][norm] = {
+            summary["readings"][reading][norm] = {
                 **mapping.timing(here, p["targets"]),
                 "mean_between": round(float(between[:, silent].mean()), 4) if solved else None,
                 "potential": between.mean(axis=0).round(5).tolist() if solved else [],
@@ -89,21 +89,21 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                 if solved
                 else None,
             }
-    return said
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.3 says."""
     del p
     found = []
-    for reading, norms in said["readings"].items():
+    for reading, norms in summary["readings"].items():
         why = f"after a spike “{reading}”"
         mean = {norm: c["mean_between"] for norm, c in norms.items()}
         found += [
             Statement(
                 "For all realisations the weights map the trains to the targets.",
                 "100 of 100, both norms",
-                *mapping.told(list(norms.values())),
+                *mapping.exactness(list(norms.values())),
                 why,
             ),
             Statement(
@@ -117,15 +117,15 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.6 once a reading: solid l2, dot-dash l1, dashed the threshold."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(10, 3.4 * len(p["readings"])), layout="constrained")
     axes = figure.subplots(len(p["readings"]), 1, sharex=True, squeeze=False)[:, 0]
-    times = np.array(said["times"])
+    times = np.array(summary["times"])
     fine = np.arange(0.0, p["stop"], 0.1)
-    for ax, (reading, norms) in zip(axes, said["readings"].items(), strict=True):
+    for ax, (reading, norms) in zip(axes, summary["readings"].items(), strict=True):
         for norm, style in (("l2", "-"), ("l1", "-.")):
             if norm in norms and norms[norm]["potential"]:
                 ax.plot(

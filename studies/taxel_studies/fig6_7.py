@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel_studies.capacity import realise
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,7 +52,7 @@ def tasks(p: Parameters) -> list[Task]:
     return [Task(params) for params in listed]
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List the largest load by reading, time, classes and inputs."""
     lines = []
     for reading in p["readings"]:
@@ -78,16 +78,16 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
     return {"lines": lines, "others": OTHERS}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.4 says, in each reading of what remains after a spike, on the grid and in continuous time."""
     found = []
     for reading in p["readings"]:
         for time in p["times"]:
-            lines = [line for line in said["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
+            lines = [line for line in summary["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
             found += _of(
                 p, lines, f"after a spike “{reading}”, " + ("1 ms grid" if time == "grid" else "every instant")
             )
-    found += _price(p, said)
+    found += _price(p, summary)
     return found
 
 
@@ -127,12 +127,12 @@ def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> list[Statement]
     ]
 
 
-def _price(p: Parameters, said: Said) -> list[Statement]:
+def _price(p: Parameters, summary: Summary) -> list[Statement]:
     found = []
     for reading in p["readings"]:
         lines = {
             time: np.array(
-                [line["p"] for line in said["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
+                [line["p"] for line in summary["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
             )
             for time in p["times"]
         }
@@ -152,14 +152,14 @@ def _price(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.7: load by inputs, a line a number of classes; a panel a time and reading."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     shape = len(p["readings"]), len(p["times"])
     figure = Figure(figsize=(5.5 * shape[1], 3.6 * shape[0]), layout="constrained")
     axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
-    for line in said["lines"]:
+    for line in summary["lines"]:
         ax = axes[p["readings"].index(line["after_spike"]), p["times"].index(line["time"])]
         ax.plot(line["inputs"], line["load"], ".-", lw=1.2, label=f"C = {line['classes']}")
         where = "1 ms grid" if line["time"] == "grid" else "every instant"

@@ -13,7 +13,7 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies import waves
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     train = waves.waves(times, np.random.default_rng([seed, 3]), params["repetitions"])
     clean = train.trains
     end = float(train.targets[params["drawn_repetitions"] - 1] + waves.GAP_MS[0])
-    told: dict[str, Any] = {
+    result: dict[str, Any] = {
         "status": cone.status_,
         "targets": train.targets.round(3).tolist(),
         "end": end,
@@ -65,7 +65,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     for number, (noise, level) in enumerate(params["levels"].items()):
         disturbed = waves.noisy(train, noise, level, np.random.default_rng([seed, 4, number]))
         spikes = cone.neuron_.run(cone.weights_, disturbed)
-        told["noises"][noise] = {
+        result["noises"][noise] = {
             "drawn": _drawn(disturbed, params, end),
             "spikes": spikes.round(3).tolist(),
             "distance": round(victor_purpura(spikes, train.targets, q=waves.Q), 3),
@@ -75,23 +75,23 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
             "of": len(clean.times),
             "stop": train.stop,
         }
-    return told
+    return result
 
 
 def _drawn(trains: SpikeTrains, params: dict[str, Any], end: float) -> list[list[float]]:
     return [train[train <= end].round(3).tolist() for train in trains][: params["drawn_inputs"]]
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Keep the one neuron's story."""
     del p
-    said: Said = rows[0].result
-    return said
+    summary: Summary = rows[0].result
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.5 and the caption say."""
-    noises = said["noises"]
+    noises = summary["noises"]
     found = []
     if "jitter" in noises:
         sd = noises["jitter"]["moved_sd_ms"]
@@ -133,42 +133,44 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         Statement(
             "A robust solution produces the target train despite noise.",
             "the bottom panel",
-            f"distance over {len(said['targets'])} targets: {said['clean_distance']:.2f} without noise, {listed}",
-            worst < ROBUST * len(said["targets"]),
+            f"distance over {len(summary['targets'])} targets: {summary['clean_distance']:.2f} without noise, {listed}",
+            worst < ROBUST * len(summary["targets"]),
             f"kappa {p['kappa']:g}, B over the number of targets; robust: below {ROBUST:.0%} of silence",
         )
     )
     return found
 
 
-def draw(p: Parameters, said: Said) -> Figure:
-    """Draw 6.8: a panel a noise, and the target with what the neuron said."""
+def draw(p: Parameters, summary: Summary) -> Figure:
+    """Draw 6.8: a panel a noise, and the target with the output spikes of the neuron."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(11, 9), layout="constrained")
-    axes = figure.subplots(len(said["noises"]) + 1, 1, sharex=True, height_ratios=[*(3 for _ in said["noises"]), 1.2])
-    clean = said["clean"]
-    for ax, (noise, told) in zip(axes, said["noises"].items(), strict=False):
-        kept = [set(train) for train in told["drawn"]]
+    axes = figure.subplots(
+        len(summary["noises"]) + 1, 1, sharex=True, height_ratios=[*(3 for _ in summary["noises"]), 1.2]
+    )
+    clean = summary["clean"]
+    for ax, (noise, shown) in zip(axes, summary["noises"].items(), strict=False):
+        kept = [set(train) for train in shown["drawn"]]
         if noise == "jitter":
             ax.eventplot(clean, colors="C3", alpha=0.3, linewidths=1, linelengths=0.8)
-            ax.eventplot(told["drawn"], colors="C3", linewidths=1, linelengths=0.8)
+            ax.eventplot(shown["drawn"], colors="C3", linewidths=1, linelengths=0.8)
         elif noise == "background":
             own = [set(train) for train in clean]
-            added = [[t for t in train if t not in own[n]] for n, train in enumerate(told["drawn"])]
+            added = [[t for t in train if t not in own[n]] for n, train in enumerate(shown["drawn"])]
             ax.eventplot(added, colors="0.6", linewidths=1, linelengths=0.8)
             ax.eventplot(clean, colors="C3", linewidths=1, linelengths=0.8)
         else:
             gone = [[t for t in train if t not in kept[n]] for n, train in enumerate(clean)]
             ax.eventplot(gone, colors="C3", alpha=0.3, linewidths=1, linelengths=0.8)
-            ax.eventplot(told["drawn"], colors="C3", linewidths=1, linelengths=0.8)
+            ax.eventplot(shown["drawn"], colors="C3", linewidths=1, linelengths=0.8)
         ax.set(ylabel="input", title=TITLES[noise].format(p["levels"][noise]))
-    names = ["target", *said["noises"]]
-    trains = [said["targets"], *(told["spikes"] for told in said["noises"].values())]
-    trains = [[t for t in train if t <= said["end"]] for train in trains]
+    names = ["target", *summary["noises"]]
+    trains = [summary["targets"], *(shown["spikes"] for shown in summary["noises"].values())]
+    trains = [[t for t in train if t <= summary["end"]] for train in trains]
     axes[-1].eventplot(trains, colors=["k", *(f"C{k}" for k in range(len(names) - 1))], linewidths=2, linelengths=0.7)
-    axes[-1].set(yticks=range(len(names)), yticklabels=names, xlabel="time, ms", xlim=(0, said["end"]))
-    axes[-1].set_title("target, and what the trained neuron said under each noise")
+    axes[-1].set(yticks=range(len(names)), yticklabels=names, xlabel="time, ms", xlim=(0, summary["end"]))
+    axes[-1].set_title("target, and spikes of the trained neuron under each noise")
     axes[-1].invert_yaxis()
     return figure
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel_studies import waves
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Said, Statement, Study
+from taxel_studies.study import Parameters, Statement, Study, Summary
 from taxel_studies.waves import NOISES, READINGS, realise
 
 if TYPE_CHECKING:
@@ -39,11 +39,11 @@ def tasks(p: Parameters) -> list[Task]:
     return waves.tasks(p, list(clean), list(noisy), "cone_x")
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.5 and 6.4.6 say, in each reading of B."""
     found = []
     for reading in p["readings"]:
-        curves = said["curves"][reading]
+        curves = summary["curves"][reading]
         why = waves.why(reading)
         for training, source in (("clean", "6.4.5"), ("noisy", "6.4.6")):
             trained = "noise-free training" if training == "clean" else "noisy training"
@@ -120,7 +120,7 @@ def _by_kappa(kappas: Sequence[float], values: Any, form: str = ".1f") -> str:
     return ", ".join(f"{v:{form}} at {k:g}" for k, v in zip(kappas, values, strict=True))
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.9 once a reading: rows a, b, c (clean, noisy, improvement), columns jitter, background, shunting."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
@@ -131,7 +131,7 @@ def draw(p: Parameters, said: Said) -> Figure:
         part.suptitle(READINGS[reading])
         axes = part.subplots(3, len(p["levels"]), squeeze=False)
         for column, noise in enumerate(p["levels"]):
-            _column(axes[:, column], said["curves"][reading], noise, p)
+            _column(axes[:, column], summary["curves"][reading], noise, p)
         for row, text in enumerate(
             ("(a) trained without noise\nVP distance", "(b) trained with noise\nVP distance", "(c) improvement, %")
         ):

@@ -32,8 +32,7 @@ __all__ = [
     "shared",
     "summed",
     "table_of",
-    "told",
-    "told_apart",
+    "varying",
 ]
 
 #: Table 5.1 as a study's parameters; elements and steps that serve it.
@@ -139,21 +138,21 @@ def bits_of(
     with warnings.catch_warnings():
         # Taxels that never fire, or always with others, are left out by LDA, as scikit-learn does.
         warnings.simplefilter("ignore", UserWarning)
-        said = sums.predictions(merge=None if merge is None else dict(merge), features=features)
+        answers = sums.predictions(merge=None if merge is None else dict(merge), features=features)
     truth = np.repeat(sums.classes, samples)
     if merge is not None:
         truth = np.array([merge[k] for k in truth.tolist()])
-    return information(truth, said, "bits", "plug_in", "right", "most")
+    return information(truth, answers, "bits", "plug_in", "right", "most")
 
 
-def told_apart(x: NDArray[Any], folds: NDArray[np.int64]) -> NDArray[np.bool_]:
+def varying(x: NDArray[Any], folds: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return which features vary in every training set: before any does there is nothing to tell."""
     least, most = (np.stack([way(x[folds == k], 0) for k in np.unique(folds)]) for way in (np.min, np.max))
     others = [np.arange(len(least)) != k for k in range(len(least))]
     return np.asarray(np.all([least[o].min(0) < most[o].max(0) for o in others], axis=0))
 
 
-def told(course: Course) -> dict[str, Any]:
+def course_summary(course: Course) -> dict[str, Any]:
     """Return what the studies of bits must know of a course."""
     return {
         "reached_mm": float(course.path_mm[-1]),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel.information import confusion_matrix, panzeri_treves, plug_in
-from taxel_studies.study import Said, logarithmic
+from taxel_studies.study import Summary, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,20 +35,20 @@ def listed(lines: Sequence[Mapping[str, Any]]) -> str:
 
 
 def lost(short: Mapping[str, Any], long: Mapping[str, Any], named: Mapping[str, str]) -> tuple[dict[str, float], str]:
-    """Return how much less can be told of each parameter at the longer of two periods, as a share, and in words."""
+    """Return how many bits less there are of each parameter at the longer of two periods, as a share, and in words."""
     share = {name: shares((short, long), name) for name in named if name in short["by"]}
     words = "; ".join(f"{named[name]} {a:.2f} to {b:.2f}" for name, (a, b) in share.items())
-    words += f" of what can be told, from {short['period_ms']:g} to {long['period_ms']:g} ms"
+    words += f" of the largest possible bits, from {short['period_ms']:g} to {long['period_ms']:g} ms"
     return {name: a - b for name, (a, b) in share.items()}, words
 
 
 def shares(lines: Sequence[Mapping[str, Any]], name: str) -> list[float]:
-    """Return which share of the bits that can be told of a parameter is told, period by period."""
+    """Return the bits of a parameter as a share of the largest possible, period by period."""
     return [line["by"][name]["bits"] / line["by"][name]["most"] for line in lines]
 
 
 def by_period_parameter_and_time(
-    said: Said,
+    summary: Summary,
     *,
     figures: tuple[str, str, str],
     curves: Mapping[str, str],
@@ -56,11 +56,11 @@ def by_period_parameter_and_time(
     times_ms: Sequence[float],
     since: str,
 ) -> list[Figure]:
-    """Draw three figures of what was found, period by period (``said["lines"]``).
+    """Draw three figures of what was found, period by period (``summary["lines"]``).
 
     Parameters
     ----------
-    said : what a study found; what was sampled in part (``said["part"]``) is in the third
+    summary : what a study found; what was sampled in part (``summary["part"]``) is in the third
     figures : the thesis' numbers of the three
     curves : of the first figure, what each curve of bits is called
     named : of the second, what each parameter is called
@@ -69,9 +69,9 @@ def by_period_parameter_and_time(
     """
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
-    lines = said["lines"]
+    lines = summary["lines"]
     periods = [line["period_ms"] for line in lines]
-    labels = ("bits", "share of the bits that can be told", "bits")
+    labels = ("bits", "share of the largest possible bits", "bits")
     found = []
     for k, (title, label) in enumerate(zip(figures, labels, strict=True)):
         figure = Figure(figsize=(6, 4), layout="constrained")
@@ -79,12 +79,12 @@ def by_period_parameter_and_time(
         if k == 0:
             for (name, called), (style, filled) in zip(curves.items(), (("o-", None), ("s--", "w")), strict=True):
                 ax.plot(periods, [line[name] for line in lines], style, mfc=filled, label=called)
-            ax.axhline(np.log2(said["conditions"]), color="0.6", ls=":", label="ceiling")
+            ax.axhline(np.log2(summary["conditions"]), color="0.6", ls=":", label="ceiling")
         elif k == 1:
             for name in lines[0]["by"]:
                 ax.plot(periods, shares(lines, name), "o-", label=named[name])
         else:
-            for line in (*([said["part"]] if "part" in said else []), *lines):
+            for line in (*([summary["part"]] if "part" in summary else []), *lines):
                 ax.plot(*zip(*line["times"], strict=True), ".-", label=f"{line['period_ms']:g} ms")
         logarithmic(ax, x=times_ms if k == 2 else periods)
         ax.set_xlabel(f"ms since {since}" if k == 2 else "sampling period, ms")

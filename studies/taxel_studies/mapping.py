@@ -12,17 +12,17 @@ from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["LEARN", "TABLE", "poisson", "realise", "single_spikes", "thresholds", "timing", "told"]
+__all__ = ["LEARN", "TABLE", "exactness", "poisson", "realise", "single_spikes", "thresholds", "timing"]
 
 #: Table 6.1; what it does not hold is taxel's default.
 TABLE: dict[str, Any] = {"tau": 15.0, "theta_0": 0.3, "theta_plus": 0.2, "refractory": 3.0}
 LEARN: dict[str, Any] = {"delta_t_ms": 1.5, "lb": -0.3, "ub": 0.3}
 
 
-def single_spikes(seed: int, inputs: int, stop: float, heard_to: float) -> SpikeTrains:
+def single_spikes(seed: int, inputs: int, stop: float, end: float) -> SpikeTrains:
     """Draw one spike an input, uniform on 0 to `stop` ms; the window ends at `heard_to`."""
     times = np.random.default_rng(seed).uniform(0.0, stop, inputs)
-    return SpikeTrains.from_lists([[t] for t in times], 0.0, heard_to)
+    return SpikeTrains.from_lists([[t] for t in times], 0.0, end)
 
 
 def poisson(seed: int, inputs: int, stop: float, low_hz: float, high_hz: float) -> SpikeTrains:
@@ -61,8 +61,8 @@ def timing(results: Sequence[dict[str, Any]], targets: Sequence[float]) -> dict[
     }
 
 
-def told(parts: Sequence[dict[str, Any]]) -> tuple[str, bool]:
-    """Say what `timing` found of several parts, and whether every one of them is exact."""
+def exactness(parts: Sequence[dict[str, Any]]) -> tuple[str, bool]:
+    """Describe what `timing` found of several parts, and whether every one of them is exact."""
     exact, of = sum(p["exact"] for p in parts), sum(p["of"] for p in parts)
     errors = [p["worst_error_ms"] for p in parts if p["worst_error_ms"] is not None]
     worst = f"worst error {max(errors):.0e} ms" if errors else "none fires as often as it should"
@@ -76,7 +76,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     ----------
     params : dict
         ``pattern`` ("single" or "poisson"), ``inputs``, ``stop`` (ms), ``targets`` (ms), ``learn`` (parameters
-        of `ConeX`), ``times`` (ms: where the potential is told; without spiking, or between output spikes).
+        of `ConeX`), ``times`` (ms: where the potential is sampled; without spiking, or between output spikes).
     seed : int
         Of the pattern.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from taxel.encode import FA1, FA2, SA1, SA2, Encoder
 from taxel.frames import Frames
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,9 +61,9 @@ def threshold(kind: str, frequency_hz: float, amplitudes: int, period_ms: float)
     t = np.arange(0.0, (warm + cycles) * 1000 / frequency_hz, period_ms)
     sizes = np.geomspace(1e-3, 1.0, amplitudes)
     course = (1 - np.cos(2 * np.pi * frequency_hz * t / 1000)) / 2
-    said = encoder(kind, period_ms).encode(frames(t, RANGE * course[:, None] * sizes))
+    spikes = encoder(kind, period_ms).encode(frames(t, RANGE * course[:, None] * sizes))
     answers = []
-    for times in said:
+    for times in spikes:
         cycle = np.floor(times * frequency_hz / 1000 + 1e-9).astype(int)
         counts = np.bincount(cycle[cycle >= 0], minlength=warm + cycles)[warm : warm + cycles]
         answers.append(bool((counts > 0).all()))
@@ -96,18 +96,18 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Keep what each type answered, and where its threshold is least."""
-    said: Said = {}
+    summary: Summary = {}
     for row in rows:
         known = [(f, a) for f, a in zip(p["frequencies_hz"], row.result["thresholds"], strict=True) if a is not None]
         least = min((a for _, a in known), default=None)
         near = [f for f, a in known if least is not None and a <= 1.02 * least]
-        said[row.params["kind"]] = {**row.result, "least": least, "least_hz": [near[0], near[-1]] if near else None}
-    return said
+        summary[row.params["kind"]] = {**row.result, "least": least, "least_hz": [near[0], near[-1]] if near else None}
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge phases and frequencies."""
     found = []
     fast, slow = (f"{ramp:g}" for ramp in (min(p["ramps_ms"]), max(p["ramps_ms"])))
@@ -117,7 +117,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         "SA-2": ("all through the hold", lambda q, s: min(q[2], s[2]) > 0 and s[4] == 0),
         "FA-2": ("fast rise and fall alone", lambda q, s: min(q[1], q[3]) > 0 and q[2] == 0 and sum(s) == 0),
     }
-    for kind, one in said.items():
+    for kind, one in summary.items():
         quick, gentle = one["phases"][fast], one["phases"][slow]
         says, holds = expected[kind]
         found.append(
@@ -134,9 +134,9 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             )
         )
     for kind, (low, high) in LEAST.items():
-        if kind not in said or said[kind]["least_hz"] is None:
+        if kind not in summary or summary[kind]["least_hz"] is None:
             continue
-        first, last = said[kind]["least_hz"]
+        first, last = summary[kind]["least_hz"]
         if not low <= max(p["frequencies_hz"]) or not min(p["frequencies_hz"]) <= high:
             continue
         why = "criterion: a spike in every cycle, peak to peak from contact on; within 2 % of the least"
@@ -155,21 +155,21 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List thresholds by frequency."""
     head = ["Hz", *(f"{f:g}" for f in p["frequencies_hz"])]
-    rows = [[kind, *("-" if a is None else f"{a:.3g}" for a in one["thresholds"])] for kind, one in said.items()]
+    rows = [[kind, *("-" if a is None else f"{a:.3g}" for a in one["thresholds"])] for kind, one in summary.items()]
     note = "shares of the range, peak to peak, at which every cycle has a spike; - where the whole range does not do"
     return [Table("thresholds by frequency", head, rows, note)]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw thresholds over frequency."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(6.5, 4), layout="constrained")
     axes = figure.subplots()
-    for kind, one in said.items():
+    for kind, one in summary.items():
         known = [(f, a) for f, a in zip(p["frequencies_hz"], one["thresholds"], strict=True) if a is not None]
         if known:
             axes.plot(*zip(*known, strict=True), "o-", markersize=4, label=kind)

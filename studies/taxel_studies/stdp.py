@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from taxel.learn import STDP
 from taxel.spikes import SpikeTrains
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -128,13 +128,13 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     since = times % end - begin[np.maximum(section, 0)]
     inside = (section >= 0) & (since <= params["pattern_ms"])
     last = times >= (params["parts"] - 1) * end
-    met = np.unique(section[last & inside])
-    latency = [since[last & inside & (section == k)].min() for k in met]
+    detected = np.unique(section[last & inside])
+    latency = [since[last & inside & (section == k)].min() for k in detected]
     outside = times[~inside]
     inputs = round(params["in_pattern"] * params["trains"])
     weights = stdp.weights_
     return {
-        "hits": round(len(met) / len(begin), 5),
+        "hits": round(len(detected) / len(begin), 5),
         "false": int(np.count_nonzero(last & ~inside)),
         "latency_ms": round(float(np.mean(latency)), 3) if latency else None,
         "found_s": round(float(outside[-1]) / 1000, 2) if len(outside) else 0.0,
@@ -158,7 +158,7 @@ def succeeded(result: dict[str, Any]) -> bool:
     )
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Count successes."""
     del p
     good = [row.result for row in rows if succeeded(row.result)]
@@ -170,25 +170,25 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
     return {"runs": len(rows), "good": len(good), "median": middle, "course": shown["course"]}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge the rate of success and what the neuron learnt."""
-    share = 100 * said["good"] / said["runs"]
+    share = 100 * summary["good"] / summary["runs"]
     # Two standard deviations of a count of so many runs.
-    give = 200 * np.sqrt(0.96 * 0.04 / said["runs"])
-    enough = p["parts"] * p["seconds"] >= 450 and said["runs"] >= ENOUGH_RUNS
+    give = 200 * np.sqrt(0.96 * 0.04 / summary["runs"])
+    enough = p["parts"] * p["seconds"] >= 450 and summary["runs"] >= ENOUGH_RUNS
     found = [
         Statement(
             "A neuron finds the pattern: it meets over 98 % of the last 150 s, 10 ms from its start or sooner, and "
             "fires at nothing else.",
             f"{PUBLISHED:g} % of 100 runs",
-            f"{share:.0f} % of {said['runs']} runs of {p['parts']} x {p['seconds']} s",
+            f"{share:.0f} % of {summary['runs']} runs of {p['parts']} x {p['seconds']} s",
             bool(abs(share - PUBLISHED) <= give + 0.5) if enough else None,
-            f"held to be within {give:.0f} %, of {ENOUGH_RUNS} runs or more; how rates wander is told by the paper "
+            f"held to be within {give:.0f} %, of {ENOUGH_RUNS} runs or more; how rates wander is stated by the paper "
             "in words",
         )
     ]
-    middle = said["median"]
-    if said["good"]:
+    middle = summary["median"]
+    if summary["good"]:
         found.append(
             Statement(
                 "It is found within seconds.",
@@ -208,21 +208,23 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List the medians of the runs that succeed."""
     del p
-    rows = [[name, "-" if value is None else f"{value:g}"] for name, value in said["median"].items()]
-    return [Table("runs that succeed, medians", ["what", "value"], rows, f"{said['good']} of {said['runs']} runs")]
+    rows = [[name, "-" if value is None else f"{value:g}"] for name, value in summary["median"].items()]
+    return [
+        Table("runs that succeed, medians", ["what", "value"], rows, f"{summary['good']} of {summary['runs']} runs")
+    ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw latencies of the first spikes of one run: 0 for those outside the pattern."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(6.5, 3.6), layout="constrained")
     axes = figure.subplots()
-    if said["course"]:
-        seconds, since = np.transpose(said["course"])
+    if summary["course"]:
+        seconds, since = np.transpose(summary["course"])
         axes.plot(seconds, since, ".", markersize=2)
     axes.set(xlabel="s", ylabel="ms from the pattern's start (0: outside)", ylim=(-1, p["pattern_ms"] + 1))
     return figure

@@ -13,8 +13,8 @@ from taxel.learn import STDP
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
-from taxel_studies.untold import moved, threshold, unlearning
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.unlabelled import moved, threshold, unlearning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -141,37 +141,35 @@ def judged(times: NDArray[np.float64], play: Play, begin: float) -> dict[str, An
         name: round(float(np.mean(fired[there & which])), 4)
         for name, which in (("same", play.same), ("other", ~play.same))
     }
-    told = late[there & fired]
+    in_touch = late[there & fired]
     return {
         **share,
-        "latency_ms": round(float(np.median(told)), 2) if len(told) else None,
+        "latency_ms": round(float(np.median(in_touch)), 2) if len(in_touch) else None,
         "beside": int(beside.sum()),
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List the boards."""
     del p
     boards = [{**row.result, "course": None} for row in rows]
     return {"boards": boards, "course": rows[0].result["course"]}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Say what it found."""
-    boards = said["boards"]
+    boards = summary["boards"]
 
     def middle(how: str, what: str) -> float:
         values = [one[how][what] for one in boards if one[how][what] is not None]
         return float(np.median(values)) if values else float("nan")
 
-    size = (
-        f"medians of {len(boards)} boards, {p['touches'] - p['touches'] // 2} touches each that were not heard before"
-    )
+    size = f"medians of {len(boards)} boards, {p['touches'] - p['touches'] // 2} new touches each"
     same, other, beside = (middle("learnt", what) for what in ("same", "other", "beside"))
     soon, untrained = middle("learnt", "latency_ms"), middle("untrained", "latency_ms")
     return [
         Statement(
-            "A neuron that is told nothing comes to fire at every touch, and at nothing else.",
+            "A neuron without labels comes to fire at every touch, and at nothing else.",
             "called for in 3.6.2",
             f"at {same:.0%} of the touches that come again, {other:.0%} of the others, {beside:g} times beside them",
             bool(min(same, other) >= EVERY and beside == 0),
@@ -185,7 +183,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             size,
         ),
         Statement(
-            "It tells the touch that comes again from the others.",
+            "It distinguishes the touch that comes again from the others.",
             "called for in 3.6.2",
             f"it fires at {same:.0%} of these and {other:.0%} of those",
             bool(same >= EVERY and other <= NONE),
@@ -195,15 +193,15 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw how soon after contact one neuron fires while it learns."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     del p
     figure = Figure(figsize=(6.5, 3.6), layout="constrained")
     axes = figure.subplots()
-    if said["course"]:
-        axes.plot(*np.transpose(said["course"]), ".", markersize=3)
+    if summary["course"]:
+        axes.plot(*np.transpose(summary["course"]), ".", markersize=3)
     axes.set(xlabel="touches presented", ylabel="ms from contact to spike", ylim=(0, None))
     return figure
 

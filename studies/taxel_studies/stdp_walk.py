@@ -13,8 +13,8 @@ from taxel.learn import STDP
 from taxel_studies.gait import sources
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
-from taxel_studies.untold import moved, threshold, unlearning
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.unlabelled import moved, threshold, unlearning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,10 +62,10 @@ def _feet(data: Path, levels: Sequence[float]) -> Mapping[str, Piece]:
 def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     """Train and test a neuron on one foot."""
     del seed
-    return heard(_feet(data, params["levels"])[params["foot"]], params)
+    return train_and_test(_feet(data, params["levels"])[params["foot"]], params)
 
 
-def heard(foot: Piece, params: Parameters) -> dict[str, Any]:
+def train_and_test(foot: Piece, params: Parameters) -> dict[str, Any]:
     """Train a neuron on the first half of a walk, presented again and again, and test it on the second."""
     # Whole, so that pieces end where the next ones begin.
     half = float(foot.spikes.stop // 2)
@@ -82,10 +82,10 @@ def heard(foot: Piece, params: Parameters) -> dict[str, Any]:
     learnt = judged(stdp.spikes_ - late, foot, half)
     # As often, without learning: at a lower threshold.
     hz = max(1000 * len(stdp.spikes_) / half, params["untrained_hz"])
-    deaf = unlearning(threshold(first, hz, taus), taus).partial_fit(foot.spikes)
+    untrained = unlearning(threshold(first, hz, taus), taus).partial_fit(foot.spikes)
     return {
         "learnt": learnt,
-        "untrained": judged(deaf.spikes_[deaf.spikes_ >= half], foot, half),
+        "untrained": judged(untrained.spikes_[untrained.spikes_ >= half], foot, half),
         "strong": int(np.count_nonzero(stdp.weights_ > 0.5)),
         "course": course,
     }
@@ -94,7 +94,7 @@ def heard(foot: Piece, params: Parameters) -> dict[str, Any]:
 def phases(
     times: NDArray[np.float64], contacts: NDArray[np.float64], begin: float, end: float
 ) -> tuple[NDArray[np.int64], list[tuple[float, float]], float]:
-    """Tell spikes by the stride that they fall into.
+    """Sort spikes by the stride that they fall into.
 
     Returns
     -------
@@ -116,10 +116,10 @@ def phases(
 
 def judged(times: NDArray[np.float64], foot: Piece, begin: float) -> dict[str, Any]:
     """Return how often a neuron fired once a stride, when in it, and how far that wanders (circular deviation)."""
-    counts, told, length = phases(times, foot.truth["contact"], begin, foot.scored[1])
-    if not len(counts) or not told:
+    counts, phased, length = phases(times, foot.truth["contact"], begin, foot.scored[1])
+    if not len(counts) or not phased:
         return {"strides": len(counts), "once": 0.0, "phase_ms": None, "wanders_ms": None}
-    turns = np.exp(2j * np.pi * np.array([share for _, share in told])).mean()
+    turns = np.exp(2j * np.pi * np.array([share for _, share in phased])).mean()
     phase = float(np.angle(turns)) / (2 * np.pi)
     wanders = float(np.sqrt(max(0.0, -2 * np.log(max(abs(turns), 1e-12))))) / (2 * np.pi)
     return {
@@ -135,7 +135,7 @@ def found(one: Mapping[str, Any]) -> bool:
     return one["wanders_ms"] is not None and one["once"] >= ONCE and one["wanders_ms"] <= WANDERS_MS
 
 
-def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
     """List the feet."""
     del p, data
     feet = [
@@ -147,19 +147,19 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
     return {"feet": feet, "shown": shown.params["foot"], "course": shown.result["course"]}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Say what it found."""
     del p
-    feet = [one for one in said["feet"] if not one["chosen_on"]] or said["feet"]
+    feet = [one for one in summary["feet"] if not one["chosen_on"]] or summary["feet"]
     good, by_chance = ([one for one in feet if found(one[how])] for how in ("learnt", "untrained"))
     wander = np.median([one["learnt"]["wanders_ms"] for one in good]) if good else float("nan")
     after = [one["learnt"]["phase_ms"] for one in good]
     near = sum(-WANDERS_MS <= t <= 2 * WANDERS_MS for t in after)
     return [
         Statement(
-            "A neuron that is told nothing comes to fire once a stride, always at the same moment of it.",
+            "A neuron without labels comes to fire once a stride, always at the same moment of it.",
             "called for in 3.6.2",
-            f"{len(good)} of {len(feet)} feet, in half a walk that it had not heard; a neuron that learns nothing and "
+            f"{len(good)} of {len(feet)} feet, in the second half of a walk; a neuron that learns nothing and "
             f"fires as often: {len(by_chance)}",
             bool(len(good) > len(feet) / 2 and len(good) > len(by_chance)) if len(feet) > CHOSEN_ON else None,
             f"found: one spike in {ONCE:.0%} of the strides and a deviation of {WANDERS_MS:g} ms or less; holds where "
@@ -176,18 +176,18 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw when one neuron fires while it learns, and when those fire that have found the stride."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     del p
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    if said["course"]:
-        left.plot(*np.transpose(said["course"]), ".", markersize=2)
-    left.set(xlabel="s presented", ylabel="share of the stride", ylim=(-0.02, 1.02), title=said["shown"])
+    if summary["course"]:
+        left.plot(*np.transpose(summary["course"]), ".", markersize=2)
+    left.set(xlabel="s presented", ylabel="share of the stride", ylim=(-0.02, 1.02), title=summary["shown"])
     for how, colour in (("untrained", "0.6"), ("learnt", "C0")):
-        every = [one[how] for one in said["feet"] if one[how]["wanders_ms"] is not None]
+        every = [one[how] for one in summary["feet"] if one[how]["wanders_ms"] is not None]
         right.plot(
             [one["wanders_ms"] for one in every], [one["once"] for one in every], "o", ms=4, color=colour, label=how
         )

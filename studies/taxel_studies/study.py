@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from taxel import FormatError, ProblemError, __version__
-from taxel.report import write_whole
-from taxel.report.provenance import installed
+from taxel.report import installed_sources, write_whole
 from taxel_studies.runner import HERE, Results, Task, Workers, one_of, run, whole
 
 if TYPE_CHECKING:
@@ -27,10 +26,10 @@ if TYPE_CHECKING:
 __all__ = [
     "Parameters",
     "Row",
-    "Said",
     "Section",
     "Statement",
     "Study",
+    "Summary",
     "Table",
     "drawn",
     "logarithmic",
@@ -42,7 +41,7 @@ __all__ = [
 #: Experiment parameters by name: what JSON can hold.
 Parameters = Mapping[str, Any]
 #: What a study found, as JSON holds it: enough to judge its statements and to draw its picture.
-Said = dict[str, Any]
+Summary = dict[str, Any]
 #: One study's part of the page, as ``summary.json`` holds it.
 Section = dict[str, Any]
 
@@ -127,12 +126,12 @@ class Study:
         Pure.
     summarise : function of (parameters, rows)
         Plain values for JSON: numbers and curves.
-    statements : function of (parameters, said)
-    draw : function of (parameters, said)
+    statements : function of (parameters, summary)
+    draw : function of (parameters, summary)
         The picture, as the source draws it; or several.
     then : function of (parameters, rows), optional
         The realisations that depend on what others gave: asked again until it lists nothing new.
-    tables : function of (parameters, said), optional
+    tables : function of (parameters, summary), optional
         Tables below the picture.
     data : tuple of str
         Folders of recordings that it needs.
@@ -152,11 +151,11 @@ class Study:
     sizes: Mapping[str, Parameters]
     tasks: Callable[..., Sequence[Task]]
     realise: Callable[..., Any]
-    summarise: Callable[..., Said]
-    statements: Callable[[Parameters, Said], Sequence[Statement]]
-    draw: Callable[[Parameters, Said], Figure | Sequence[Figure]]
+    summarise: Callable[..., Summary]
+    statements: Callable[[Parameters, Summary], Sequence[Statement]]
+    draw: Callable[[Parameters, Summary], Figure | Sequence[Figure]]
     then: Callable[..., Sequence[Task]] | None = None
-    tables: Callable[[Parameters, Said], Sequence[Table]] | None = None
+    tables: Callable[[Parameters, Summary], Sequence[Table]] | None = None
     data: tuple[str, ...] = field(default=())
     courses: bool = False
     needs: tuple[str, ...] = ()
@@ -184,12 +183,12 @@ class Study:
     @property
     def code(self) -> str:
         """The digest of what a realisation is computed by: when it changes, results are computed anew."""
-        return installed("taxel_studies").digest(self.realise.__module__)
+        return installed_sources("taxel_studies").digest(self.realise.__module__)
 
     @property
     def made_of(self) -> dict[str, str]:
         """The digest of every source that what it shows is computed from, by name."""
-        return installed("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
+        return installed_sources("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
 
     @property
     def lacks(self) -> str | None:
@@ -222,7 +221,7 @@ class Study:
             Where the recordings lie, for the studies that need some.
         workers : Workers
         strict : bool
-            A file of recordings that cannot be read ends it before it begins; else it is left out, and said.
+            A file of recordings that cannot be read ends the study before it begins; else it is left out, and named.
         quiet : bool
             No progress line.
 
@@ -264,7 +263,7 @@ class Study:
             if not wanted:
                 break
             phase(f"{self.name}, next", wanted)
-        said = self.summarise(parameters, list(rows.values()), **given)
+        summary = self.summarise(parameters, list(rows.values()), **given)
         section = {
             "name": self.name,
             "title": self.title,
@@ -275,15 +274,15 @@ class Study:
             "changed": sorted(changes or {}),
             "unread": dict(unread),
             "realisations": len(rows),
-            "statements": [asdict(s) for s in self.statements(parameters, said)],
-            "tables": [asdict(t) for t in self.tables(parameters, said)] if self.tables is not None else [],
-            "said": said,
+            "statements": [asdict(s) for s in self.statements(parameters, summary)],
+            "tables": [asdict(t) for t in self.tables(parameters, summary)] if self.tables is not None else [],
+            "said": summary,
             "cpu_seconds": round(sum(row.seconds for row in rows.values()), 1),
             "wall_seconds": round(time.time() - begun, 1),
             "made_of": self.made_of,
             **_machine(),
         }
-        _write_section(folder, section, drawn(self, parameters, said))
+        _write_section(folder, section, drawn(self, parameters, summary))
         return section
 
     def _recordings(self, data: Path | None) -> Path:
@@ -362,9 +361,9 @@ def logarithmic(axes: Axes, *, x: Sequence[float] = (), y: Sequence[float] = ())
         axes.set_yticks([], minor=True)
 
 
-def drawn(study: Study, parameters: Parameters, said: Said) -> list[bytes]:
+def drawn(study: Study, parameters: Parameters, summary: Summary) -> list[bytes]:
     """Return a study's pictures of what it found, as SVG."""
-    figures = study.draw(parameters, said)
+    figures = study.draw(parameters, summary)
     return [svg(figure) for figure in (figures if isinstance(figures, Sequence) else [figures])]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +51,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     }
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List by load: share solved, epochs of those that were."""
     lines = []
     for load in p["loads"]:
@@ -69,11 +69,11 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
     return {"lines": lines}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Hold what was noted beside ours."""
     full = (p["inputs"], p["epochs"]) == (PARAMETERS["inputs"], PARAMETERS["epochs"])
     found = []
-    for line in said["lines"]:
+    for line in summary["lines"]:
         spread = f"{line['epochs'][0]} to {line['epochs'][-1]} epochs" if line["epochs"] else "none"
         ours = f"{line['solved']} of {line['runs']} solved: {spread}"
         if line["load"] in NOTED:
@@ -96,16 +96,18 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the share of tasks solved, and the epochs that they took, by load."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    left.plot([line["load"] for line in said["lines"]], [line["solved"] / line["runs"] for line in said["lines"]], ".-")
+    left.plot(
+        [line["load"] for line in summary["lines"]], [line["solved"] / line["runs"] for line in summary["lines"]], ".-"
+    )
     left.set_ylim(-0.05, 1.05)
     left.set_ylabel(f"share solved in {p['epochs']} epochs")
-    for line in said["lines"]:
+    for line in summary["lines"]:
         right.plot([line["load"]] * len(line["epochs"]), line["epochs"], ".", color="C0")
     right.set_yscale("log")
     right.set_ylabel("epochs to the solution")

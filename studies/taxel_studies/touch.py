@@ -12,7 +12,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +32,7 @@ from taxel.simulate import Act, Contact, Scene, Silence, play, truth
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,8 +54,8 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 
-#: What a loaded taxel reads above rest, ticks: the board's noise floor and half a tick.
-ABOVE = 3.5
+#: What a loaded taxel reads above rest at least, ticks.
+ABOVE = ContactArea().above
 #: The two spheres, as labels.
 KINDS = ("small", "large")
 EVENTS = ("contact", "lift")
@@ -78,28 +78,29 @@ RIDGES = (0.1, 1.0, 10.0, 100.0)
 MOST_FRAMES = 1500
 
 
-class Trial:
-    """One recording, read back from its file as `taxel train` reads it, and what really happened in it."""
+class Drop(NamedTuple):
+    """A recording as `taxel train` reads it, and what the simulation knows of it besides."""
 
-    def __init__(self, path: Path, table: Labels, contacts: list[Contact], kind: int) -> None:
-        recording = open_recording(path)
-        self.events: Events = recording.events
-        self.labels = table.of(recording)
-        started = next(t for t, start in self.events.markers if start)
-        self.tare = Tare.take(self.events, stop_us=started)
-        self.contacts, self.kind = contacts, kind
-
-    @property
-    def example(self) -> Example:
-        """What the training is given."""
-        return Example(self.events, self.labels, self.tare)
+    example: Example
+    events: Events
+    tare: Tare
+    contacts: list[Contact]
+    kind: int
 
     def frames(self, period_us: int, start: float, stop: float) -> Frames:
-        """Pictures of what stands above rest, us."""
+        """Return what stands above rest as pictures, us."""
         return self.tare.off(Frames.from_events(self.events, period_us, round(start), round(stop)))
 
 
-def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[Trial]:
+def _opened(path: Path, table: Labels, contacts: list[Contact], kind: int) -> Drop:
+    recording = open_recording(path)
+    events = recording.events
+    started = next(t for t, start in events.markers if start)
+    tare = Tare.take(events, stop_us=started)
+    return Drop(Example(events, table.of(recording), tare), events, tare, contacts, kind)
+
+
+def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[Drop]:
     """Draw scenes by seed, play them, write recordings and a table of labels, and read them back."""
     rng = np.random.default_rng([seed, 56])
     happened: list[tuple[list[Contact], int]] = []
@@ -125,7 +126,7 @@ def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[
     with (folder / "labels.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([("recording", "label", "t_us"), *rows])
     table = Labels(folder / "labels.csv")
-    return [Trial(folder / f"{k:03d}.npz", table, *told) for k, told in enumerate(happened)]
+    return [_opened(folder / f"{k:03d}.npz", table, *one) for k, one in enumerate(happened)]
 
 
 def tasks(p: Parameters) -> list[Task]:
@@ -151,38 +152,38 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         names = KINDS if params["question"] == "kind" else EVENTS
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # targets out of reach are counted below as missed
-            readout = train_readout([trial.example for trial in sets["train"]], Recipe.load("touch", labels=names))
+            readout = train_readout([drop.example for drop in sets["train"]], Recipe.load("touch", labels=names))
         judge = _kinds if params["question"] == "kind" else _contacts
         return judge(params, readout, sets["train"], sets["test"])
 
 
-def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Trial], test: list[Trial]) -> dict[str, Any]:
+def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Drop], test: list[Drop]) -> dict[str, Any]:
     """Say which sphere fell, by time since contact."""
     times = params["times_ms"]
     right: dict[str, Any] = {"neuron": [], "said_ms": [], "silent": 0}
-    for trial in test:
-        contact_us = trial.contacts[0].start_us
-        said = [d for d in run(readout, trial.events, tare=trial.tare) if d.known >= contact_us]
-        first = min(said, key=lambda d: d.known, default=None)
+    for drop in test:
+        contact_us = drop.contacts[0].start_us
+        detected = [d for d in run(readout, drop.events, tare=drop.tare) if d.known >= contact_us]
+        first = min(detected, key=lambda d: d.known, default=None)
         if first is None:
             right["silent"] += 1
         else:
             right["said_ms"].append(to_ms(first.known - contact_us))
-        good = first is not None and first.label == KINDS[trial.kind]
+        good = first is not None and first.label == KINDS[drop.kind]
         right["neuron"].append([good and right["said_ms"][-1] <= t for t in times])
-    truths = [np.array([trial.kind for trial in which]) for which in (train, test)]
-    felt = [[_since_contact(trial, times) for trial in which] for which in (train, test)]
+    truths = [np.array([drop.kind for drop in which]) for which in (train, test)]
+    by_moment = [[_since_contact(drop, times) for drop in which] for which in (train, test)]
     names = []
     shares: dict[str, list[float]] = {"rule": [], "numbers": [], "lda": []}
     for k in range(len(times)):
-        now = [[frames[k] for frames in which] for which in felt]
+        now = [[frames[k] for frames in which] for which in by_moment]
         name, by_rule = _best_rule(now, truths[0])
         names.append(name)
-        said_by = {"rule": by_rule}
+        answers_by = {"rule": by_rule}
         for way, seen in (("numbers", _numbers), ("lda", _around)):
             learnt, judged = (seen(pictures) for pictures in now)
-            said_by[way] = _lda(learnt, truths[0])(judged)
-        for way, kinds in said_by.items():
+            answers_by[way] = _lda(learnt, truths[0])(judged)
+        for way, kinds in answers_by.items():
             shares[way].append(float(np.mean(kinds == truths[1])))
     return {
         "scenes": len(test),
@@ -194,16 +195,16 @@ def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Trial], 
     }
 
 
-def _since_contact(trial: Trial, times: Sequence[float]) -> list[Frames]:
+def _since_contact(drop: Drop, times: Sequence[float]) -> list[Frames]:
     """Return the picture above rest at times (ms) since the touch really began."""
-    contact = trial.contacts[0].start_us
+    contact = drop.contacts[0].start_us
     at = [round(contact + to_us(t)) for t in times]
-    return [trial.frames(1, t, t + 1) for t in at]
+    return [drop.frames(1, t, t + 1) for t in at]
 
 
-def _best_rule(felt: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
-    """Return the feature whose threshold tells most training scenes apart, and what it says of the others."""
-    features = [_features(which) for which in felt]
+def _best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
+    """Return the feature whose threshold tells most training scenes apart, and its answers for the others."""
+    features = [_features(which) for which in by_moment]
     best: tuple[float, str, float, int] = (-1.0, "", 0.0, 1)
     for name, values in features[0].items():
         edges = np.sort(values)
@@ -268,12 +269,14 @@ def _lda(values: ArrayLike, classes: NDArray[Any]) -> Callable[[ArrayLike], NDAr
     x, fold = np.asarray(values, np.float64), folds(classes, count=5)
     right = []
     for ridge in RIDGES:
-        said = [LDA(ridge=ridge).fit(x[fold != k], classes[fold != k]).predict(x[fold == k]) for k in np.unique(fold)]
-        right.append(sum(int(np.sum(s == classes[fold == k])) for k, s in zip(np.unique(fold), said, strict=True)))
+        answers = [
+            LDA(ridge=ridge).fit(x[fold != k], classes[fold != k]).predict(x[fold == k]) for k in np.unique(fold)
+        ]
+        right.append(sum(int(np.sum(s == classes[fold == k])) for k, s in zip(np.unique(fold), answers, strict=True)))
     return LDA(ridge=RIDGES[int(np.argmax(right))]).fit(x, classes).predict
 
 
-def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Trial], test: list[Trial]) -> dict[str, Any]:
+def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Drop], test: list[Drop]) -> dict[str, Any]:
     """Say when touches begin and end."""
     window = params["window_ms"]
     levels = {level: _tally([_by_area(t, level) for t in train], train, window) for level in (1, 2, 4, 8)}
@@ -289,39 +292,41 @@ def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Trial
     }
 
 
-def _tally(found: list[Detections], trials: list[Trial], window_ms: float) -> dict[str, Any]:
-    """Return found, missed, false, and by how much a label was off and how much later it was said (ms)."""
-    told: dict[str, Any] = {
+def _tally(found: list[Detections], drops: list[Drop], window_ms: float) -> dict[str, Any]:
+    """Return found, missed, false, the error of its time, and its delay until it was known (ms)."""
+    tallies: dict[str, Any] = {
         label: {"found": 0, "missed": 0, "false": 0, "error_ms": [], "later_ms": []} for label in EVENTS
     }
-    for said, trial in zip(found, trials, strict=True):
-        judged = score(said, {label: trial.labels[label] for label in EVENTS}, window_ms).to_dict()["by_label"]
+    for detected, drop in zip(found, drops, strict=True):
+        judged = score(detected, {label: drop.example.labels[label] for label in EVENTS}, window_ms).to_dict()[
+            "by_label"
+        ]
         for label, one in judged.items():
             for name in ("found", "missed", "false"):
-                told[label][name] += one[name]
+                tallies[label][name] += one[name]
             for name, key in (("error_ms", "error_ms"), ("later_ms", "known_delay_ms")):
                 if one[key]["median"] is not None:
-                    told[label][name].append(one[key]["median"])
-    return told
+                    tallies[label][name].append(one[key]["median"])
+    return tallies
 
 
-def _by_area(trial: Trial, level: int) -> Detections:
+def _by_area(drop: Drop, level: int) -> Detections:
     """Say contact where so many taxels are loaded, and lift where fewer are."""
-    spikes = ContactArea(levels=[level], tare=trial.tare).encode(trial.events)
+    spikes = ContactArea(levels=[level], tare=drop.tare).encode(drop.events)
     times = [np.rint(to_us(train)).astype(np.int64) for train in spikes]
-    return _said(times[0]) + _said(times[1], "lift")
+    return detections_at(times[0]) + detections_at(times[1], "lift")
 
 
-def _said(t: NDArray[np.int64], label: str = "contact") -> Detections:
+def detections_at(t: NDArray[np.int64], label: str = "contact") -> Detections:
     return Detections(np.full(len(t), label), t, t)
 
 
-def _touched(train: list[Trial]) -> Callable[[ArrayLike], NDArray[Any]]:
-    """Return an LDA that tells pictures of a touch from pictures of none."""
+def _touched(train: list[Drop]) -> Callable[[ArrayLike], NDArray[Any]]:
+    """Return an LDA that separates pictures of a touch from pictures of none."""
     pictures, there = [], []
-    for trial in train:
-        for contact in trial.contacts:
-            frames = trial.frames(2000, contact.start_us - 20_000, contact.stop_us + 20_000)
+    for drop in train:
+        for contact in drop.contacts:
+            frames = drop.frames(2000, contact.start_us - 20_000, contact.stop_us + 20_000)
             pictures.append(_around([frames]))
             there.append((frames.t >= contact.start_us) & (frames.t < contact.stop_us))
     values, classes = np.concatenate(pictures), np.concatenate(there)
@@ -329,19 +334,19 @@ def _touched(train: list[Trial]) -> Callable[[ArrayLike], NDArray[Any]]:
     return _lda(values[chosen], classes[chosen].astype(np.int64))
 
 
-def _by_frames(trial: Trial, touched: Callable[[ArrayLike], NDArray[Any]]) -> Detections:
+def _by_frames(drop: Drop, touched: Callable[[ArrayLike], NDArray[Any]]) -> Detections:
     """Say contact and lift where the LDA changes its mind from one picture to the next, 1 ms apart."""
-    frames = trial.frames(1000, trial.events.markers[0][0], trial.contacts[-1].stop_us + AFTER_US)
+    frames = drop.frames(1000, drop.events.markers[0][0], drop.contacts[-1].stop_us + AFTER_US)
     change = np.diff(touched(_around([frames])), prepend=0)
-    return _said(frames.t[change > 0]) + _said(frames.t[change < 0], "lift")
+    return detections_at(frames.t[change > 0]) + detections_at(frames.t[change < 0], "lift")
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Join the parts."""
     kinds = [row.result for row in rows if row.params["question"] == "kind"]
     contacts = [row.result for row in rows if row.params["question"] == "contact"]
     late = [ms for one in kinds for ms in one["said_ms"]]
-    said: Said = {
+    summary: Summary = {
         "times_ms": list(p["times_ms"]),
         "scenes": sum(one["scenes"] for one in kinds),
         "silent": sum(one["silent"] for one in kinds),
@@ -352,44 +357,44 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
         "contacts": {},
     }
     for way in CONTACT_WAYS:
-        said["contacts"][way] = {}
+        summary["contacts"][way] = {}
         for label in EVENTS:
             each = [one[way][label] for one in contacts]
-            told: dict[str, Any] = {name: sum(e[name] for e in each) for name in ("found", "missed", "false")}
+            tally: dict[str, Any] = {name: sum(e[name] for e in each) for name in ("found", "missed", "false")}
             for name in ("error_ms", "later_ms"):
                 values = [v for e in each for v in e[name]]
-                told[name] = float(np.median(values)) if values else None
-            said["contacts"][way][label] = told
-    return said
+                tally[name] = float(np.median(values)) if values else None
+            summary["contacts"][way][label] = tally
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what the study is to show, and say where another way wins."""
-    at = said["times_ms"].index(10.0) if 10.0 in said["times_ms"] else len(said["times_ms"]) - 1
-    shares = {way: said["kinds"][way][at] for way in WAYS}
+    at = summary["times_ms"].index(10.0) if 10.0 in summary["times_ms"] else len(summary["times_ms"]) - 1
+    shares = {way: summary["kinds"][way][at] for way in WAYS}
     best = max(shares, key=lambda way: shares[way])
-    middle = "never" if said["said_ms"] is None else f"{said['said_ms'][1]:.1f} ms after contact (median)"
+    middle = "never" if summary["said_ms"] is None else f"{summary['said_ms'][1]:.1f} ms after contact (median)"
     ways = ", ".join(f"{WAYS[way]} {shares[way]:.1%}" for way in WAYS)
     found = [
         Statement(
-            "Which of the two spheres of 5.6.2 fell is learnt from labels alone and said within 10 ms of contact.",
+            "Which of the two spheres of 5.6.2 fell is learnt from labels alone and detected within 10 ms of contact.",
             "95 % right or more (our goal)",
-            f"{shares['neuron']:.1%} right of {said['scenes']} scenes, {said['silent']} without a word; {middle}",
+            f"{shares['neuron']:.1%} right of {summary['scenes']} scenes, {summary['silent']} without a word; {middle}",
             shares["neuron"] >= 0.95,
             "heights, places and foams drawn; learnt from other seeds",
         ),
         Statement(
-            f"No rule and no LDA does better at {said['times_ms'][at]:g} ms.",
+            f"No rule and no LDA does better at {summary['times_ms'][at]:g} ms.",
             "the neuron first (our goal)",
             ways,
             best == "neuron",
-            f"the rule looks at {said['rules'][at]}; rule and LDA are told when the touch began, the neuron is not; "
+            f"the rule looks at {summary['rules'][at]}; rule and LDA are given the time of contact, the neuron is not; "
             "they look at one moment, and see less when the ball leaves (after 15 to 19 ms)",
         ),
     ]
-    levels = ", ".join(str(level) for level in sorted(set(said["levels"])))
+    levels = ", ".join(str(level) for level in sorted(set(summary["levels"])))
     for label in EVENTS:
-        each = {way: said["contacts"][way][label] for way in CONTACT_WAYS}
+        each = {way: summary["contacts"][way][label] for way in CONTACT_WAYS}
         wrong = {way: one["missed"] + one["false"] for way, one in each.items()}
         listed = "; ".join(
             f"{WAYS[w]} {o['found']} found, {o['missed']} missed, {o['false']} false" for w, o in each.items()
@@ -406,53 +411,53 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List both questions by way."""
     del p
     recipe = Recipe.load("touch", labels=EVENTS)
     trained = " and ".join(f"{label} {recipe.learner_of(label)[1]:g} ms" for label in EVENTS)
-    kinds = [(WAYS[way], *(f"{100 * share:.0f}" for share in said["kinds"][way])) for way in WAYS]
+    kinds = [(WAYS[way], *(f"{100 * share:.0f}" for share in summary["kinds"][way])) for way in WAYS]
     contacts = []
     for label in EVENTS:
         for way in CONTACT_WAYS:
-            one = said["contacts"][way][label]
+            one = summary["contacts"][way][label]
             off, later = ("" if one[k] is None else f"{one[k]:+.2f}" for k in ("error_ms", "later_ms"))
             contacts.append(
                 (f"{label}, {WAYS[way]}", str(one["found"]), str(one["missed"]), str(one["false"]), off, later)
             )
     return [
         Table(
-            "Which sphere fell: said and right, per cent, by ms since contact",
-            ["way", *(f"{t:g}" for t in said["times_ms"])],
+            "Which sphere fell: detected and right, per cent, by ms since contact",
+            ["way", *(f"{t:g}" for t in summary["times_ms"])],
             kinds,
-            "The neuron's share counts what was said by then and right; what the rule looks at at each time: "
-            + ", ".join(said["rules"]),
+            "The neuron's share counts what was detected by then and right; what the rule looks at at each time: "
+            + ", ".join(summary["rules"]),
         ),
         Table(
             "Contact and lift",
-            ["label, way", "found", "missed", "false", "off, ms", "said later, ms"],
+            ["label, way", "found", "missed", "false", "error, ms", "known after, ms"],
             contacts,
             "Medians over the parts' recordings. The neuron is trained to say " + trained + " later.",
         ),
     ]
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw both questions."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(11, 5), layout="constrained")
     left, right = figure.subplots(1, 2)
     for way, words in WAYS.items():
-        shares = [100 * share for share in said["kinds"][way]]
-        left.plot(said["times_ms"], shares, "o-", color=COLOURS[way], label=words, markersize=4)
+        shares = [100 * share for share in summary["kinds"][way]]
+        left.plot(summary["times_ms"], shares, "o-", color=COLOURS[way], label=words, markersize=4)
     left.axhline(50, color="grey", linestyle=":", linewidth=0.8, label="by chance")
-    left.set(xlabel="time since contact (ms)", ylabel="said and right (%)", title="which of two spheres fell")
+    left.set(xlabel="time since contact (ms)", ylabel="detected and right (%)", title="which of two spheres fell")
     left.set_ylim(0, 103)
     places = np.arange(len(EVENTS))
     for k, way in enumerate(CONTACT_WAYS):
         words, colour = WAYS[way], COLOURS[way]
-        each = [said["contacts"][way][label] for label in EVENTS]
+        each = [summary["contacts"][way][label] for label in EVENTS]
         of = [max(1, one["found"] + one["missed"]) for one in each]
         missed = [100 * one["missed"] / n for one, n in zip(each, of, strict=True)]
         false = [100 * one["false"] / n for one, n in zip(each, of, strict=True)]

@@ -184,19 +184,19 @@ def curves(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
         By reading, training ("clean", "noisy") and noise: ``levels``, and ``mean`` and ``sem`` (standard error), one
         list a setting.
     """
-    said: dict[str, Any] = {}
+    averages: dict[str, Any] = {}
     for reading in p["readings"]:
-        said[reading] = {"clean": {}, "noisy": {}}
+        averages[reading] = {"clean": {}, "noisy": {}}
         for training in ("clean", *p["levels"]):
             here = [r for r in rows if r.params["divide_b_by"] == reading and r.params["training"] == training]
             for noise, levels in here[0].params["levels"].items():
                 each = np.array([[f["distance"][noise] for f in r.result["found"]] for r in here])
-                said[reading]["clean" if training == "clean" else "noisy"][noise] = {
+                averages[reading]["clean" if training == "clean" else "noisy"][noise] = {
                     "levels": levels,
                     "mean": each.mean(axis=0).round(3).tolist(),
                     "sem": (each.std(axis=0) / np.sqrt(len(each))).round(3).tolist(),
                 }
-    return said
+    return averages
 
 
 def summarise(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:

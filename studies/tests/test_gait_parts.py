@@ -159,7 +159,7 @@ def walking() -> Piece:
 
 def said(rule: str, numbers: dict, event: str = "contact", **changed) -> list[float]:
     options = {"levels": 1, "channels": None, "sum_name": "total", "dead_ms": 100.0} | changed
-    return rules.said(rule, numbers, walking(), event, **options).tolist()
+    return rules.detection_times(rule, numbers, walking(), event, **options).tolist()
 
 
 def test_a_counter_that_remembers_says_when_enough_sensors_are_on():
@@ -179,7 +179,10 @@ def test_a_counter_hears_only_its_sensors():
 def test_a_counter_knows_what_was_on_before_it_listened():
     begun = piece("h/1", [[500.0], []], [[100.0], [700.0]], [])
     options = {"levels": 1, "channels": None, "sum_name": "", "dead_ms": 0.0}
-    assert rules.said("state", {"count": 2, "release": 1}, begun, "foot_off", **options).tolist() == [100.0, 700.0]
+    assert rules.detection_times("state", {"count": 2, "release": 1}, begun, "foot_off", **options).tolist() == [
+        100.0,
+        700.0,
+    ]
 
 
 def test_a_spike_counter_needs_its_spikes_within_the_window():
@@ -193,8 +196,14 @@ def test_a_sum_has_its_threshold_and_its_release():
     t = np.arange(0.0, 100.0, 10.0)
     row.sums["total"] = (t, np.array([0, 6, 9, 12, 9, 12, 4, 0, 20, 0.0]))
     options = {"levels": 1, "channels": None, "sum_name": "total", "dead_ms": 0.0}
-    assert rules.said("sum", {"threshold": 10, "release": 5}, row, "contact", **options).tolist() == [30.0, 80.0]
-    assert rules.said("sum", {"threshold": 10, "release": 5}, row, "foot_off", **options).tolist() == [60.0, 90.0]
+    assert rules.detection_times("sum", {"threshold": 10, "release": 5}, row, "contact", **options).tolist() == [
+        30.0,
+        80.0,
+    ]
+    assert rules.detection_times("sum", {"threshold": 10, "release": 5}, row, "foot_off", **options).tolist() == [
+        60.0,
+        90.0,
+    ]
 
 
 def test_every_point_of_a_grid_is_one_that_can_be_said():

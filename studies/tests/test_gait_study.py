@@ -234,9 +234,9 @@ def test_no_delay_is_longer_than_12_ms():
 def test_a_goal_is_met_only_where_every_part_of_it_is():
     units = [outcomes.Unit("a", "a", "", 10, 1, 1.0, (1.0,) * 10, (9.0,) * 10)]
     f = outcomes.figures(units)
-    assert outcomes._met(f, {"found_percent": 100.0, "false_per_minute": 1.0, "within_10_ms_percent": 100.0})
-    assert not outcomes._met(f, {"missed": 0, "false": 0})
-    assert not outcomes._met(outcomes.figures([]), {"found_percent": 98.0})
+    assert outcomes._reaches(f, {"found_percent": 100.0, "false_per_minute": 1.0, "within_10_ms_percent": 100.0})
+    assert not outcomes._reaches(f, {"missed": 0, "false": 0})
+    assert not outcomes._reaches(outcomes.figures([]), {"found_percent": 98.0})
 
 
 @pytest.mark.parametrize(

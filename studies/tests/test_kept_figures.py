@@ -8,9 +8,11 @@ from typing import Any
 
 import pytest
 from matplotlib.container import BarContainer
+from typer.testing import CliRunner
 
 from taxel import FormatError, ProblemError
 from taxel_studies import kept, load
+from taxel_studies.command import app
 from taxel_studies.page import write_page
 
 _spec = importlib.util.spec_from_file_location("figures", Path(__file__).parents[2] / "docs" / "figures.py")
@@ -105,6 +107,22 @@ def test_a_figure_whose_coarse_result_is_another_one_stays_stale(figure: Path) -
     assert kept.stale_figures(figure) == {"fig6.1": ["taxel.neuron"]}
 
 
+def test_all_stale_figures_are_tried_and_those_that_moved_named(figure: Path) -> None:
+    for name in ("fig6.2", "fig6.1"):
+        section = json.loads((figure / "fig6.1.json").read_text()) | {
+            "name": name,
+            "made_of": {"taxel.neuron": "other"},
+        }
+        (figure / f"{name}.json").write_text(json.dumps(section))
+        kept.keep_coarse(name, figure)
+    spoil(figure / "coarse" / "fig6.1.json", lambda result: result["said"].update({"spikes": [1.0]}))
+    ended = CliRunner().invoke(app, ["all", "--confirm", "--figures", str(figure)])
+    assert isinstance(ended.exception, ProblemError)
+    assert "not confirmed: fig6.1;" in str(ended.exception)
+    assert "fig6.2: confirmed" in ended.output
+    assert kept.stale_figures(figure) == {"fig6.1": list(load("fig6.1").made_of)}
+
+
 def test_a_figure_whose_sources_were_not_recorded_is_stale(figure: Path) -> None:
     spoil(figure / "fig6.1.json", lambda section: section.pop("made_of"))
     assert kept.stale_figures(figure) == {"fig6.1": ["its sources were not recorded"]}
@@ -114,7 +132,9 @@ def test_a_stale_figure_is_marked_on_the_page(tmp_path: Path) -> None:
     load("fig6.1").run(tmp_path, size="toy", quiet=True)
     assert "Stale" not in write_page(tmp_path).read_text()
     spoil(tmp_path / "fig6.1" / "summary.json", lambda section: section["made_of"].update({"taxel.neuron": "other"}))
-    assert "Stale: made by other code than today's; changed since: taxel.neuron." in write_page(tmp_path).read_text()
+    page = write_page(tmp_path).read_text()
+    assert "Stale: made by other code than today's</summary>" in page
+    assert "Changed since: taxel.neuron.<" in page
 
 
 @pytest.mark.parametrize(

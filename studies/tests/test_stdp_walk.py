@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from taxel import SpikeTrains
-from taxel_studies import stdp_walk, untold
+from taxel_studies import stdp_walk, unlabelled
 from taxel_studies.gait.pieces import Piece
 
 TAUS = {name: stdp_walk.PARAMETERS[name] for name in ("tau_m", "tau_s", "tau_plus", "tau_minus")}
@@ -30,8 +30,8 @@ def foot(seed=1, jitter_ms=3.0, pattern=True):
     return Piece("made up", "made up", "nobody", "none", spikes, {"contact": contacts}, (0.0, stop))
 
 
-def test_it_finds_the_steps_of_a_made_up_foot_untold():
-    said = stdp_walk.heard(foot(), stdp_walk.PARAMETERS)
+def test_it_finds_the_steps_of_a_made_up_foot_without_labels():
+    said = stdp_walk.train_and_test(foot(), stdp_walk.PARAMETERS)
     assert stdp_walk.found(said["learnt"])
     assert said["learnt"]["once"] > 0.9
     assert -10 < said["learnt"]["phase_ms"] < 80
@@ -41,15 +41,15 @@ def test_it_finds_the_steps_of_a_made_up_foot_untold():
 
 def test_where_nothing_repeats_there_is_nothing_to_find():
     for seed in range(3):
-        assert not stdp_walk.found(stdp_walk.heard(foot(seed, pattern=False), stdp_walk.PARAMETERS)["learnt"])
+        assert not stdp_walk.found(stdp_walk.train_and_test(foot(seed, pattern=False), stdp_walk.PARAMETERS)["learnt"])
 
 
 @pytest.mark.parametrize("hz", [0.1, 1.0])
 def test_a_threshold_is_the_least_at_which_a_neuron_fires_so_often(hz):
     spikes = foot(2).spikes
-    level = untold.threshold(spikes, hz, TAUS)
+    level = unlabelled.threshold(spikes, hz, TAUS)
     fired = [
-        1000 * len(untold.unlearning(share * level, TAUS).partial_fit(spikes).spikes_) / spikes.stop
+        1000 * len(unlabelled.unlearning(share * level, TAUS).partial_fit(spikes).spikes_) / spikes.stop
         for share in (1.0, 0.9)
     ]
     assert fired[0] <= hz < fired[1]

@@ -77,8 +77,8 @@ def test_scenes_come_back_from_their_files_with_their_labels(tmp_path) -> None:
     trials = touch.drawn(params, 5, 2, tmp_path)
     assert [trial.kind for trial in trials] == [0, 1]
     for trial in trials:
-        assert trial.labels["contact"].tolist() == [round(c.start_us) for c in trial.contacts]
-        assert trial.labels["lift"].tolist() == [round(c.stop_us) for c in trial.contacts]
+        assert trial.example.labels["contact"].tolist() == [round(c.start_us) for c in trial.contacts]
+        assert trial.example.labels["lift"].tolist() == [round(c.stop_us) for c in trial.contacts]
         assert (trial.events.t <= trial.contacts[-1].stop_us + touch.AFTER_US).all()
     told = touch._tally([touch._by_area(trial, 2) for trial in trials], trials, 10.0)
     assert told["contact"]["missed"] == told["lift"]["missed"] == 0

@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from taxel.cli import app
-from taxel.demo.hearing import hear
+from taxel.demo.evaluation import evaluate_acts
 from taxel.demo.judging import GOALS, LABELS
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.demo.shipped import shipped
@@ -80,20 +80,20 @@ def test_the_demo_never_plays_what_the_readout_was_trained_on():
 
 
 def test_the_parts_of_a_delay_sum_to_it():
-    hearing = hear(script(3, 2), shipped(), seed=3)
-    row = hearing.judged.row("first", "contact")
+    evaluation = evaluate_acts(script(3, 2), shipped(), seed=3)
+    row = evaluation.judged.row("first", "contact")
     for (place, said), delay in zip(row.places, row.delays_ms, strict=True):
-        contact = hearing.contacts[place]
-        stamp = hearing.first_input(contact, "contact")
+        contact = evaluation.contacts[place]
+        stamp = evaluation.first_input(contact, "contact")
         assert stamp is not None
         begin = math.ceil(stamp / FRAME_US) * FRAME_US
         physics = (begin - contact.start_us) / 1000
         assert -0.2 < physics < delay
-        assert hearing.found.known[hearing.found.label == "contact"][said] >= begin + FRAME_US - 1
+        assert evaluation.found.known[evaluation.found.label == "contact"][said] >= begin + FRAME_US - 1
 
 
 def test_noise_alone_says_nothing():
-    quiet = hear([Silence(5_050.3)], shipped(), seed=8)
+    quiet = evaluate_acts([Silence(5_050.3)], shipped(), seed=8)
     assert len(quiet.found) == 0
     assert len(quiet.plain) == 0
     assert 20 < len(quiet.events) / 5 < 400

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from taxel.demo import naming
-from taxel.demo.hearing import hear
+from taxel.demo.evaluation import evaluate_acts
 from taxel.demo.naming import ANSWERED_MS, LOOKED_MS, QUESTIONS, Drops, named, shipped_drops
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.demo.shipped import shipped
@@ -21,8 +21,8 @@ BOARD, FOLD = naming._DROPS, 3 * naming._DROPS
 
 
 @pytest.fixture(scope="module")
-def hearing():
-    return hear(script(23, 3), shipped(), seed=23)
+def evaluation():
+    return evaluate_acts(script(23, 3), shipped(), seed=23)
 
 
 def test_the_shipped_drops_are_what_the_command_writes():
@@ -81,9 +81,9 @@ def test_the_middle_moves_down_the_slant_and_not_on_a_level_array():
     assert np.corrcoef(known.slant_deg[known.slant_deg > 0], slanted)[0, 1] > 0.5
 
 
-def test_each_drop_of_a_play_is_named_and_judged(hearing):
+def test_each_drop_of_a_play_is_named_and_judged(evaluation):
     scenes = [act for act in script(23, 3) if isinstance(act, Scene)]
-    found = named(hearing, scenes)
+    found = named(evaluation, scenes)
     assert [drop["true"]["height"] for drop in found["drops"]] == [
         s.parameters["bodies"][0]["motion"]["dropped"]["height_mm"] for s in scenes
     ]
@@ -101,11 +101,11 @@ def test_each_drop_of_a_play_is_named_and_judged(hearing):
     assert all(-to_ms(FRAME_US) < drop["felt_ms"] < 2 for drop in found["drops"])
 
 
-def test_a_play_without_drops_and_drops_that_were_not_felt(hearing):
-    quiet = hear([Silence(400.0)], shipped(), seed=3)
+def test_a_play_without_drops_and_drops_that_were_not_felt(evaluation):
+    quiet = evaluate_acts([Silence(400.0)], shipped(), seed=3)
     assert named(quiet, [])["drops"] == []
-    begin = hearing.area.start
-    deaf = replace(hearing, area=hearing.area.between(begin, begin + 1.0))
+    begin = evaluation.area.start
+    deaf = replace(evaluation, area=evaluation.area.between(begin, begin + 1.0))
     found = named(deaf, [act for act in script(23, 3) if isinstance(act, Scene)])
     assert [drop["felt_ms"] for drop in found["drops"]] == [None] * 3
     assert found["right"] == {"ball": [0] * 4, "height": [0] * 4, "slant": [0] * 4}

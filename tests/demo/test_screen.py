@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from taxel import Detection
 from taxel.demo.screen import Screen
-from taxel.live import Live, Said
+from taxel.live import Live
 from taxel.simulate import Contact
 
 
@@ -26,7 +27,9 @@ class Drawing:
 def test_the_newest_detection_is_visible_whatever_the_terminal(width: int, height: int) -> None:
     drawing = Drawing(width, height)
     contacts = [Contact("first", 1e5 * k, 1e5 * k + 2e4, 1.0, 1.0) for k in range(1, 30)]
-    said = [Said("contact", 100_000 * k, 100_600 + 100_000 * k, 1.0, 101_000 + 100_000 * k, 0) for k in range(1, 30)]
+    said = [
+        Detection("contact", 100_000 * k, 100_600 + 100_000 * k, 1.0, 101_000 + 100_000 * k, 0) for k in range(1, 30)
+    ]
     with Live(0, host="127.0.0.1") as live:
         counters = live.counters
     Screen(drawing, contacts, 3.0).draw(counters, np.full((64, 64), 40, np.uint16), said)

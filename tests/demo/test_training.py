@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taxel.demo.hearing import hear
+from taxel.demo.evaluation import evaluate_acts
 from taxel.demo.script import script
 from taxel.demo.shipped import described, shipped, trained
 
@@ -15,7 +15,7 @@ def toy():
 
 def test_a_toy_training_hears_other_scenes(toy):
     """Trained on three caught balls and three left to rest, it finds first impacts of another seed."""
-    judged = hear(script(17, 2), toy, seed=17).judged
+    judged = evaluate_acts(script(17, 2), toy, seed=17).judged
     for label in ("contact", "lift"):
         assert judged.row("first", label).found == 2
     assert sum(len(times) for times in judged.false.values()) <= 1

@@ -63,7 +63,7 @@ def test_a_ridge_is_scikit_learns_shrinkage_also_from_inner_products(ridge):
         assert apart(gram.decision_function(new @ x.T), ours.decision_function(new)) < 1e-8
         primal = LDA(ridge=ridge)
         primal.classes_ = np.arange(3)
-        primal.from_moments(ClassMoments.of(x, y, 3))
+        primal._from_moments(ClassMoments.of(x, y, 3))
         assert apart(primal.decision_function(new), ours.decision_function(new)) < 1e-8
 
 

@@ -1,4 +1,4 @@
-"""A neuron in continuous time, simulated apart from the package: kernels are summed, crossings bracketed.
+"""A neuron simulated apart from the package: kernels are summed; crossings are bracketed, or sought at grid points.
 
 Slow and plain. An input counts from its own time on and an output spike takes effect at its own time. An input within
 1e-6 ms of the end of a refractory time counts as at it; nothing else is rounded.
@@ -12,8 +12,20 @@ import numpy as np
 ROUNDING = 5e-12
 
 
+def kernel(neuron, ages):
+    """The effect of an input, 0 up to the input itself."""
+    late, tau = np.maximum(ages, 0), neuron.tau
+    if neuron.kernel == "alpha":
+        return late / tau * np.exp(-late / tau)
+    if neuron.kernel == "exponential":
+        return np.where(ages > 0, np.exp(-late / tau), 0.0)
+    fast = tau / 4 if neuron.tau_s is None else neuron.tau_s
+    top = tau * fast / (tau - fast) * np.log(tau / fast)
+    return (np.exp(-late / tau) - np.exp(-late / fast)) / (np.exp(-top / tau) - np.exp(-top / fast))
+
+
 class Simulated:
-    """One neuron on one pattern."""
+    """One neuron on one pattern, in continuous time."""
 
     def __init__(self, neuron, weights, pattern):
         self.neuron, self.pattern = neuron, pattern
@@ -31,15 +43,7 @@ class Simulated:
         if neuron.after_spike == "ignore":
             for spike in self.fired:
                 counts &= ~((self.times > spike + 1e-6) & (self.times <= spike + neuron.refractory + 1e-6))
-        ages = np.maximum(times[:, None] - self.times[None, counts], 0.0)
-        if neuron.kernel == "alpha":
-            kernels = ages / neuron.tau * np.exp(-ages / neuron.tau)
-        else:
-            fast = neuron.tau / 4 if neuron.tau_s is None else neuron.tau_s
-            top = neuron.tau * fast / (neuron.tau - fast) * np.log(neuron.tau / fast)
-            kernels = (np.exp(-ages / neuron.tau) - np.exp(-ages / fast)) / (
-                np.exp(-top / neuron.tau) - np.exp(-top / fast)
-            )
+        kernels = kernel(neuron, times[:, None] - self.times[None, counts])
         rise = 0.0
         last = self.fired[-1] if self.fired else None
         if last is None and neuron.first_threshold == "printed":
@@ -89,16 +93,56 @@ class Simulated:
         low, high = inner[k - 1], inner[k]
         if values[k] < 0:
             return float(high)
-        while high - low > 1e-10:
+        while high - low > max(1e-10, 2 * np.spacing(abs(high))):
             middle = (low + high) / 2
             low, high = (low, middle) if self.above(middle)[0] >= 0 else (middle, high)
         return float(high)
 
 
+def on_grid(neuron, weights, pattern, targets, end):
+    """The numbers of the grid points at which a neuron fires, and those of the targets.
+
+    Ages are whole numbers of steps less the time of an input since the start, in long double. A potential counts as at
+    the threshold from `ROUNDING` below it on, at a target from as far below it as a rounded time may move it.
+    """
+    pairs = sorted((float(t), float(w)) for train, w in zip(pattern, weights, strict=True) for t in train)
+    times, weights = (np.array(column, np.longdouble) for column in zip(*pairs, strict=True))
+    step, apart = np.longdouble(neuron.step_ms), 4 * np.spacing(max(abs(pattern.start), abs(end)))
+    # An input at the double nearest to a point is at the point.
+    points = np.round(((times - pattern.start) / step).astype(float))
+    since = np.where(
+        times == pattern.start + points * neuron.step_ms, points * step, times - np.longdouble(pattern.start)
+    )
+    wanted, fired = [round((t - pattern.start) / neuron.step_ms) for t in targets], []
+    recovery = 2 * neuron.tau if neuron.tau_rec is None else neuron.tau_rec
+    for k in range(round((end - pattern.start) / neuron.step_ms) + 1):
+        now, last = k * step, fired[-1] * step if fired else None
+        if last is not None and now - last <= neuron.refractory + 1e-9 + apart:
+            continue
+        counts = np.ones(len(since), bool)
+        if neuron.after_spike == "reset" and fired:
+            counts = since > last + neuron.refractory + 1e-6
+        if neuron.after_spike == "ignore":
+            for spike in fired:
+                counts &= ~((since > spike * step + 1e-6) & (since <= spike * step + neuron.refractory + 1e-6))
+        potential = float(kernel(neuron, (now - since)[counts]) @ weights[counts])
+        if last is None and neuron.first_threshold == "printed":
+            last = np.longdouble(0)
+        recovering = -1.0 if last is None else float(now - last) - neuron.refractory
+        rise = neuron.theta_plus * np.exp(-max(recovering, 0) / recovery) if recovering >= -1e-9 - apart else 0.0
+        rounding = ROUNDING + (4 * abs(potential) / neuron.tau * apart if k in wanted else 0.0)
+        if potential >= neuron.theta_0 + rise - rounding:
+            fired.append(k)
+    return fired, wanted
+
+
 def misfire(neuron, weights, pattern, targets, end):
-    """What the simulated neuron does else than fire once at each target, within 1e-6 ms; None: nothing."""
+    """The spikes of the simulated neuron where they are not one at each target; None where they are."""
+    if neuron.time == "grid":
+        fired, wanted = on_grid(neuron, weights, pattern, targets, end)
+        return None if fired == wanted else f"fires at points {fired}, not at {wanted}"
     fired = Simulated(neuron, weights, pattern).run(end)
     if len(fired) != len(targets):
         return f"fires at {fired[:9]}, not at {targets}"
     off = np.abs(np.array(fired) - np.array(targets)).max(initial=0)
-    return f"fires {off} ms beside a target" if off > 1e-6 + 4 * np.spacing(end) else None
+    return f"fires {off} ms beside a target" if off > 1e-6 + 4 * np.spacing(abs(end)) else None

@@ -93,6 +93,25 @@ def test_what_is_solved_on_a_grid_is_silent_but_at_its_targets(step, start, afte
     assert solved > 3
 
 
+def test_a_margin_below_the_resolution_of_times_is_solved_only_where_the_neuron_fires_right():
+    """At 1e9 ms times are rounded by 1e-7 ms: a potential 1e-9 mV below the threshold has reached it."""
+    ended = []
+    for seed in range(40):
+        trains, target, _ = drawn(seed, 1e9, 0.3)
+        cone = made(
+            ConeX, tau=6.0, time="grid", step_ms=0.3, refractory=2.4, theta_plus=0.1, margin=1e-9, lb=-5, ub=5
+        ).fit([trains], [[target]])
+        ended.append(cone.status_)
+        fired = [] if cone.status_ == "infeasible" else cone.neuron_.run(cone.weights_, trains)
+        if cone.status_ == "solved":
+            assert len(fired) == 1, f"seed {seed}: fires at {fired}, not at {target}"
+            assert abs(fired[0] - target) <= 2 * np.spacing(target), f"seed {seed}"
+        if cone.status_ == "stopped":
+            assert "the neuron fires" in cone.reason_
+    assert ended.count("solved") > 3
+    assert ended.count("stopped") > 1
+
+
 @pytest.mark.parametrize("start", [0.0, 0.3, -17.1, -1e5, 1e7])
 @pytest.mark.parametrize("step", [0.1, 0.3])
 def test_d_of_cone_r_is_the_sum_over_the_points(step, start):

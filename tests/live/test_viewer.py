@@ -19,14 +19,14 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel import ProblemError
+from taxel import Detection, Note, ProblemError
 from taxel.cli import main
 from taxel.encode import ChangeEvents, ContactArea
-from taxel.live import Live, Panel, Said, Viewer
+from taxel.live import Live, Panel, Viewer
 from taxel.live._viewer_process import MOST_OTHERS, MOST_PICTURES, BoundedQueue
-from taxel.live.client import Note, Picture, Subject
+from taxel.live.client import Picture, Subject
 
-from .test_live import LOOPBACK, SMALL, play, presses, touch, wait_for
+from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 
 client = pytest.importorskip("websockets.sync.client", reason="the test extra brings websockets")
 
@@ -162,7 +162,7 @@ def rows(folder: Path) -> dict[str, list[tuple[int, dict[str, Any]]]]:
     return found
 
 
-def recorded(path: Path) -> tuple[taxel.Recording, list[Said]]:
+def recorded(path: Path) -> tuple[taxel.Recording, list[Detection]]:
     """Record what a board says, with what a readout says."""
     events, said = presses(20), []
     with Live(0, host=LOOPBACK, array=SMALL, readout=touch(), record=path, say=said.append) as live:
@@ -241,7 +241,7 @@ def test_foxglove_hears_a_recording_as_it_is(tmp_path: Path) -> None:
 
 @foxglove
 def test_foxglove_hears_a_board_with_what_is_detected(tmp_path: Path) -> None:
-    said: list[Said] = []
+    said: list[Detection] = []
     with (
         Live(0, host=LOOPBACK, array=SMALL, readout=touch(), say=said.append) as live,
         Viewer(live, "foxglove:0") as viewer,

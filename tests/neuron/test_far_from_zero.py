@@ -60,10 +60,17 @@ def test_potential_and_spikes_agree_at_every_point(start):
         assert below[: np.searchsorted(points, fired[0])].all()
 
 
-@pytest.mark.parametrize("start", [-1e5, 1e5, 2.0**23])
+#: A potential of this draw crosses the threshold 1e-6 ms after a grid point. At 2^33 ms neighbouring times are 1.9e-6
+#: ms apart, so that the crossing is at the point itself.
+BELOW_RESOLUTION = 42
+
+
+@pytest.mark.parametrize("start", [-1e5, 1e5, 2.0**23, 2.0**33])
 def test_a_neuron_far_from_0_fires_as_one_at_0(start):
     """Times that are whole numbers of 2^-10 ms: shifted without rounding."""
     for seed in range(60):
+        if start == 2.0**33 and seed == BELOW_RESOLUTION:
+            continue
         random = np.random.default_rng([42, seed])
         lists = [np.sort(random.integers(0, 100 * 1024, random.integers(1, 9))) / 1024 for _ in range(30)]
         neuron = Neuron(tau=8.0, time="grid", step_ms=0.1, after_spike=str(random.choice(["keep", "ignore", "reset"])))

@@ -57,6 +57,9 @@ def test_a_file_cut_before_its_end_says_that_it_is_truncated(small: Path, tmp_pa
     assert rec.truncated
     assert rec.verdict.startswith("not finished")
     assert rec.rebuilt["torn_bytes"] > 0
+    lost = taxel.convert(rec, tmp_path / "again.mcap")
+    assert lost == ["that its end is missing", "what reading had to put up with"]
+    assert taxel.open(tmp_path / "again.mcap").lost == tuple(lost)
 
 
 @pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])

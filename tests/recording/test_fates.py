@@ -267,8 +267,12 @@ def sliced(m: Model, a: float, b: float) -> Model:
     return replace(
         m, rows=[r for r in m.rows if a <= r[0] < b], held=known or None,
         notes=[n for n in m.notes if n[1] is not None and a <= n[1] < b], found=[f for f in m.found if a <= f[1] < b],
-        zeroed=[z for z in m.zeroed if z[0] < b],
+        zeroed=[z for z in m.zeroed if z[0] < b], lost=m.lost | untimed(m),
     )  # fmt: skip
+
+
+def untimed(m: Model) -> set[str]:
+    return {f"{count} notes without a time"} if (count := sum(t is None for _, t in m.notes)) else set()
 
 
 def cut_to(m: Model, x0: int, x1: int, y0: int, y1: int) -> Model:
@@ -292,7 +296,7 @@ def joined(m: Model, at: int, name: str) -> Model:
     begins = [(name, min(side, default=0)) for side in (left, right)]
     both = replace(m, rows=sorted(m.rows, key=lambda r: r[0]), notes=m.notes + begins, datagrams=False)
     both.notes = [n for n in both.notes if n[1] is not None]
-    both.lost = m.lost | ({"raw datagrams"} if m.datagrams else set())
+    both.lost = m.lost | untimed(m) | ({"raw datagrams"} if m.datagrams else set())
     return both
 
 

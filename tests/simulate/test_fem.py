@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from taxel import FormatError, ProblemError
+from taxel.report import installed_sources
 from taxel.simulate.fem import (
     DRAGON_SKIN_10,
     TABLE_5_1,
@@ -201,6 +202,15 @@ def test_courses_are_kept_under_a_digest_of_what_made_them(tmp_path, slanted):
     assert all(other not in kept for other in others)
     kept.code = "of other code"
     assert asked not in kept
+
+
+def test_all_of_the_solver_counts_for_what_is_kept(tmp_path):
+    parts = installed_sources().parts("taxel.simulate.fem.indentation")
+    folder = Path(press.__code__.co_filename).parent
+    solver = {f"taxel.simulate.fem.{file.stem}" for file in folder.glob("[!_]*.py")}
+    # Not who keeps courses, nor who samples them.
+    assert solver - parts.keys() == {f"taxel.simulate.fem.{name}" for name in ("conditions", "grid", "kept")}
+    assert KeptCourses(tmp_path).code == installed_sources().digest("taxel.simulate.fem.indentation")
 
 
 CHANGES = [("friction", 0.6), ("height_mm", 5.5), ("silicone", Yeoh(3600)), ("step_um", 24.0), ("penalty", 51.0)]

@@ -1,5 +1,9 @@
 //! Times by train.
 
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+use std::collections::binary_heap::PeekMut;
+
 use crate::{Result, Stop, problem};
 
 /// A time of the wire, us, as neurons count it, ms.
@@ -87,6 +91,28 @@ impl SpikeTrains {
         Ok(Self { times, values: signed.then_some(values), offsets, start, stop })
     }
 
+    /// Copies the columns of spike trains with the window `(start, stop)`, ms, and checks them.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` as [`SpikeTrains::check`]; `Interrupted` where the caller stops it.
+    pub fn copy_of(
+        times: &[f64],
+        offsets: Vec<usize>,
+        values: Option<&[f32]>,
+        (start, stop): (f64, f64),
+        interrupt: Stop<'_>,
+    ) -> Result<Self> {
+        let mut copy = Vec::with_capacity(times.len());
+        for piece in times.chunks(BETWEEN_CHECKS) {
+            interrupt.check()?;
+            copy.extend_from_slice(piece);
+        }
+        let trains = Self { times: copy, offsets, values: values.map(<[f32]>::to_vec), start, stop };
+        trains.check()?;
+        Ok(trains)
+    }
+
     /// How many trains.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -111,29 +137,34 @@ impl SpikeTrains {
     ///
     /// `Interrupted` where the caller stops it.
     pub fn by_time(&self, stop: Stop<'_>) -> Result<Vec<Spike>> {
-        stop.check()?;
-        let mut all: Vec<Spike> = (0..self.len())
-            .flat_map(|n| {
-                (self.offsets[n]..self.offsets[n + 1]).map(move |k| Spike {
-                    t: self.times[k],
-                    train: u32::try_from(n).unwrap_or(u32::MAX),
-                    value: self.values.as_ref().map_or(1.0, |v| v[k]),
-                })
-            })
-            .collect();
-        for piece in all.chunks_mut(SORTED_AT_ONCE) {
-            stop.check()?;
-            piece.sort_by(|a, b| a.t.total_cmp(&b.t));
+        let spike = |n: usize, k: usize| Spike {
+            t: self.times[k],
+            train: u32::try_from(n).unwrap_or(u32::MAX),
+            value: self.values.as_ref().map_or(1.0, |v| v[k]),
+        };
+        let mut all: Vec<Spike> = Vec::with_capacity(self.times.len());
+        if self.times.len() <= BETWEEN_CHECKS {
+            all.extend(
+                (0..self.len())
+                    .flat_map(|n| (self.offsets[n]..self.offsets[n + 1]).map(move |k| (n, k)))
+                    .map(|(n, k)| spike(n, k)),
+            );
+            all.sort_by(|a, b| a.t.total_cmp(&b.t));
+            return Ok(all);
         }
-        let mut sorted = SORTED_AT_ONCE;
-        while sorted < all.len() {
-            let mut merged = Vec::with_capacity(all.len());
-            for pair in all.chunks(2 * sorted) {
-                let (first, second) = pair.split_at(sorted.min(pair.len()));
-                merge(first, second, &mut merged, stop)?;
+        // Trains are merged, as a sort of this many spikes could not be interrupted.
+        let next = |n: usize, k: usize| (k < self.offsets[n + 1]).then(|| Reverse(Next { t: self.times[k], n, k }));
+        let mut heads: BinaryHeap<_> = (0..self.len()).filter_map(|n| next(n, self.offsets[n])).collect();
+        while let Some(mut head) = heads.peek_mut() {
+            if all.len().is_multiple_of(BETWEEN_CHECKS) {
+                stop.check()?;
             }
-            all = merged;
-            sorted *= 2;
+            let Next { n, k, .. } = head.0;
+            all.push(spike(n, k));
+            match next(n, k + 1) {
+                Some(following) => *head = following,
+                None => drop(PeekMut::pop(head)),
+            }
         }
         Ok(all)
     }
@@ -163,28 +194,36 @@ impl SpikeTrains {
     }
 }
 
-/// So many spikes are sorted between two checks for Ctrl-C.
-const SORTED_AT_ONCE: usize = 1 << 18;
+/// So many spikes are copied, sorted or merged between two checks for Ctrl-C.
+const BETWEEN_CHECKS: usize = 1 << 18;
 
-/// Appends two sorted runs to `out`, sorted; at equal times those of the first come first.
-fn merge(first: &[Spike], second: &[Spike], out: &mut Vec<Spike>, stop: Stop<'_>) -> Result<()> {
-    let (mut i, mut j) = (0, 0);
-    while i < first.len() && j < second.len() {
-        if (i + j) % SORTED_AT_ONCE == 0 {
-            stop.check()?;
-        }
-        if second[j].t.total_cmp(&first[i].t).is_lt() {
-            out.push(second[j]);
-            j += 1;
-        } else {
-            out.push(first[i]);
-            i += 1;
-        }
-    }
-    out.extend_from_slice(&first[i..]);
-    out.extend_from_slice(&second[j..]);
-    Ok(())
+/// The next spike of train `n`, number `k` of all; ordered by time, then by train.
+#[derive(Debug, Clone, Copy)]
+struct Next {
+    t: f64,
+    n: usize,
+    k: usize,
 }
+
+impl Ord for Next {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.t.total_cmp(&other.t).then(self.n.cmp(&other.n))
+    }
+}
+
+impl PartialOrd for Next {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Next {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Next {}
 
 /// [`SpikeTrains::check`] for columns wherever they lie; of the values their number matters.
 ///

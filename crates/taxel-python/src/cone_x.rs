@@ -52,7 +52,7 @@ fn weighed<'py>(py: Python<'py>, rows: &[(Row, f64)]) -> Weighed<'py> {
     (rows.iter().map(|r| from_row(r.0)).collect(), array(py, rows.iter().map(|r| r.1).collect()))
 }
 
-/// A certificate as Python gets it: rows and multipliers, gap, whether it needs no margin, what it says.
+/// A certificate as Python gets it: rows and multipliers, gap, whether it needs no margin, its explanation.
 type CertificateOut<'py> = (Weighed<'py>, f64, bool, String);
 
 /// A fit as Python gets it: status, weights, objective, parts, gap, violation, margins that hold and were asked for, engine, rounds,
@@ -113,7 +113,7 @@ impl ConeXProblem {
         Ok((array(py, coefficients), limit))
     }
 
-    /// What B looks at behind a target, and what it shall reach.
+    /// The row of B behind a target, and the value that it aims at.
     fn behind<'py>(&self, py: Python<'py>, pattern: usize, target: usize) -> PyResult<RowOut<'py>> {
         let Stated { coefficients, limit } = self.problem.behind(pattern, target).map_err(core)?;
         Ok((array(py, coefficients), limit))
@@ -130,10 +130,10 @@ impl ConeXProblem {
         let multipliers = slice("multipliers", &multipliers)?;
         let rows = start.iter().map(to_row).collect::<PyResult<Vec<_>>>()?;
         let start: Vec<(Row, f64)> = rows.into_iter().zip(multipliers.iter().copied()).collect();
-        let (found, signal) = enter_keeping(py, self.max_seconds, |stop, teller| {
+        let (found, signal) = enter_keeping(py, self.max_seconds, |stop, caller| {
             let mut report = |round: Round| {
                 let Round { round, rows, objective, left: Left::Broken(broken) } = round else { return };
-                teller.tell(progress.as_ref(), |py, told| told.call1(py, (round, rows, broken, objective)));
+                caller.call(progress.as_ref(), |py, function| function.call1(py, (round, rows, broken, objective)));
             };
             self.problem.fit(&start, &mut report, stop)
         })?;

@@ -9,8 +9,9 @@ use numpy::{BorrowError, Element, IntoPyArray, PyArray1, PyArrayMethods, PyReado
 use pyo3::Borrowed;
 use pyo3::prelude::*;
 use taxel_core::wire::{Columns, Filled, Room};
-use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeTrains};
+use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeTrains, Stop};
 
+use crate::enter::enter;
 use crate::errors::{ProblemError, core};
 
 /// The entries of a one-dimensional array, in place.
@@ -216,12 +217,17 @@ pub(crate) fn to_offsets(offsets: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<us
 }
 
 pub(crate) fn to_spikes((times, offsets, values, start, stop): SpikesIn<'_>) -> PyResult<SpikeTrains> {
+    let py = times.py();
     let offsets = to_offsets(&offsets)?;
-    let values = values.map(|v| slice("values", &v).map(<[f32]>::to_vec)).transpose()?;
-    let trains = SpikeTrains { times: slice("times", &times)?.to_vec(), offsets, values, start, stop };
-    trains.check().map_err(core)?;
-    Ok(trains)
+    let times = slice("times", &times)?;
+    let values = values.as_ref().map(|v| slice("values", v)).transpose()?;
+    let copy = |interrupt: Stop<'_>| SpikeTrains::copy_of(times, offsets, values, (start, stop), interrupt);
+    // Of few spikes a copy costs less than releasing the GIL.
+    if times.len() < MANY_SPIKES { copy(Stop::never()).map_err(core) } else { enter(py, copy) }
 }
+
+/// So many spikes are copied without the GIL, so that Ctrl-C can interrupt the copy.
+const MANY_SPIKES: usize = 1 << 20;
 
 /// Spike trains as Python gets them: the same parts, as new arrays.
 pub(crate) type SpikesOut<'py> =

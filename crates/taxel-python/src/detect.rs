@@ -97,10 +97,10 @@ fn score<'py>(
     Ok(tallies
         .into_iter()
         .map(|tally| {
-            let (said, events) = tally.pairs.into_iter().unzip();
+            let (detections, events) = tally.pairs.into_iter().unzip();
             (
                 tally.label,
-                places(said),
+                places(detections),
                 places(events),
                 places(tally.missed),
                 places(tally.false_),
@@ -138,7 +138,7 @@ fn parse(readout: &str, tare: Option<&str>) -> PyResult<(Readout, Option<Tare>)>
     Ok((Readout::from_json(readout).map_err(core)?, tare))
 }
 
-/// What a readout says of a whole recording of events, in which taxels were zeroed: t in us, column, row, rest.
+/// The detections of a readout in a whole recording of events, with its zeroings: t in us, column, row, rest.
 #[pyfunction]
 fn readout_run_events<'py>(
     py: Python<'py>,
@@ -158,7 +158,7 @@ fn readout_run_events<'py>(
     Ok(from_detections(py, found))
 }
 
-/// What a readout says of a whole recording of pictures.
+/// The detections of a readout in a whole recording of pictures.
 #[pyfunction]
 fn readout_run_frames<'py>(
     py: Python<'py>,
@@ -206,22 +206,22 @@ impl ReadoutStream {
         Ok(from_detections(py, found))
     }
 
-    /// Up to where everything has been said, us.
+    /// The time up to which all detections have been returned, us.
     #[getter]
     fn now(&self, py: Python<'_>) -> Option<i64> {
-        self.0.look(py, |readout| readout.now())
+        self.0.with(py, |readout| readout.now())
     }
 
     /// How many events came late.
     #[getter]
     fn late(&self, py: Python<'_>) -> u64 {
-        self.0.look(py, |readout| readout.late())
+        self.0.with(py, |readout| readout.late())
     }
 
     /// Each neuron's potential now, mV.
     #[getter]
     fn potentials(&self, py: Python<'_>) -> Vec<(String, f64)> {
-        self.0.look(py, |readout| readout.potentials().map(|(label, mv)| (label.to_owned(), mv)).collect())
+        self.0.with(py, |readout| readout.potentials().map(|(label, mv)| (label.to_owned(), mv)).collect())
     }
 }
 

@@ -219,10 +219,10 @@ class Calibration:
         unit : {"N", "kPa"}
         of : str
             What readings are in.
-        gain : float or float64, shape (rows, columns)
-        rest : Tare or float64 of the array's shape, optional
+        gain : float or float64, shape (rows, columns), above 0
+        rest : Tare or float64, shape (rows, columns), in the unit `of`, optional
             0 where it is left out.
-        floor : float, in readings
+        floor : float, in the unit `of`, 0 or more
         date : str, optional
             Today where it is left out.
         note : str
@@ -273,9 +273,9 @@ class Calibration:
         each : bool
             A gain of its own for each taxel that a load determines: uniform pressure (kPa), or a load on one
             taxel. The others keep the common one.
-        rest : Tare or float64 of the array's shape, optional
+        rest : Tare or float64, shape (rows, columns), in the unit of the readings, optional
             That of `start`, or 0, where it is left out.
-        floor : float, in readings
+        floor : float, in the unit of the readings, 0 or more
         date : str, optional
             Today where it is left out.
         note : str
@@ -283,6 +283,13 @@ class Calibration:
         Raises
         ------
         ProblemError : no load, loads of several arrays or units, a load under which nothing is read
+
+        Examples
+        --------
+        >>> weight = Load(Frames([[[20.0]], [[20.0]]], [0, 1000]), 5.0)
+        >>> fitted = Calibration.fit([weight], date="2026-11-21")
+        >>> fitted.apply(Frames([[[40.0]]], [0])).values.ravel()
+        array([10.], dtype=float32)
         """
         checked_text("unit", unit, UNITS)
         given = [instance("loads", load, Load) for load in several("loads", loads)]
@@ -336,6 +343,18 @@ class Calibration:
 
     def readings(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
         """Return what the sensor would read under pictures in N or kPa: the inverse of `apply`.
+
+        Parameters
+        ----------
+        frames : Frames
+            Pictures in the calibration's unit.
+        rest : Tare or float64, shape (rows, columns), in the unit of the readings, optional
+            Today's rest; the calibration's own where it is left out.
+
+        Returns
+        -------
+        Frames
+            In the unit of the readings.
 
         Raises
         ------
@@ -402,6 +421,10 @@ class Calibration:
     def from_json(cls, text: str) -> Calibration:
         """Return the calibration that `to_json` wrote.
 
+        Parameters
+        ----------
+        text : str
+
         Raises
         ------
         FormatError : no calibration (names the entry)
@@ -444,6 +467,16 @@ class Calibration:
         Beside ``walk.mcap`` it is found by itself where it is called ``walk.calibration.json``, or, for all recordings
         of the folder, ``calibration.json``.
 
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
+
         Raises
         ------
         FileExistsError : the file is there already and `overwrite` is false
@@ -453,6 +486,10 @@ class Calibration:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Calibration:
         """Read a calibration from the file that `save` wrote.
+
+        Parameters
+        ----------
+        path : path
 
         Raises
         ------
@@ -466,7 +503,21 @@ class Calibration:
 
     @staticmethod
     def beside(recording: str | os.PathLike[str]) -> Path | None:
-        """Return the file of the calibration that lies beside a recording; None where there is none."""
+        """Return the file of the calibration that lies beside a recording; None where there is none.
+
+        Parameters
+        ----------
+        recording : path
+
+        Raises
+        ------
+        ProblemError : no path
+
+        Examples
+        --------
+        >>> Calibration.beside("a recording that is not there.mcap") is None
+        True
+        """
         place = Path(checked_path("recording", recording))
         for name in (f"{place.stem}.calibration.json", "calibration.json"):
             if place.with_name(name).is_file():
@@ -519,7 +570,10 @@ class _Laid(NamedTuple):
         readings = frames.values.mean(axis=0, dtype=np.float64)
         chosen = _there(calibration.array) & ~np.isnan(rest)
         if load.taxel is not None:
-            x, y = (whole(f"{place}, taxel", n, 0) for n in load.taxel)
+            only = several(f"{place}, taxel", load.taxel)
+            if len(only) != 2:
+                raise ProblemError(f"{place}, taxel is {shown(load.taxel)}: must be a column and a row")
+            x, y = (whole(f"{place}, taxel", n, 0) for n in only)
             index = int(calibration.array.index(x, y))
             chosen &= np.arange(chosen.size).reshape(chosen.shape) == index
         rest = np.nan_to_num(rest)

@@ -19,7 +19,9 @@ __all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app"]
 WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
 
 #: Of commands that go on until they are stopped.
-SecondsOption = Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")]
+SecondsOption = Annotated[
+    float | None, typer.Option(min=0.0, help="End after this many seconds; without it with Ctrl-C.")
+]
 
 
 class _Command(TyperCommand):

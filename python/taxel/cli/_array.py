@@ -21,8 +21,8 @@ FileArrayOption = Annotated[
     typer.Option(
         "--array",
         metavar="ROWSxCOLUMNS[xMM]",
-        help="The sensor and its pitch, as 24x20x5, where the file does not hold it (events as .csv, .lsa): 64x64x2.67 "
-        "where left out, a larger one where events lie outside it.",
+        help="Rows, columns and pitch of the sensor, as 24x20x5, for files without them (events as .csv, .lsa). "
+        "Default: 64x64x2.67, or a larger array where events lie outside it.",
     ),
 ]
 

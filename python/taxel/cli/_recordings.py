@@ -31,10 +31,8 @@ _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
 #: Of the taxels that a recording has events of, so many may lack a rest without a word: the few that woke late.
 _MOST_UNKNOWN = 0.1
 
-TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or so many seconds at the recording's beginning."
-SET_HELP = (
-    "KEY=VALUE: another value (TOML) of a parameter, by dotted key where it lies within another; may be repeated."
-)
+TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest at the beginning of the recording."
+SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
 
 
 def assignments(said: list[str]) -> dict[str, Any]:
@@ -186,7 +184,7 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
     span = f"{recording.path} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
     if total and lost == total:
         raise ProblemError(f"{option} {table.path}: none of its {total} events lies within {span}")
-    if recording.clock is None and any(row.host_ns is not None for row in table.rows):
+    if recording.clock is None and any(row.at_ns for row in table.rows):
         warnings.warn(
             f"the {kind_of_file(recording.kind)} keeps no arrival times, so host_ns cannot settle by how many turns of "
             f"the board's clock (6.5536 s) {table.path} is ahead of it: times are taken as they are",

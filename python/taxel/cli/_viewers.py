@@ -19,14 +19,12 @@ ToOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="VIEWER",
-        help="Show it in another program: rerun or rerun:HOST:PORT, a viewer that you have started; foxglove or "
+        help="Show the data in another program: rerun or rerun:HOST:PORT, a viewer that you have started; foxglove or "
         "foxglove:PORT, a server on 127.0.0.1 that Foxglove connects to. May be repeated.",
     ),
 ]
-SpikesOption = Annotated[
-    str | None, typer.Option("--encoder", help="With --to: an encoder whose spikes are shown too.")
-]
-SpikesSetOption = Annotated[list[str] | None, typer.Option("--set", help=f"Of --encoder. {SET_HELP}")]
+SpikesOption = Annotated[str | None, typer.Option("--encoder", help="With --to: show the spikes of this encoder too.")]
+SpikesSetOption = Annotated[list[str] | None, typer.Option("--set", help=f"Set a parameter of --encoder. {SET_HELP}")]
 
 #: Names of what is counted, where the key is not one.
 _NAMES = {"curves": "times of the curves"}

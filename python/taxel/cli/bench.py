@@ -16,9 +16,9 @@ from typing import Annotated, Any, BinaryIO
 import typer
 
 from taxel._base.files import write_whole
+from taxel._base.provenance import Sources, installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.report.provenance import Sources, installed
 
 __all__ = ["bench", "stale_results"]
 
@@ -28,9 +28,11 @@ _PATIENT = "TAXEL_BENCH_PEERS"
 
 @app.command()
 def bench(
-    name: Annotated[str, typer.Argument(help="A file of benchmarks/ without its ending, or all.")] = "all",
-    folder: Annotated[Path, typer.Option(help="Where the benchmarks lie: a checkout's folder.")] = Path("benchmarks"),
-    quick: Annotated[bool, typer.Option(help="Few rounds: to see that it runs; writes no result.")] = False,
+    name: Annotated[str, typer.Argument(help="The name of a file of benchmarks/ without .py, or all.")] = "all",
+    folder: Annotated[Path, typer.Option(help="The folder of the benchmarks, in a checkout of taxel.")] = Path(
+        "benchmarks"
+    ),
+    quick: Annotated[bool, typer.Option(help="Run few rounds, as a test; writes no result.")] = False,
     peers: Annotated[
         bool, typer.Option("--peers", help="Wait for peers that need minutes, and keep their times for this processor.")
     ] = False,
@@ -39,7 +41,7 @@ def bench(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Measure taxel beside its peers in one run and write the ratios to benchmarks/results/.
+    """Compare the speed of taxel with other libraries, in one run; write the ratios to benchmarks/results/.
 
     Peers that are not installed are left out, and named.
 
@@ -86,7 +88,7 @@ def bench(
 
 def _sources(folder: Path) -> Sources:
     """Return the sources of the benchmarks and of what they measure."""
-    return installed("taxel_studies", *sorted(folder.glob("*.py")))
+    return installed_sources("taxel_studies", *sorted(folder.glob("*.py")))
 
 
 def stale_results(folder: Path, names: Sequence[str]) -> dict[str, list[str]]:
@@ -113,13 +115,13 @@ def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
 
 def _changed(folder: Path) -> list[str]:
     """Return the files of the checkout that differ from its last commit, but for results."""
-    said = subprocess.run(
+    status = subprocess.run(
         ["git", "status", "--porcelain", "--untracked-files=no", "--", ":/", f":!{folder}/results"],
         capture_output=True,
         text=True,
         check=False,
     )
-    return [line[3:] for line in said.stdout.splitlines()]
+    return [line[3:] for line in status.stdout.splitlines()]
 
 
 def _put(text: str, file: BinaryIO) -> None:

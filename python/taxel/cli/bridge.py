@@ -44,34 +44,35 @@ def bridge(
     array: ArrayOption = None,
     preset: PresetOption = None,
     differences: DifferencesOption = LiveOptions.differences,
-    name: Annotated[str, typer.Option(help="Of the board: letters, digits, - _ or .")] = "board",
+    name: Annotated[str, typer.Option(help="The board's name: letters, digits, - _ or .")] = "board",
     listen: Annotated[
-        list[str], typer.Option(help="HOST:PORT (TCP) of this computer for others to connect to; may be repeated.")
+        list[str], typer.Option(help="HOST:PORT (TCP) of this computer to listen on; may be repeated.")
     ] = [PLACE],  # noqa: B006  typer reads it and never writes
     connect: Annotated[
-        list[str] | None, typer.Option(help="HOST:PORT of a Zenoh router to publish at; may be repeated.")
+        list[str] | None, typer.Option(help="HOST:PORT of a Zenoh router to connect to; may be repeated.")
     ] = None,
     readout: Annotated[
         Path | None, typer.Option(help="A trained readout (JSON), whose detections are published too.")
     ] = None,
     tare: TareOption = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Keep everything here too, in a new file (.mcap or .lsa).")
-    ] = None,
+    record: Annotated[Path | None, typer.Option(help="Record here too, in a new file (.mcap or .lsa).")] = None,
     seconds: SecondsOption = None,
     clock_ahead: Annotated[
-        float, typer.Option(help="For trials: set this computer's clock ahead by so much, s.")
+        float, typer.Option(help="For tests: publish times that are ahead of this computer's clock by this, s.")
     ] = 0.0,
-    clock_drift: Annotated[float, typer.Option(help="For trials: let it run faster, parts per million.")] = 0.0,
+    clock_drift: Annotated[
+        float, typer.Option(help="For tests: publish times of a clock that runs faster by this, parts per million.")
+    ] = 0.0,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the counts at the end as JSON, and nothing else.")
     ] = False,
 ) -> None:
-    """Publish a board for other computers: datagrams as they are, pictures ten times a second, detections.
+    """Publish a board to other computers: its datagrams, ten pictures a second, and detections.
 
-    There taxel live, and taxel record, hear it with --from zenoh:HOST:PORT/NAME as if the board were there. Listens on
-    this computer alone unless --listen says more; what is published is neither encrypted nor guarded. Needs the wheel
-    taxel-bridge (make bridge). Exit code 3 where nothing came or something was lost here after it had arrived.
+    On the other computer, taxel live and taxel record receive the board with --from zenoh:HOST:PORT/NAME. The bridge
+    listens on loopback unless --listen names another address; what it publishes is neither encrypted nor protected by a
+    password. It needs the wheel taxel-bridge (make bridge). Exit code 3: nothing came, or something was lost here after
+    it had arrived.
 
     Example: taxel bridge --port 5208 --name left --listen 192.168.1.5:7447
     """

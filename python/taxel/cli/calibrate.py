@@ -27,40 +27,47 @@ __all__ = ["calibrate"]
 
 @app.command()
 def calibrate(
-    recording: Annotated[Path, typer.Argument(help="A recording of the sensor, under the loads where there are any.")],
-    load: Annotated[float | None, typer.Option(help="A known load that lies there from --from to --to.")] = None,
-    start: Annotated[float | None, typer.Option("--from", metavar="S", help="Time of the board, s.")] = None,
-    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="Time of the board, s.")] = None,
-    load_unit: Annotated[str, typer.Option(help="Of --load: N in all, or kPa at every taxel.")] = "N",
+    recording: Annotated[
+        Path, typer.Argument(help="A recording of the sensor, with the loads on it if there are any.")
+    ],
+    load: Annotated[float | None, typer.Option(help="A known load, on the sensor from --from to --to.")] = None,
+    start: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="Start of the load, board time, s.")
+    ] = None,
+    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="End of the load, board time, s.")] = None,
+    load_unit: Annotated[str, typer.Option(help="Unit of --load: N (total) or kPa (at every taxel).")] = "N",
     loads: Annotated[
         Path | None,
-        typer.Option(help="A .csv of loads: load,unit,from_s,to_s and, for one taxel alone, x,y."),
+        typer.Option(help="A .csv of loads: load,unit,from_s,to_s and, for a load on a single taxel, x,y."),
     ] = None,
     law: Annotated[
-        bool, typer.Option("--law", help="By the law of the fabric, its amplifier and its ramp; loads correct it.")
+        bool, typer.Option("--law", help="Use the law of the fabric, amplifier and ramp; loads correct its gain.")
     ] = False,
     table: Annotated[
         Path | None,
-        typer.Option(help="By a .csv of reading,value (above rest), of each taxel with x,y; loads scale it."),
+        typer.Option(
+            help="Use a .csv of reading,value (above rest); with columns x,y for each taxel. Loads correct its gain."
+        ),
     ] = None,
     set_: Annotated[
-        list[str] | None, typer.Option("--set", help="KEY=VALUE of the law: v_trans, feedback_kohm, exponent ...")
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE: a parameter of the law: v_trans, feedback_kohm, exponent ..."),
     ] = None,
-    unit: Annotated[str, typer.Option(help="Of the values: N on a taxel, or kPa at it.")] = "N",
+    unit: Annotated[str, typer.Option(help="Unit of the calibrated values: N or kPa, at a taxel.")] = "N",
     each: Annotated[
-        bool, typer.Option("--each", help="A gain of its own for each taxel (uniform kPa, or loads on single taxels).")
+        bool, typer.Option("--each", help="Fit a gain for each taxel (needs uniform kPa, or loads on single taxels).")
     ] = False,
-    exponent: Annotated[float | None, typer.Option(help="Not fitted, but this.")] = None,
-    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Left out: the lowest that each taxel reads.")] = None,
-    date: Annotated[str | None, typer.Option(help="The day, as 2026-11-21; today where it is left out.")] = None,
-    note: Annotated[str, typer.Option(help="Which sensor, which weights.")] = "",
+    exponent: Annotated[float | None, typer.Option(help="The exponent, given instead of fitted.")] = None,
+    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: the lowest value of each taxel.")] = None,
+    date: Annotated[str | None, typer.Option(help="Date of the calibration, as 2026-11-21. Default: today.")] = None,
+    note: Annotated[str, typer.Option(help="A note: which sensor, which weights.")] = "",
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The new file; beside the recording where it is left out.")
+        Path | None, typer.Option("--out", "-o", help="The new file. Default: beside the recording.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Make a calibration, ticks or counts to N or kPa, from a known load, a table or the fabric's law.
+    """Calibrate readings (ticks, counts) to N or kPa by a known load, a table or the fabric's law.
 
     It lies beside the recording, where taxel info and Recording.calibrated find it; called calibration.json it holds
     for all recordings of the folder.

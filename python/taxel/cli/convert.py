@@ -19,20 +19,20 @@ __all__ = ["convert"]
 @app.command()
 def convert(
     source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
-    target: Annotated[Path, typer.Argument(help="The new file; its ending says the kind.")],
+    target: Annotated[Path, typer.Argument(help="The new file; its extension gives the format.")],
     array: FileArrayOption = None,
     frames: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Write pictures at this rate (.npz, .csv, .h5), not events."),
+        typer.Option(metavar="HZ", help="Write frames at this rate (.npz, .csv, .h5) instead of events."),
     ] = None,
     part: Annotated[
-        str | None, typer.Option("--source", metavar="NAME", help="Of a recording of several sources this one.")
+        str | None, typer.Option("--source", metavar="NAME", help="The source to convert, of a recording with several.")
     ] = None,
-    compression: Annotated[str, typer.Option(help="Of a .mcap: none, lz4 or zstd.")] = "none",
+    compression: Annotated[str, typer.Option(help="Compression of a .mcap: none, lz4 or zstd.")] = "none",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Write a recording as another kind of file: lossless where the target can hold it, else it says what it cannot.
+    """Convert a recording to another format, and report what the target cannot hold.
 
     Example: taxel convert walk.mcap walk.csv
     """
@@ -49,4 +49,4 @@ def convert(
         return
     typer.echo(f"written to {target}")
     for what in lost:
-        typer.echo(f"  a {target.suffix} cannot hold: {what}")
+        typer.echo(f"  not kept: {what}")

@@ -20,16 +20,27 @@ __all__ = ["cut"]
 @app.command()
 def cut(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
-    out: Annotated[Path, typer.Argument(help="The new file; its ending says the kind. With --label out1 ...")],
-    start: Annotated[float | None, typer.Option("--from", metavar="S", help="From this time of the board, s.")] = None,
-    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="To this time of the board, s.")] = None,
-    columns: Annotated[str | None, typer.Option(metavar="A:B", help="These columns, the last not: 0:32.")] = None,
-    rows: Annotated[str | None, typer.Option(metavar="A:B", help="These rows, the last not: 10:20.")] = None,
-    label: Annotated[str | None, typer.Option(help="Cut around each note of this text.")] = None,
-    before: Annotated[float, typer.Option(min=0.0, metavar="S", help="With --label: so long before it, s.")] = 0.5,
-    after: Annotated[float, typer.Option(min=0.0, metavar="S", help="With --label: so long after it, s.")] = 0.5,
+    out: Annotated[
+        Path,
+        typer.Argument(
+            help="The new file; its extension gives the format. With --label a number is appended to the name."
+        ),
+    ],
+    start: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="Start of the part, board time, s.")
+    ] = None,
+    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="End of the part, board time, s.")] = None,
+    columns: Annotated[str | None, typer.Option(metavar="A:B", help="Columns A to B - 1, as 0:32.")] = None,
+    rows: Annotated[str | None, typer.Option(metavar="A:B", help="Rows A to B - 1, as 10:20.")] = None,
+    label: Annotated[str | None, typer.Option(help="Cut a part around each note with this text.")] = None,
+    before: Annotated[
+        float, typer.Option(min=0.0, metavar="S", help="With --label: start this long before the note, s.")
+    ] = 0.5,
+    after: Annotated[
+        float, typer.Option(min=0.0, metavar="S", help="With --label: end this long after the note, s.")
+    ] = 0.5,
     source: Annotated[
-        str | None, typer.Option("--source", metavar="NAME", help="Of a recording of several sources this one.")
+        str | None, typer.Option("--source", metavar="NAME", help="The source to cut, of a recording with several.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
@@ -61,7 +72,7 @@ def cut(
         if not as_json:
             typer.echo(f"written to {place}: {part!r}")
             for what in lost:
-                typer.echo(f"  a {place.suffix} cannot hold: {what}")
+                typer.echo(f"  not kept: {what}")
     if as_json:
         typer.echo(json.dumps({"recording": str(recording), "written": written}))
 

@@ -18,25 +18,39 @@ __all__ = ["demo"]
 
 @app.command()
 def demo(
-    scenes: Annotated[int, typer.Option(min=1, help="How many scenes.")] = 12,
-    seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Drawn where it is left out.")] = None,
-    no_clock: Annotated[bool, typer.Option("--no-clock", help="Board time as fast as it goes; no socket.")] = False,
-    noise: Annotated[float | None, typer.Option(help="Seconds of noise: 60, or 120 without the clock.")] = None,
-    data: Annotated[Path | None, typer.Option(help="Recordings: footfalls of DATA/plate are played as well.")] = None,
-    readout: Annotated[Path | None, typer.Option(help="Another readout than the one that comes with taxel.")] = None,
+    scenes: Annotated[int, typer.Option(min=1, help="Number of scenes.")] = 12,
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Seed of the random numbers. Default: drawn.")
+    ] = None,
+    no_clock: Annotated[
+        bool, typer.Option("--no-clock", help="Simulate as fast as possible instead of in real time; no socket.")
+    ] = False,
+    noise: Annotated[
+        float | None, typer.Option(help="Duration of the noise test, s. Default: 60, with --no-clock 120.")
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="A folder of recordings: the footfalls in DATA/plate are played too.")
+    ] = None,
+    readout: Annotated[
+        Path | None, typer.Option(help="A readout to use instead of the one that comes with taxel.")
+    ] = None,
     folder: Annotated[Path | None, typer.Option(help="A new folder for the report.")] = None,
     train_to: Annotated[
-        Path | None, typer.Option("--train", help="Train the readout, write it there, and end.")
+        Path | None, typer.Option("--train", help="Train the demo's readout, write it to this file, and end.")
     ] = None,
     drops_to: Annotated[
-        Path | None, typer.Option("--drops", help="Simulate the drops that answers rest on, write them there, and end.")
+        Path | None,
+        typer.Option(
+            "--drops",
+            help="Simulate the drops on which ball, height and slant are classified, write them to this file, and end.",
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON, and nothing else.")] = False,
 ) -> None:
     """Play scenes on the emulated board, find contact and lift-off while they run, and leave a report.
 
     A ball falls on foam, is caught in flight, pressed by hand and lifted. The board is a process of its own that sends
-    real packets over UDP; this one records, encodes and says contact and lift. A new folder gets report.html and
+    real packets over UDP; this one records, encodes and detects contact and lift. A new folder gets report.html and
     report.json.
 
     Example: taxel demo --seed 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -17,12 +17,8 @@ from taxel.spikes import to_ms
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from taxel.detect import Score
+    from taxel.detect import Outcome, Score
     from taxel.detections import Detections
-    from taxel.recording import Recording
-    from taxel.tare import Tare
 
 __all__ = ["detect"]
 
@@ -30,20 +26,6 @@ __all__ = ["detect"]
 _NONE = np.empty(0, np.int64)
 #: Rows of the table that is printed; all go to --csv and --json.
 _ROWS = 40
-
-
-class _Heard(NamedTuple):
-    """A recording, what was said of it and after which rest, and what really happened where that is known."""
-
-    recording: Recording
-    found: Detections
-    tare: Tare | None
-    truth: dict[str, NDArray[np.int64]] | None
-    score: Score | None
-
-    @property
-    def name(self) -> str:
-        return str(self.recording.path)
 
 
 @app.command()
@@ -54,25 +36,29 @@ def detect(
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote.")],
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
     frame_us: Annotated[
-        float | None, typer.Option(help="Length of the board's frame; else the registers', the pictures' or 192.")
+        float | None,
+        typer.Option(help="Length of the board's frame, us. Default: by the registers or the frames, else 192."),
     ] = None,
     truth: Annotated[
-        str | None, typer.Option(help="Score against a CSV label,t_us or recording,label,t_us, or against notes.")
+        str | None,
+        typer.Option(
+            help="Score against a CSV label,t_us or recording,label,t_us, or notes: the recordings' own notes."
+        ),
     ] = None,
-    window_ms: Annotated[float, typer.Option(help="How far a detection may lie from its event, either way.")] = 50.0,
-    csv: Annotated[Path | None, typer.Option(help="Write the detections to this table.")] = None,
+    window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
+    csv: Annotated[Path | None, typer.Option(help="Write the detections to this .csv.")] = None,
     report: Annotated[
-        Path | None, typer.Option(help="A folder for a page: potential, weights, errors, the worst events.")
+        Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Say what happens when in a recording, or in each of a folder, by a trained readout.
+    """Detect events in a recording, or in each of a folder, by a trained readout.
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
     from taxel._base.files import try_whole, write_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import Readout, run, score  # noqa: PLC0415
+    from taxel.detect import Example, Outcome, Readout, run, score  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
 
     for place in (csv, None if report is None else new_report(report)):
@@ -92,17 +78,15 @@ def detect(
             # What the readout cannot say it cannot miss.
             wanted = None if happened is None else {label: happened.get(label, _NONE) for label in loaded.labels}
             scored = None if wanted is None else score(found, wanted, window_ms)
-            heard.append(_Heard(one, found, rest, wanted, scored))
-    truths = [one.truth for one in heard if one.truth is not None]
+            heard.append(Outcome(str(one.path), Example(one, wanted or {}, rest), found, scored))
+    truths = [one.example.labels for one in heard if one.score is not None]
     together = score_together([one.found for one in heard], truths, window_ms) if truths else None
     if csv is not None:
         write_whole(csv, lambda file: file.write(_table(heard).encode()), overwrite=overwrite)
     if report is not None:
-        from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
-        from taxel.report import Listened, write_listening  # noqa: PLC0415  pictures load slowly
+        from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
-        shown = [Listened(said.name, recorded(one), *said[1:]) for one, said in zip(opened, heard, strict=True)]
-        write_listening(report, loaded, shown, title=f"What {readout} says of {recording}")
+        write_listening(report, loaded, heard, title=f"What {readout} says of {recording}")
     written = {"written": csv, "report": None if report is None else report / "report.html"}
     places = {name: str(place) for name, place in written.items() if place is not None}
     if as_json:
@@ -119,7 +103,7 @@ def detect(
 
 
 def _result(
-    recording: Path, readout: Path, heard: Sequence[_Heard], together: Score | None, window_ms: float
+    recording: Path, readout: Path, heard: Sequence[Outcome], together: Score | None, window_ms: float
 ) -> dict[str, Any]:
     """Return what was found as JSON holds it; a detection has the keys that `taxel live --json` gives it."""
     each: list[dict[str, Any]] = [
@@ -140,7 +124,7 @@ def _result(
     return result if together is None else result | {"window_ms": window_ms, "score": together.to_dict()}
 
 
-def _table(heard: Sequence[_Heard]) -> str:
+def _table(heard: Sequence[Outcome]) -> str:
     """Return the detections as a table; of several recordings each row begins with its recording's name."""
     if len(heard) == 1:
         return heard[0].found._csv()

@@ -15,8 +15,8 @@ from rich.table import Table
 from taxel._core import ProblemError
 from taxel.cli._app import App, SecondsOption, app
 from taxel.device import Device, ports
-from taxel.live.options import QUOTED_PRESETS
 from taxel.wire import PRESETS, Registers, described
+from taxel.wire.registers import QUOTED_PRESETS
 
 __all__ = ["apply", "listed", "record", "set_registers", "show", "watch"]
 
@@ -26,7 +26,7 @@ _device = App(
 app.add_typer(_device, name="device")
 
 PlaceArgument = Annotated[str, typer.Argument(help="A serial device (/dev/ttyUSB0), or host:port.")]
-BaudOption = Annotated[int, typer.Option(help="Of the serial line.")]
+BaudOption = Annotated[int, typer.Option(help="Baud rate of the serial line.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
 
@@ -54,7 +54,7 @@ def listed(as_json: JsonOption = False) -> None:
 
 @_device.command()
 def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption = False) -> None:
-    """Show what a board is, and every register with its unit.
+    """Show a board's identity, and every register with its unit.
 
     Example: taxel device show /dev/ttyUSB0
     """
@@ -66,7 +66,8 @@ def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption =
 def set_registers(
     place: PlaceArgument,
     fields: Annotated[
-        list[str], typer.Argument(metavar="NAME=VALUE...", help="As ramp=140 noise_floor=4; times in us.")
+        list[str],
+        typer.Argument(metavar="NAME=VALUE...", help="Registers and values, as ramp=140 noise_floor=4; times in us."),
     ],
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
@@ -87,7 +88,7 @@ def apply(
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
-    """Set a board to a preset, and read it back; it goes on speaking the version of the wire that it speaks.
+    """Set a board to a preset, and read it back; its version of the wire stays as it is.
 
     Example: taxel device apply /dev/ttyUSB0 "2 kHz"
     """
@@ -100,11 +101,11 @@ def apply(
 @_device.command()
 def record(
     place: PlaceArgument,
-    what: Annotated[str, typer.Argument(help="start or stop.")],
+    what: Annotated[str, typer.Argument(help="The mark: start or stop.")],
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
-    """Let a board mark the start or stop of a recording, in its events and on its sync pin.
+    """Make a board mark the start or stop of a recording, in its events and on its sync pin.
 
     Example: taxel device record /dev/ttyUSB0 start
     """
@@ -121,7 +122,7 @@ def watch(
     baud: BaudOption = 115_200,
     as_json: Annotated[bool, typer.Option("--json", help="Print a line of JSON a change, and nothing else.")] = False,
 ) -> None:
-    """Say what a board says of its faults as it says so; a cable that was pulled is waited for.
+    """Print the faults that a board reports, as they come; waits for a cable that was pulled.
 
     Example: taxel device watch /dev/ttyUSB0 --seconds 60
     """

@@ -17,114 +17,92 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taxel._base.files import try_whole
+from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._recordings import told
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
-from taxel.live.options import QUOTED_PRESETS
 from taxel.recording.opening import open_any
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
 from taxel.simulate.board import fitting
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
+from taxel.simulate.options import EmulateOptions
+from taxel.spikes import to_ms
 
 __all__ = ["emulate"]
 
 
+def _option(name: str, *flags: str, of: type = EmulateOptions, metavar: str | None = None) -> Any:
+    """Return the option of the command line that sets an option of `emulate`: its text and range."""
+    return typer.Option(*flags, metavar=metavar, **about(of, name))
+
+
+def _in_ms(name: str) -> Any:
+    """Return the option of the command line, ms, that sets an option of version 2, us."""
+    found = about(Version2, name)
+    return typer.Option(help=found["help"], min=to_ms(found["min"]), max=to_ms(found["max"]))
+
+
 @app.command()
 def emulate(
-    port: Annotated[int, typer.Option(min=1, max=65_535, help="Where the datagrams go.")] = 5208,
-    host: Annotated[str, typer.Option(help="To which machine, by name or address.")] = "127.0.0.1",
-    scenes: Annotated[int | None, typer.Option(min=0, help="How many scenes; else until Ctrl-C.")] = None,
+    port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port to send to.")] = 5208,
+    host: Annotated[str, typer.Option(help="The machine to send to, by name or address.")] = "127.0.0.1",
+    scenes: Annotated[int | None, typer.Option(min=0, help="Number of scenes. Default: play until Ctrl-C.")] = None,
     scene: Annotated[
-        Path | None, typer.Option(help="Play the scene of this .toml instead of drawn ones, again and again.")
+        Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random ones.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
-    replay: Annotated[Path | None, typer.Option(help="Play a recording again instead of scenes.")] = None,
-    speed: Annotated[float | None, typer.Option(help="Of the replay: 2 in half the time; 1 where left out.")] = None,
+    seed: Annotated[int | None, typer.Option(max=TRAINING_SEED - 1, **about(EmulateOptions, "seed"))] = None,
+    replay: Annotated[Path | None, typer.Option(help="Play a recording instead of scenes.")] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="With --replay: playback speed; 2 takes half the time. Default: 1.")
+    ] = None,
     pipe: Annotated[
-        bool, typer.Option("--pipe", help="Scan frames of another sensor that come on standard input.")
+        bool, typer.Option("--pipe", help="Send events of another sensor, whose frames come on standard input.")
     ] = False,
     noise_floor: Annotated[
         int | None,
-        typer.Option(min=0, max=255, help="Of a pipe: a change above it makes an event; 3 where left out."),
+        typer.Option(min=0, max=255, help="With --pipe: a change above this makes an event. Default: 3."),
     ] = None,
-    tare: Annotated[
-        float | None,
-        typer.Option(
-            min=0, max=60, help="How long the noise floor is 0 before the start marker, s; else 0.05 or the scene's."
-        ),
-    ] = None,
-    preset: Annotated[
-        str | None,
-        typer.Option(
-            help=f"The registers; where left out the scene's, or those of the array at reset. One of {QUOTED_PRESETS}.",
-        ),
-    ] = None,
-    wire: Annotated[
-        int | None,
-        typer.Option(min=1, max=2, help="The version of the wire that the board speaks; else its registers'."),
-    ] = None,
-    board: Annotated[int, typer.Option(min=0, max=65_535, help="Version 2: the board's number.")] = 0,
-    session: Annotated[int, typer.Option(min=0, max=65_535, help="Version 2: the number of the first session.")] = 1,
-    hold: Annotated[float, typer.Option(min=0, max=30, help="Version 2: events wait so long for company, ms.")] = 0.0,
-    heartbeat: Annotated[float, typer.Option(min=0, help="Version 2: a promise so often in silence, ms.")] = 10.0,
-    states: Annotated[
-        float, typer.Option(min=0, help="Version 2: each value told again so often, ms; 0: never.")
-    ] = 1000.0,
-    reset_every: Annotated[float | None, typer.Option(min=0.001, help="The board is reset so often, s.")] = None,
-    drift: Annotated[float, typer.Option(help="The board's clock runs faster by so much, parts per million.")] = 0.0,
-    circuit: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            help="Taxels share lines: gain, switch_ohm, wire_ohm, offset_mv, hysteresis_v, settle_us, amplifier_us; "
-            "one of them puts in the whole circuit, the others as usual. Takes the board to some 2.4 kHz.",
-        ),
-    ] = None,
-    asynchronous: Annotated[
-        bool,
-        typer.Option("--asynchronous", help="Each taxel compares by itself: no scan, stamps of 1 us (version 2)."),
+    tare: Annotated[float | None, typer.Option(min=0, max=60, help=about(EmulateOptions, "tare_ms")["help"])] = None,
+    preset: Annotated[str | None, _option("preset")] = None,
+    wire: Annotated[int | None, _option("wire")] = None,
+    board: Annotated[int, _option("board", of=Version2)] = Version2.board,
+    session: Annotated[int, _option("seed", of=Version2)] = Version2.seed,
+    hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us),
+    heartbeat: Annotated[float, _in_ms("heartbeat_us")] = to_ms(Version2.heartbeat_us),
+    states: Annotated[float, _in_ms("states_us")] = to_ms(Version2.states_us),
+    reset_every: Annotated[float | None, _option("reset_every_s")] = EmulateOptions.reset_every_s,
+    drift: Annotated[float, _option("drift_ppm")] = EmulateOptions.drift_ppm,
+    circuit: Annotated[list[str] | None, _option("circuit", metavar="NAME=VALUE")] = None,
+    asynchronous: Annotated[bool, _option("asynchronous", "--asynchronous")] = EmulateOptions.asynchronous,
+    flaw: Annotated[list[str] | None, _option("flaws", metavar="NAME=SIZE[:SEED]")] = None,
+    fault: Annotated[list[str] | None, _option("faults", metavar="NAME=SHARE")] = None,
+    control: Annotated[int | None, typer.Option(help=about(EmulateOptions, "control")["help"])] = None,
+    line: Annotated[Path | None, _option("line")] = None,
+    baud: Annotated[int | None, _option("baud")] = None,
+    sync: Annotated[Path | None, _option("sync")] = None,
+    source_port: Annotated[int, _option("source_port")] = EmulateOptions.source_port,
+    rest: Annotated[
+        bool, typer.Option("--rest", help="Let the ball bounce until it rests, instead of catching it.")
     ] = False,
-    flaw: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=SIZE[:SEED]",
-            help="Taxels: gain, threshold, hysteresis, drift, dead, stuck, loose, noise; may be repeated.",
-        ),
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=SHARE", help="Datagrams: lost, repeated, reordered, cut, corrupted; may be repeated."
-        ),
-    ] = None,
-    control: Annotated[
-        int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")
-    ] = None,
-    line: Annotated[Path | None, typer.Option(help="A serial line of this name: a link to a pseudo-terminal.")] = None,
-    baud: Annotated[
-        int | None, typer.Option(min=300, max=4_000_000, help="Of the serial line; 115200 where left out.")
-    ] = None,
-    sync: Annotated[
-        Path | None, typer.Option(help="The sync line as text, to a new file or a pipe: board us, 1 or 0, host ns.")
-    ] = None,
-    source_port: Annotated[int, typer.Option(min=0, max=65_535, help="The board sends from here; 0: any port.")] = 0,
-    rest: Annotated[bool, typer.Option("--rest", help="Nobody catches the ball.")] = False,
     labels: Annotated[
         Path | None,
-        typer.Option("--truth", help="Write what really happens when to this CSV, label,t_us,host_ns, as it happens."),
+        typer.Option(
+            "--truth", help="Write the true times of the touches to this CSV, label,t_us,host_ns, as they happen."
+        ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace such files where they exist.")] = False,
+    overwrite: Annotated[bool, _option("overwrite", "--overwrite")] = EmulateOptions.overwrite,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False,
 ) -> None:
-    """Be a board that sends its events by UDP, in real time, until Ctrl-C.
+    """Emulate a board that sends its events by UDP, in real time, until Ctrl-C.
 
-    Scenes: a ball is dropped on foam over 64 x 64 taxels, caught in flight, pressed by hand and lifted. The board arms
-    after its first frame, is tared with a noise floor of 0, then takes the preset's floor and marks the start. --truth
-    is what taxel train learns from: contact and lift, by the board's clock (t_us) and by this machine's (host_ns).
+    In each scene a ball is dropped on foam over 64 x 64 taxels, caught in flight, pressed by hand and lifted. The board
+    starts with a noise floor of 0, so that the rest of the taxels can be measured; then it sets the preset's floor and
+    marks the start. --truth writes the labels for taxel train: contact and lift, by the board's clock (t_us) and by
+    this machine's (host_ns).
 
-    --scene plays a scene from a file instead of drawn ones. --replay plays a recording again. --pipe takes any other
+    --scene plays a scene from a file instead of random ones. --replay plays a recording. --pipe reads another
     sensor's frames from standard input: one line of JSON (rows, columns, rate, bits), then uint16, little-endian, row
     by row.
 
@@ -193,7 +171,7 @@ def emulate(
                     drift_ppm=drift,
                     control=None if control is None else f"127.0.0.1:{control}",
                     line=line,
-                    baud=115_200 if baud is None else baud,
+                    baud=EmulateOptions.baud if baud is None else baud,
                     sync=sync,
                     overwrite=overwrite,
                     source_port=source_port,
@@ -211,9 +189,9 @@ def emulate(
     if labels is not None:
         console.print(f"truth: {labels}", soft_wrap=True)
     if as_json:
-        about: dict[str, Any] = {"seed": seed, "scenes": scenes, "preset": said_by.preset, "held": report.held}
-        about |= {"verdict": report.verdict, "wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
-        typer.echo(json.dumps({**about, **asdict(report)}))
+        summary: dict[str, Any] = {"seed": seed, "scenes": scenes, "preset": said_by.preset, "held": report.held}
+        summary |= {"verdict": report.verdict, "wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
+        typer.echo(json.dumps({**summary, **asdict(report)}))
     else:
         _say(report, in_time=not pipe)
 

@@ -20,14 +20,14 @@ __all__ = ["encode"]
 @app.command()
 def encode(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
-    out: Annotated[Path, typer.Argument(help="Where the spikes go: a .npz that SpikeTrains.load reads.")],
+    out: Annotated[Path, typer.Argument(help="The new file, a .npz that SpikeTrains.load reads.")],
     encoder: Annotated[str, typer.Option(help=f"One of {', '.join(encoder_names())}.")],
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Turn a recording into spike trains.
+    """Encode a recording as spike trains.
 
     Example: taxel encode walk.mcap walk.npz --encoder level_crossing --set "levels=[40, 80]" --set hold_ms=2
     """

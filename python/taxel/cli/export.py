@@ -24,15 +24,18 @@ def _root() -> None:
 @_export.command()
 def nir(
     readout: Annotated[Path, typer.Argument(help="A readout, as taxel train writes it.")],
-    out: Annotated[Path, typer.Argument(help="Where the NIR graph goes: a .nir.")],
+    out: Annotated[Path, typer.Argument(help="The new file, a .nir.")],
     spike_ms: Annotated[
         float | None,
-        typer.Option(metavar="MS", help="The reader's step, where it adds 1 in the step of a spike (snnTorch: 0.1)."),
+        typer.Option(
+            metavar="MS",
+            help="Time step of the reading simulator, ms, if it adds 1 in the step of a spike (snnTorch: 0.1).",
+        ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Write a readout as a NIR graph, in SI units, and say what NIR cannot hold.
+    """Write a readout as a NIR graph, in SI units, and report what NIR cannot hold.
 
     Example: taxel export nir walk.json walk.nir
     """

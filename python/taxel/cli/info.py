@@ -28,7 +28,7 @@ _PICTURES = (".png", ".svg", ".pdf")
 def info(
     file: Annotated[
         Path,
-        typer.Argument(help="A recording, other people's file, or a folder."),
+        typer.Argument(help="A recording, a file of another maker, or a folder."),
     ],
     array: FileArrayOption = None,
     picture: Annotated[
@@ -39,10 +39,12 @@ def info(
         Path | None,
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is written where it exists.")] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the files that are written where they exist.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Say what is in a recording, what was lost, its rates, how it was pressed, and which taxels are dead or noisy.
+    """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     """

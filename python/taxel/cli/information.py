@@ -36,26 +36,30 @@ def information(
         ),
     ] = None,
     window_ms: Annotated[
-        float | None, typer.Option(help="How long after contact to look; needed where trials have no stop_us.")
+        float | None, typer.Option(help="How long after contact events count, ms; needed where trials have no stop_us.")
     ] = None,
-    windows_ms: Annotated[str | None, typer.Option("--windows", help="Times after contact, ms, as 10,20,50.")] = None,
+    windows_ms: Annotated[
+        str | None, typer.Option("--windows", help="Further windows: times after contact, ms, as 10,20,50.")
+    ] = None,
     periods_ms: Annotated[str | None, typer.Option("--periods", help="Sampling periods, ms, as 1,2,5.")] = None,
-    taxels: Annotated[str | None, typer.Option(help="Numbers of taxels drawn at random, as 10,30,100.")] = None,
-    pools: Annotated[str | None, typer.Option(help="Taxels of so many by so many taken for one, as 2,4.")] = None,
-    encoder: Annotated[str, typer.Option(help="change_events or fa1.")] = "change_events",
+    taxels: Annotated[
+        str | None, typer.Option(help="Subsets of taxels, drawn at random: their sizes, as 10,30,100.")
+    ] = None,
+    pools: Annotated[str | None, typer.Option(help="Squares of taxels averaged to one: their sides, as 2,4.")] = None,
+    encoder: Annotated[str, typer.Option(help="The encoder: change_events or fa1.")] = "change_events",
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     classifiers: Annotated[
         str, typer.Option("--also", help="Further classifiers: neighbours, cone_r, tempotron.")
     ] = "neighbours",
-    draws: Annotated[int, typer.Option(help="Draws of the sampling's phase, averaged.")] = 5,
-    folds: Annotated[int, typer.Option(help="Folds; groups are never split.")] = 10,
-    shuffles: Annotated[int, typer.Option(help="Of the labels, for the test against zero.")] = 20,
-    seed: Annotated[int, typer.Option(help="Of phases, folds, taxels and redraws.")] = 0,
-    report: Annotated[Path, typer.Option(help="Where the page with pictures goes.")] = Path("information.html"),
+    draws: Annotated[int, typer.Option(help="How many random phases of the sampling are averaged.")] = 5,
+    folds: Annotated[int, typer.Option(help="Number of folds; groups are never split.")] = 10,
+    shuffles: Annotated[int, typer.Option(help="How often labels are shuffled, for the test against zero.")] = 20,
+    seed: Annotated[int, typer.Option(help="Seed of the random phases, folds, taxels and bootstrap.")] = 0,
+    report: Annotated[Path, typer.Option(help="The page with pictures, an .html.")] = Path("information.html"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Say how many bits labelled touches hold: by sampling period, time, number of taxels and rate on the wire.
+    """Estimate how many bits labelled touches hold, by sampling period, time, number of taxels and data rate.
 
     Example: taxel information drops.mcap --labels drops.csv --window-ms 50
     """

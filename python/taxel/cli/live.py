@@ -42,8 +42,9 @@ from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, an
 from taxel.cli._recordings import new_report
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
 from taxel.detect import Readout
+from taxel.detections import Detection
 from taxel.device import Cable
-from taxel.live import Live, Panel, Said, Summary, Viewer, delays
+from taxel.live import Live, Panel, Summary, Viewer, delays
 from taxel.live.options import LiveOptions
 from taxel.spikes import to_ms
 from taxel.tare import Tare
@@ -58,7 +59,10 @@ def live(
     host: HostOption = LiveOptions.host,
     array: Annotated[
         str | None,
-        typer.Option(metavar="ROWSxCOLUMNS[xMM]", help="The sensor and its pitch; the readout's where left out."),
+        typer.Option(
+            metavar="ROWSxCOLUMNS[xMM]",
+            help="Rows, columns and pitch of the sensor, as 24x20x5. Default: the readout's.",
+        ),
     ] = None,
     preset: PresetOption = None,
     differences: DifferencesOption = LiveOptions.differences,
@@ -68,37 +72,42 @@ def live(
     control: Annotated[
         str | None,
         typer.Option(
-            help="The board's serial line (/dev/ttyUSB0, host:port): for the panel, and floor 0 while a tare is taken."
+            help="The board's serial line (/dev/ttyUSB0, host:port), for the panel's registers and for a noise floor "
+            "of 0 while a tare is taken."
         ),
     ] = None,
-    save_tare: Annotated[Path | None, typer.Option(help="Keep the fresh tare in a new file (JSON).")] = None,
+    save_tare: Annotated[Path | None, typer.Option(help="Save the tare that was taken, in a new file (JSON).")] = None,
     record: RecordOption = None,
     seconds: SecondsOption = None,
     guard_frames: GuardFramesOption = LiveOptions.guard_frames,
     send: SendOption = None,
     report: Annotated[
         Path | None,
-        typer.Option(help="With --record: a folder for a page: potential, weights, errors, the worst events."),
+        typer.Option(
+            help="With --record: write a report to this folder: potential, weights, errors, the worst events."
+        ),
     ] = None,
     panel: Annotated[bool, typer.Option("--panel", help="Show the board in a browser.")] = False,
     panel_host: PanelHostOption = "127.0.0.1",
     panel_port: PanelPortOption = 0,
-    folder: Annotated[Path | None, typer.Option(help="With --panel: where recordings are, and go; else here.")] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: this folder.")
+    ] = None,
     opens: OpenOption = False,
     to: ToOption = None,
     encoder: SpikesOption = None,
     values: SpikesSetOption = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print a line of JSON a detection, and nothing else.")
+        bool, typer.Option("--json", help="Print one line of JSON for each detection, and nothing else.")
     ] = False,
 ) -> None:
-    """Listen to a board and say what a readout detects, while it happens; with --panel or --to, show it.
+    """Receive a board's events and print what a readout detects, live; with --panel or --to, show them.
 
-    Prints a line a detection, and shows rates, losses and latency. With --json each detection is one line of JSON,
-    written by the thread that made it: label; t_us, known_us and said_us of the board's clock; slope_mv_per_ms; said_ns
-    by this computer's. --send sends the same lines elsewhere; who reads them too slowly loses some, and is told how
-    many. --panel shows the board in a browser, --to in a viewer of others, which loses pictures where it is too slow.
-    Exit code 3 where nothing came or something was lost after it had arrived, 2 where the board has more taxels than
+    Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
+    JSON, written by the thread that made it: label; t_us, known_us and said_us by the board's clock; slope_mv_per_ms;
+    said_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
+    which are counted. --panel shows the board in a browser, --to in Rerun or Foxglove; a slow viewer loses pictures,
+    never data. Exit code 3: nothing came, or something was lost after it had arrived; 2: the board has more taxels than
     the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
@@ -181,11 +190,12 @@ def live(
 def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | None) -> None:
     """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
-    from taxel.report import Listened, write_listening  # noqa: PLC0415  pictures load slowly
+    from taxel.detect import Example, Outcome  # noqa: PLC0415
+    from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
     recording = taxel.open(path)
     rest = tare if isinstance(tare, Tare) else None
-    heard = Listened(str(path), recording.events, recording.detections, rest)
+    heard = Outcome(str(path), Example(recording, {}, rest), recording.detections)
     write_listening(folder, readout, [heard], title=f"What was said live, recorded to {path}")
 
 
@@ -310,10 +320,10 @@ def _watch(
                 before = now
 
 
-def _tell(said: Said, console: Console, say: Callable[[str], None]) -> None:
+def _tell(said: Detection, console: Console, say: Callable[[str], None]) -> None:
     """Print a detection, with its delay after `known`; with --json the thread that made it has written it."""
     if not console.quiet:
-        say(f"{said.t / 1e6:10.4f} s  {said.label:<16} said {to_ms(said.said - said.known):.2f} ms after it was known")
+        say(f"{said.t / 1e6:10.4f} s  {said.label:<16} said {to_ms(said.latency or 0):.2f} ms after it was known")
 
 
 def _drain(pipeline: Live, console: Console, say: Callable[[str], None]) -> None:

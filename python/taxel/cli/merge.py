@@ -16,19 +16,23 @@ __all__ = ["merge"]
 @app.command()
 def merge(
     recordings: Annotated[list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The new file; its ending says the kind.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The new file; its extension gives the format.")],
     gap: Annotated[
         float | None,
-        typer.Option(min=0.0, metavar="S", help="Put each after the one before, with this pause, s; else times stay."),
+        typer.Option(
+            min=0.0, metavar="S", help="Put the recordings one after another, with this pause, s. Default: times stay."
+        ),
     ] = None,
     beside: Annotated[bool, typer.Option("--beside", help="Put the sensors side by side, left to right.")] = False,
-    label: Annotated[str | None, typer.Option(help="Only what lies half a second around notes of this text.")] = None,
+    label: Annotated[
+        str | None, typer.Option(help="Merge only the half second before and after each note with this text.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Merge recordings: by time, beside one another, or what lies around a label in each.
+    """Merge recordings: by time, side by side, or the parts around a label in each.
 
-    A note with its name stands where each begins.
+    A note with its file's name marks where each recording begins.
 
     Example: taxel merge left.mcap right.mcap -o both.mcap --beside
     """
@@ -44,4 +48,4 @@ def merge(
         return
     typer.echo(f"written to {out}: {merged!r}")
     for what in lost:
-        typer.echo(f"  a {out.suffix} cannot hold: {what}")
+        typer.echo(f"  not kept: {what}")

@@ -47,39 +47,43 @@ _EMPTY = 3
 
 @app.command()
 def record(
-    file: Annotated[Path, typer.Argument(help="A new file: .mcap keeps all that is known, .lsa raw bytes.")],
+    file: Annotated[Path, typer.Argument(help="A new file: .mcap (with times, registers, notes) or .lsa (raw bytes).")],
     port: PortOption = LiveOptions.port,
     host: HostOption = LiveOptions.host,
     array: ArrayOption = None,
     preset: PresetOption = None,
     address: FromOption = None,
     seconds: SecondsOption = None,
-    markers: Annotated[bool, typer.Option("--markers", help="End where the board marks a stop.")] = False,
+    markers: Annotated[bool, typer.Option("--markers", help="End at the board's stop marker.")] = False,
     compression: CompressionOption = LiveOptions.compression,
     name: NameOption = LiveOptions.name,
     source: SourceOption = None,
     overwrite: OverwriteOption = LiveOptions.overwrite,
     differences: DifferencesOption = LiveOptions.differences,
     length: Annotated[
-        float | None, typer.Option(min=0.0, help="Automatic mode: record again and again, so long each, s.")
+        float | None, typer.Option(min=0.0, help="Automatic mode: record trials of this length, s.")
     ] = None,
-    countdown: Annotated[int, typer.Option(min=0, help="Automatic mode: time before each recording, s.")] = 3,
-    start_index: Annotated[int, typer.Option(min=0, help="Automatic mode: appended to the first name.")] = 1,
-    trials: Annotated[int | None, typer.Option(min=1, help="Automatic mode: how many; else until Ctrl-C.")] = None,
+    countdown: Annotated[int, typer.Option(min=0, help="Automatic mode: countdown before each trial, s.")] = 3,
+    start_index: Annotated[
+        int, typer.Option(min=0, help="Automatic mode: the number of the first trial, appended to its name.")
+    ] = 1,
+    trials: Annotated[
+        int | None, typer.Option(min=1, help="Automatic mode: number of trials. Default: until Ctrl-C.")
+    ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print a line of JSON a recording, and nothing else.")
+        bool, typer.Option("--json", help="Print one line of JSON for each recording, and nothing else.")
     ] = False,
 ) -> None:
-    """Record what a board sends by UDP, and say what was lost.
+    """Record what a board sends by UDP, and report what was lost.
 
     Ends with Ctrl-C, after --seconds, or with the board's stop marker (--markers). With --length it records one trial
-    after the other, the index appended to the name, a countdown with beeps before each. It listens all the time, so
-    that each begins with what the taxels hold; with --countdown 0 nothing is lost between two. A trial to which nothing
-    came is not kept, and its number is used again; with --trials, three of them in a row end it, exit code 3. While it
-    records, a key on the terminal, or a line on any other standard input, writes a note with that label and the board's
-    time into the .mcap (give it < /dev/null where its input is meant for others). --source records other boards, and
-    lines of numbers, into the same .mcap, each by its own clock. Exit code 3 where nothing came or something was lost
-    after it had arrived, 2 where the board has more taxels than --array.
+    after another, with a number appended to the name and a countdown with beeps before each. The board is received
+    during countdowns too, so each trial begins with the values of all taxels; with --countdown 0 nothing is lost
+    between two trials. An empty trial is not saved, and its number is used again; with --trials, three empty trials in
+    a row end the command with exit code 3. While it records, a key on the terminal, or a line on any other standard
+    input, writes a note with that label and the board's time into the .mcap (add < /dev/null where the input is not for
+    taxel). --source records other boards, and lines of numbers, into the same .mcap, each with its own clock. Exit code
+    3: nothing came, or something was lost after it had arrived; 2: the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay

@@ -19,22 +19,29 @@ __all__ = ["simulate"]
 
 @app.command()
 def simulate(
-    scene: Annotated[Path, typer.Argument(help="A scene: a .toml; the page *Scenes* says what may stand in it.")],
+    scene: Annotated[
+        Path, typer.Argument(help="A scene: a .toml, as the page *Scenes* of the documentation describes it.")
+    ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Write what a host hears: .mcap, .lsa, .npz, .csv or .h5.")
+        Path | None,
+        typer.Option("--out", "-o", help="Write the recording that a host would make: .mcap, .lsa, .npz, .csv or .h5."),
     ] = None,
     movie: Annotated[
-        Path | None, typer.Option(help="Draw a film: .gif, or another that matplotlib's writers know, as .mp4.")
+        Path | None, typer.Option(help="Draw a movie: .gif, or another format of matplotlib's writers, as .mp4.")
     ] = None,
-    slower: Annotated[float, typer.Option(min=0.1, max=1000, help="The film runs so many times slower.")] = 10.0,
+    slower: Annotated[
+        float, typer.Option(min=0.1, max=1000, help="How many times slower than real time the movie runs.")
+    ] = 10.0,
     labels: Annotated[
-        Path | None, typer.Option("--truth", help="Write what really happens when to this CSV, label,t_us.")
+        Path | None, typer.Option("--truth", help="Write the true times of the touches to this CSV, label,t_us.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Draws taxels and noise; else the file's.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace such files where they exist.")] = False,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of taxels and noise. Default: the scene's.")] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace the files that are written where they exist.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Play a scene from a file to the emulated board, as fast as it goes; without -o and --movie only check it.
+    """Simulate a scene on the emulated board, as fast as possible; without -o and --movie only check it.
 
     Example: taxel simulate scene.toml -o touch.mcap --movie touch.gif
     """
@@ -67,7 +74,7 @@ def simulate(
         if out is not None:
             lost = taxel.convert(played.events, out, overwrite=overwrite)
             lines.append(f"{len(played.events)} events written to {out}")
-            lines += [f"  a {out.suffix} cannot hold: {what}" for what in lost]
+            lines += [f"  not kept: {what}" for what in lost]
         if movie is not None:
             task = bar.add_task("drawing", total=1.0)
             film(played.events, movie, force, frame_us=said.registers.frame_us, slower=slower, overwrite=overwrite,

@@ -26,11 +26,10 @@ from taxel.cli._recordings import (
 )
 
 if TYPE_CHECKING:
-    from taxel.detect import Example, Judged, Readout, Recipe
+    from taxel.detect import Example, Judged, Outcome, Readout, Recipe
     from taxel.events import Events
     from taxel.frames import Frames
     from taxel.recording import Recording
-    from taxel.report import Listened
 
 __all__ = ["train"]
 
@@ -41,39 +40,49 @@ def train(
         list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5, or folders of them.")
     ],
     labels: Annotated[
-        str, typer.Option(help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own.")
+        str, typer.Option(help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own notes.")
     ] = "notes",
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="A known recipe: touch (events of a board), gait_plate (counts), gait_insole (N), gait_channel (any "
-            "other); or a TOML or JSON file (its path holds a dot or a slash): [encoder], [learner], [neurons.LABEL], "
-            "run_threshold. Without it and --encoder: the one that fits the recording."
+            help="The recipe to start from: touch (events of a board), gait_plate (counts), gait_insole (N), "
+            "gait_channel (others); or a TOML or JSON file (a path with a dot or a slash): [encoder], [learner], "
+            "[neurons.LABEL], run_threshold. Default, without --encoder: the recipe that fits the recording."
         ),
     ] = None,
-    encoder: Annotated[str | None, typer.Option(help="The encoder's name, short for --set encoder.name=NAME.")] = None,
+    encoder: Annotated[
+        str | None, typer.Option(help="The encoder's name; the same as --set encoder.name=NAME.")
+    ] = None,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Left out: what lies before the first label.")] = None,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Where the readout goes.")] = Path("readout.json"),
+    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: the time before the first label.")] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
+        "readout.json"
+    ),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout where it exists.")] = False,
-    window_ms: Annotated[float, typer.Option(help="How far a detection may lie from its event, either way.")] = 50.0,
+    window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     folds: Annotated[
         int | None,
-        typer.Option(min=2, help="Judge it on what it was not trained on: recordings, or of one blocks of time."),
+        typer.Option(
+            min=2,
+            help="Cross-validate in this many folds: of recordings, or of blocks of time where there is one recording.",
+        ),
     ] = None,
     search: Annotated[
-        bool, typer.Option("--search", help="Choose among the points that the recipe lists, on held-out data.")
+        bool,
+        typer.Option(
+            "--search", help="Choose each neuron's parameters among those that the recipe lists, on held-out data."
+        ),
     ] = False,
     report: Annotated[
-        Path | None, typer.Option(help="A folder for a page: potential, weights, errors, the worst events.")
+        Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Train neurons to say when labelled events happen, and save them as a readout.
+    """Train neurons to detect labelled events, and save them as a readout.
 
-    It starts from the recipe that fits the recordings; --recipe, --encoder and --set change that. With --folds it is
-    also trained as often without a part of the data, which it is then judged on; without, the score is on its own
-    training data.
+    Training starts from the recipe that fits the recordings; --recipe, --encoder and --set change that. With --folds
+    the score is cross-validated: each fold is scored by neurons that were trained without it. Without --folds the score
+    is that of the training data.
 
     Example: taxel train trials/ -o gait.json
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json
@@ -155,9 +164,8 @@ def _on_itself(
     examples: Sequence[Example],
     window_ms: float,
     tell: Callable[[str], None],
-) -> list[Listened]:
-    from taxel.detect import run, score  # noqa: PLC0415
-    from taxel.report import Listened  # noqa: PLC0415
+) -> list[Outcome]:
+    from taxel.detect import Example, Outcome, run, score  # noqa: PLC0415
 
     heard = []
     for one, example in zip(opened, examples, strict=True):
@@ -165,16 +173,16 @@ def _on_itself(
         truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
         found = run(readout, one, tare=example.tare)
         own = score(found, truth, window_ms)
-        heard.append(Listened(str(one.path), _source(one), found, example.tare, truth, own))
+        heard.append(Outcome(str(one.path), Example(one, truth, example.tare), found, own))
     return heard
 
 
-def _own(heard: Sequence[Listened], window_ms: float) -> Judged:
+def _own(heard: Sequence[Outcome], window_ms: float) -> Judged:
     """Say how it did on what it was trained on."""
     from taxel.detect import Judged  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
 
-    truths = [one.truth for one in heard if one.truth is not None]
+    truths = [one.example.labels for one in heard]
     together = score_together([one.found for one in heard], truths, window_ms)
     return Judged(tuple(one.score for one in heard if one.score is not None), together, "its own training data")
 

@@ -26,16 +26,19 @@ _CHECK_EVERY = 0.1
 @app.command()
 def view(
     recording: Annotated[
-        Path, typer.Argument(help="A recording: .mcap or .lsa. Others of its folder can be opened too.")
+        Path, typer.Argument(help="A recording: .mcap or .lsa. The page can open others in its folder.")
     ],
     panel_host: PanelHostOption = "127.0.0.1",
     panel_port: PanelPortOption = 0,
     opens: Annotated[
-        bool | None, typer.Option("--open/--no-open", help="Open the panel in a browser; the default, but with --to.")
+        bool | None, typer.Option("--open/--no-open", help="Open the panel in a browser. Default: open, with --to not.")
     ] = None,
     to: ToOption = None,
     speed: Annotated[
-        float | None, typer.Option(min=0.001, max=100.0, help="With --to: board time over real time.")
+        float | None,
+        typer.Option(
+            min=0.001, max=100.0, help="With --to: playback speed; 0.1 is ten times slower than real time. Default: 1."
+        ),
     ] = None,
     encoder: SpikesOption = None,
     values: SpikesSetOption = None,
@@ -46,7 +49,7 @@ def view(
 ) -> None:
     """Show a recording in a browser: play, scrub, label, cut. With --to, play it once in Rerun or Foxglove.
 
-    Labels are saved beside it, in NAME.notes.csv; the recording itself is never changed.
+    Labels are saved beside the recording, in NAME.notes.csv; the recording itself is never changed.
 
     Example: taxel view walk.mcap
     Example: taxel view walk.mcap --to rerun --speed 0.1 --encoder fa1

@@ -1,1 +1,1 @@
-"""The main job, shown: scenes on the emulated board, heard, recorded, said and judged."""
+"""The main job, shown: scenes on the emulated board, recorded, detected and judged."""

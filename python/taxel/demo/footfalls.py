@@ -24,8 +24,8 @@ _EACH = 2
 _FILL_MM, _PEAK = 150.0, 0.8
 
 NOTE = (
-    f"Footfalls of a pressure plate, laid over the array and heard by the same readout, which never heard one in "
-    f"training; no goal. Guesses: the footprint is shrunk to {_FILL_MM:.0f} mm, the plate's pictures (500 a second) "
+    f"Footfalls of a pressure plate, laid over the array and given to the same readout, which was not trained "
+    f"on any; no goal. Guesses: the footprint is shrunk to {_FILL_MM:.0f} mm, the plate's pictures (500 a second) "
     f"are joined by straight lines, and a footfall's largest value is {_PEAK:.0%} of the way from rest to the "
     f"ramp's end. Truth is the plate's own: its last empty picture before and the first after, so it can be 2 ms early."
 )

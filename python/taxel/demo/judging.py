@@ -1,4 +1,4 @@
-"""What was said against what really happened, by class of touch."""
+"""Detections against the simulated truth, by class of touch."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Row(NamedTuple):
     label: str
     touches: int
     errors_ms: NDArray[np.float64]
-    """Said minus true, of those that were found."""
+    """Time of the detection minus true time, of those that were found."""
     delays_ms: NDArray[np.float64]
     """`known` minus true, likewise."""
     places: NDArray[np.int64]
@@ -69,13 +69,13 @@ class Row(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """What was said, by class of touch and label; and what was said of nothing."""
+    """Detections by class of touch and label, and those that belong to no touch."""
 
     rows: list[Row]
     false: dict[str, NDArray[np.int64]]
-    """By label: when something was said that belongs to no touch, us."""
+    """By label: times of detections that belong to no touch, us."""
     false_within: dict[str, int]
-    """How many of these lie within a touch all the same: a press that was said more than 50 ms off."""
+    """How many of these lie within a touch all the same: a press that was detected more than 50 ms off."""
 
     def row(self, name: str, label: str) -> Row:
         """Return one row; its name may be cut short."""
@@ -123,12 +123,12 @@ def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
         mine = found[label]
         # Scored on whole us; errors are taken from the truth itself.
         result = score(mine, {label: np.rint(true).astype(np.int64)}, {label: windows})
-        said, touch = result.pairs[:, 0], result.pairs[:, 1]
-        errors, delays = to_ms(mine.t[said] - true[touch]), to_ms(mine.known[said] - true[touch])
+        mine_at, touch = result.pairs[:, 0], result.pairs[:, 1]
+        errors, delays = to_ms(mine.t[mine_at] - true[touch]), to_ms(mine.known[mine_at] - true[touch])
         for name, belongs in CLASSES:
             of_class = np.array([belongs(c) for c in contacts], bool)
             chosen = of_class[touch] if len(touch) else np.zeros(0, bool)
-            places = np.column_stack([touch[chosen], said[chosen]])
+            places = np.column_stack([touch[chosen], mine_at[chosen]])
             rows.append(Row(name, label, int(of_class.sum()), errors[chosen], delays[chosen], places))
         false[label] = mine.t[result.false_detections]
         within[label] = sum(any(c.start_us <= t <= c.stop_us for c in contacts) for t in false[label])

@@ -1,4 +1,4 @@
-"""What could be said of a drop so soon after its contact: which ball, from how high, on which slant.
+"""Classify a drop soon after its contact: which ball, from how high, on which slant.
 
 The answers rest on drops that were simulated beforehand and come with taxel (``drops.json``, written by
 ``taxel demo --drops``): balls, heights, slants, places, foams and boards that the demo never plays.
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.files import write_whole
-from taxel.demo.hearing import Hearing
+from taxel.demo.evaluation import Evaluation
 from taxel.demo.script import SLANTS_DEG, TRAINING_SEED, drawn, fall_ms
 from taxel.encode import ContactArea
 from taxel.events import Events
@@ -46,7 +46,7 @@ _RIDGE = 0.01
 
 @dataclass(frozen=True)
 class Question:
-    """One thing to be said of a drop."""
+    """One property of a drop that is estimated."""
 
     column: str
     unit: str
@@ -140,7 +140,7 @@ def _truth(scene: Scene) -> tuple[float, float, float]:
 
 
 def board_of_drops(seed: int, count: int) -> list[list[float | int]]:
-    """Drop balls on one board; return a row a drop that was felt: diameter, height, slant, then its pictures."""
+    """Drop balls on one board; return a row for each that gave events: diameter, height, slant, then its pictures."""
     scenes = []
     for n in range(count):
         scene = drawn(seed, n)
@@ -153,12 +153,12 @@ def board_of_drops(seed: int, count: int) -> list[list[float | int]]:
     rows: list[list[float | int]] = []
     firsts = [contact for contact in truth(acts)[0] if contact.kind == "first"]
     for scene, contact in zip(scenes, firsts, strict=True):
-        told = rises[(rises >= contact.start_us - FRAME_US) & (rises < contact.stop_us)]
-        if len(told):
+        inputs = rises[(rises >= contact.start_us - FRAME_US) & (rises < contact.stop_us)]
+        if len(inputs):
             rows.append(
                 [
                     *(round(value, 1) for value in _truth(scene)),
-                    *look(events.sorted(), tare, float(told[0])).ravel().tolist(),
+                    *look(events.sorted(), tare, float(inputs[0])).ravel().tolist(),
                 ]
             )
     return rows
@@ -194,44 +194,44 @@ def shipped_drops() -> Drops:
     return Drops(table[:, 0], table[:, 1], table[:, 2], pictures)
 
 
-def named(hearing: Hearing, scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Say of each scene's first impact which ball fell from how high on which slant, by time since it was felt.
+def named(evaluation: Evaluation, scenes: Sequence[Scene]) -> dict[str, Any]:
+    """Estimate which ball fell first in each scene, from how high on which slant, by time since the first event.
 
     Parameters
     ----------
-    hearing : Hearing
+    evaluation : Evaluation
         Of these scenes.
     scenes : sequence of Scene
 
     Returns
     -------
     dict
-        ``answered_ms``; ``drops``, each with the truth (mm, degrees), how late it was felt (ms; None where it was not)
+        ``answered_ms``; ``drops``, each with the truth (mm, degrees), the delay of the first event (ms; None for none)
         and by question the answers' probabilities and whether the most probable is right, by time; ``right``, how many
         of all drops, by question and time; ``chance``, the share of the answer that the shipped drops have most of.
     """
     known = shipped_drops()
-    firsts = [contact for contact in hearing.contacts if contact.kind == "first"]
+    firsts = [contact for contact in evaluation.contacts if contact.kind == "first"]
     drops: list[dict[str, Any]] = []
     pictures = []
     for scene, contact in zip(scenes, firsts, strict=True):
-        felt = hearing.first_input(contact, "contact")
+        first_us = evaluation.first_input(contact, "contact")
         true = dict(zip(QUESTIONS, _truth(scene), strict=True))
-        late = None if felt is None else to_ms(felt - contact.start_us)
+        late = None if first_us is None else to_ms(first_us - contact.start_us)
         drops.append({"true": true, "felt_ms": late, "said": {}})
-        if felt is not None:
-            pictures.append(look(hearing.events, hearing.tare, felt))
-    heard = [one for one in drops if one["felt_ms"] is not None]
-    for name, question in QUESTIONS.items() if heard else ():
+        if first_us is not None:
+            pictures.append(look(evaluation.events, evaluation.tare, first_us))
+    answered = [one for one in drops if one["felt_ms"] is not None]
+    for name, question in QUESTIONS.items() if answered else ():
         for t in ANSWERED_MS:
-            for one, p in zip(heard, known.posterior(name, t, np.array(pictures)), strict=True):
+            for one, p in zip(answered, known.posterior(name, t, np.array(pictures)), strict=True):
                 right = bool(p.argmax() == question.of(one["true"][name]))
                 one["said"].setdefault(name, []).append({"probable": p.round(4).tolist(), "right": right})
     return {
         "answered_ms": list(ANSWERED_MS),
         "drops": drops,
         "right": {
-            name: [sum(one["said"][name][k]["right"] for one in heard) for k in range(len(ANSWERED_MS))]
+            name: [sum(one["said"][name][k]["right"] for one in answered) for k in range(len(ANSWERED_MS))]
             for name in QUESTIONS
         },
         "chance": _chance(known),

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from taxel.demo.hearing import Hearing
+from taxel.demo.evaluation import Evaluation
 from taxel.demo.judging import LABELS, Judged
 from taxel.events import Events
 from taxel.report.charts import INK
@@ -25,38 +25,38 @@ __all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates
 _CROP = 28
 
 #: Truth, contact, lift, quiet.
-_TRUE, _SAID, _QUIET = "#e8b04b", {"contact": "#b5423c", "lift": "#2f6690"}, "#8a8a8a"
+_TRUE, _COLOURS, _QUIET = "#e8b04b", {"contact": "#b5423c", "lift": "#2f6690"}, "#8a8a8a"
 
 
 def _figure(rows: int, columns: int, size: tuple[float, float], **kwargs: Any) -> tuple[Figure, Any]:
     return plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **kwargs)
 
 
-def scene_picture(hearing: Hearing, start_us: float, stop_us: float) -> Figure:
-    """Draw force with truth, both potentials and what was said, from one time to another."""
+def scene_picture(evaluation: Evaluation, start_us: float, stop_us: float) -> Figure:
+    """Draw force with truth, both potentials and the detections, from one time to another."""
     figure, axes = _figure(3, 1, (9.5, 5.4), sharex=True, height_ratios=[2, 1, 1])
     first, last = int(start_us / FRAME_US), int(stop_us / FRAME_US)
     t = np.arange(first, last) * FRAME_US * 1e-6
     top = axes[0, 0]
     # Presses of half a newton and impacts of twenty in one picture.
     top.set_yscale("function", functions=(lambda v: np.sqrt(np.maximum(v, 0.0)), np.square))
-    top.plot(t, hearing.force_n[first:last], color=INK, linewidth=1.2, label="force on the foam")
+    top.plot(t, evaluation.force_n[first:last], color=INK, linewidth=1.2, label="force on the foam")
     top.set(ylabel="force (N, root scale)", title="Force on the foam")
-    shown = [c for c in hearing.contacts if c.start_us < stop_us and c.stop_us > start_us]
+    shown = [c for c in evaluation.contacts if c.start_us < stop_us and c.stop_us > start_us]
     for axis in axes[:, 0]:
         for contact in shown:
             edges = contact.start_us * 1e-6, contact.stop_us * 1e-6
             axis.axvspan(*edges, color=_TRUE, alpha=0.3, linewidth=0, label="really touches" * (contact is shown[0]))
     times = to_ms(np.arange(start_us, stop_us, FRAME_US))
     for axis, label in zip(axes[1:, 0], LABELS, strict=True):
-        colour = _SAID[label]
-        threshold = hearing.readout.neurons[label].neuron.theta_0 * hearing.readout.run_threshold
-        axis.plot(times * 1e-3, hearing.potential(label, times), color=colour, linewidth=0.9, label="potential")
+        colour = _COLOURS[label]
+        threshold = evaluation.readout.neurons[label].neuron.theta_0 * evaluation.readout.run_threshold
+        axis.plot(times * 1e-3, evaluation.potential(label, times), color=colour, linewidth=0.9, label="potential")
         axis.axhline(threshold, color=_QUIET, linewidth=0.8, linestyle="--", label="its threshold")
-        said = hearing.found[label].between(start_us, stop_us)
+        found = evaluation.found[label].between(start_us, stop_us)
         for place in (axis, top):
-            for k, at in enumerate(said.known):
-                name = f"{label} said" * (k == 0)
+            for k, at in enumerate(found.known):
+                name = f"{label} detected" * (k == 0)
                 place.axvline(at * 1e-6, color=colour, linewidth=0.9, alpha=0.9, label=name)
         axis.set(ylabel="potential (mV)", title=f"Potential of the neuron for {label}")
         axis.legend()
@@ -65,25 +65,25 @@ def scene_picture(hearing: Hearing, start_us: float, stop_us: float) -> Figure:
     return figure
 
 
-def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> Figure:
+def close_up(evaluation: Evaluation, contact: Contact, reach_us: float = 5_000.0) -> Figure:
     """Draw force, every event and the contact area's spikes around a touch and around its end."""
     figure, axes = _figure(3, 2, (9.5, 6.2), sharex="col", height_ratios=[1, 2.2, 1.4])
     for column, (label, at) in enumerate((("contact", contact.start_us), ("lift", contact.stop_us))):
         begin, end = at - reach_us, at + reach_us
-        frames = np.arange(max(0, int(begin / FRAME_US)), min(len(hearing.force_n), int(end / FRAME_US) + 1))
+        frames = np.arange(max(0, int(begin / FRAME_US)), min(len(evaluation.force_n), int(end / FRAME_US) + 1))
         force, raster, area = axes[:, column]
-        force.plot(to_ms(frames * FRAME_US - at), hearing.force_n[frames], color=INK, linewidth=1.2)
+        force.plot(to_ms(frames * FRAME_US - at), evaluation.force_n[frames], color=INK, linewidth=1.2)
         force.set(ylabel="force (N)", title=f"{label}, {contact.kind}, {contact.speed_m_s:.2f} m/s")
-        near = hearing.events.between(begin, end)
+        near = evaluation.events.between(begin, end)
         index = near.y.astype(int) * near.array.columns + near.x
         for on, colour in ((True, "#c44e52"), (False, "#4c72b0")):
             mine = near.p == on
             name = f"{'more' if on else 'less'} pressure ({int(mine.sum())})"
             raster.plot(to_ms(near.t[mine] - at), index[mine], ".", color=colour, markersize=2.5, label=name)
         raster.set(ylabel="taxel (row by row)")
-        spikes = hearing.area.between(to_ms(begin), to_ms(end))
+        spikes = evaluation.area.between(to_ms(begin), to_ms(end))
         for train in range(len(spikes)):
-            colour = _SAID["contact"] if train < 5 else _SAID["lift"]
+            colour = _COLOURS["contact"] if train < 5 else _COLOURS["lift"]
             ms = spikes[train] - to_ms(at)
             area.plot(ms, np.full(len(ms), train), "|", color=colour, markersize=9)
         names = [f"{sign} {n}" for sign in ("≥", "<") for n in (2, 4, 8, 16, 32)]
@@ -91,20 +91,20 @@ def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> F
         area.set_ylabel("taxels loaded")
         for axis in (force, raster, area):
             axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0, label="true moment")
-            for k, known in enumerate(hearing.found[label].between(begin, end).known):
+            for k, known in enumerate(evaluation.found[label].between(begin, end).known):
                 name = f"{label} known" * (k == 0)
-                axis.axvline(to_ms(known - at), color=_SAID[label], linewidth=1.0, label=name)
+                axis.axvline(to_ms(known - at), color=_COLOURS[label], linewidth=1.0, label=name)
             axis.legend()
     return figure
 
 
-def maps(hearing: Hearing, contact: Contact) -> Figure:
+def maps(evaluation: Evaluation, contact: Contact) -> Figure:
     """Draw what the host holds of the taxels, above their rest, around a touch and where it is."""
     moments = (-0.4, 0.4, 1.0, 3.0, 8.0, 1e-3 * (contact.stop_us - contact.start_us) + 1.0)
     figure, axes = _figure(1, len(moments), (9.5, 1.9))
-    rest = np.nan_to_num(hearing.tare.rest)
-    held = [_held(hearing.events, contact.start_us + to_us(after), rest) for after in moments]
-    touched = hearing.events.between(contact.start_us, contact.start_us + 3_000.0)
+    rest = np.nan_to_num(evaluation.tare.rest)
+    held = [_held(evaluation.events, contact.start_us + to_us(after), rest) for after in moments]
+    touched = evaluation.events.between(contact.start_us, contact.start_us + 3_000.0)
     middle = [float(np.median(v)) if len(v) else 31.5 for v in (touched.y, touched.x)]
     top, left = (int(np.clip(m - _CROP / 2, 0, n - _CROP)) for m, n in zip(middle, rest.shape, strict=True))
     seen = [h[top : top + _CROP, left : left + _CROP] for h in held]
@@ -120,7 +120,7 @@ def maps(hearing: Hearing, contact: Contact) -> Figure:
 
 
 def _held(events: Events, until_us: float, rest: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return ticks above rest as the host holds them; a taxel that said nothing since the start is at rest."""
+    """Return ticks above rest as the host holds them; a taxel without events since the start is at rest."""
     held = rest.copy()
     before = events.t <= until_us
     if events.intensity is not None:
@@ -129,21 +129,21 @@ def _held(events: Events, until_us: float, rest: NDArray[np.float64]) -> NDArray
     return held - rest
 
 
-def rates(hearing: Hearing, bits: int = 9) -> Figure:
+def rates(evaluation: Evaluation, bits: int = 9) -> Figure:
     """Draw the data rate of impacts as events beside that of frames, as figure 5.14."""
-    impacts = [c for c in hearing.contacts if c.kind == "first"]
-    spans = [hearing.events.between(c.start_us - 500.0, c.stop_us + 1_000.0) for c in impacts]
+    impacts = [c for c in evaluation.contacts if c.kind == "first"]
+    spans = [evaluation.events.between(c.start_us - 500.0, c.stop_us + 1_000.0) for c in impacts]
     each = np.array([len(s) / max(1, int(s.t[-1] - s.t[0])) * 1e6 for s in spans if len(s) > 1])
     figure, axes = _figure(1, 1, (9.5, 2.6))
     axis = axes[0, 0]
     bins = np.geomspace(1e3, 1e9, 121)
     if len(each):
         axis.hist(
-            each * bits, bins, color=_SAID["contact"], label=f"events in a first impact, {bits} bits each (as 5.14)"
+            each * bits, bins, color=_COLOURS["contact"], label=f"events in a first impact, {bits} bits each (as 5.14)"
         )
-        axis.hist(each * 80, bins, color=_SAID["lift"], label="the same on the wire, 80 bits with intensity")
-    whole = len(hearing.events) / max(1.0, hearing.stop_us - hearing.start_us) * 1e6
-    taxels, hz = hearing.events.array.rows * hearing.events.array.columns, 1e6 / FRAME_US
+        axis.hist(each * 80, bins, color=_COLOURS["lift"], label="the same on the wire, 80 bits with intensity")
+    whole = len(evaluation.events) / max(1.0, evaluation.stop_us - evaluation.start_us) * 1e6
+    taxels, hz = evaluation.events.array.rows * evaluation.events.array.columns, 1e6 / FRAME_US
     for value, colour, name in (
         (whole * 80, "#4b8f4b", "the whole play on the wire"),
         (taxels * hz * 2, _QUIET, "frames, 2 bits a taxel"),
@@ -166,7 +166,7 @@ def delays_by_class(judged: Judged, plain: Judged) -> Figure:
     jitter = np.random.default_rng(1)
     for axis, label in zip(axes[0], LABELS, strict=True):
         for place, name in enumerate(names):
-            for who, shift, colour in ((judged, 0.17, _SAID[label]), (plain, -0.17, _QUIET)):
+            for who, shift, colour in ((judged, 0.17, _COLOURS[label]), (plain, -0.17, _QUIET)):
                 delays = who.row(name, label).delays_ms
                 height = place + shift + jitter.uniform(-0.08, 0.08, len(delays))
                 kind = ("neuron" if who is judged else "plain rule") * (place == 0)
@@ -206,18 +206,18 @@ def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
     return figure
 
 
-def noise(hearing: Hearing) -> Figure:
-    """Draw a stretch in which nothing touches: events a second, and what was said."""
+def noise(evaluation: Evaluation) -> Figure:
+    """Draw a stretch in which nothing touches: events a second, and detections."""
     figure, axes = _figure(1, 1, (9.5, 1.8))
     axis: Axes = axes[0, 0]
-    seconds = np.arange(0.0, (hearing.stop_us - hearing.start_us) * 1e-6, 1.0)
-    each = np.histogram((hearing.events.t - hearing.start_us) * 1e-6, np.append(seconds, seconds[-1] + 1.0))[0]
+    seconds = np.arange(0.0, (evaluation.stop_us - evaluation.start_us) * 1e-6, 1.0)
+    each = np.histogram((evaluation.events.t - evaluation.start_us) * 1e-6, np.append(seconds, seconds[-1] + 1.0))[0]
     axis.bar(seconds + 0.5, each, width=0.9, color=_QUIET, label="events")
     for label in LABELS:
-        for k, at in enumerate(hearing.found[label].t):
-            axis.axvline((at - hearing.start_us) * 1e-6, color=_SAID[label], label=f"{label} said" * (k == 0))
+        for k, at in enumerate(evaluation.found[label].t):
+            axis.axvline((at - evaluation.start_us) * 1e-6, color=_COLOURS[label], label=f"{label} detected" * (k == 0))
     axis.legend()
-    said: Sequence[str] = [f"{len(hearing.found[label])} times {label}" for label in LABELS]
+    counts: Sequence[str] = [f"{len(evaluation.found[label])} times {label}" for label in LABELS]
     axis.set_xlim(0.0, seconds[-1] + 1.0)
-    axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: said {' and '.join(said)}")
+    axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: detected {' and '.join(counts)}")
     return figure

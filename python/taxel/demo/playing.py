@@ -13,10 +13,11 @@ from typing import Any, Protocol
 
 import taxel
 from taxel._core import DeviceError
-from taxel.demo.hearing import Hearing, listen
+from taxel.demo.evaluation import Evaluation, evaluate_events
 from taxel.demo.script import script
 from taxel.detect import Readout, run
-from taxel.live import Live, Said, heard
+from taxel.detections import Detection
+from taxel.live import Live, heard
 from taxel.simulate import Contact, truth
 from taxel.wire import FRAME_US
 
@@ -32,7 +33,7 @@ _LISTEN_ON_S = 0.3
 class Screen(Protocol):
     """What is drawn while it runs."""
 
-    def draw(self, counters: dict[str, Any], picture: Any, said: list[Said]) -> None:
+    def draw(self, counters: dict[str, Any], picture: Any, said: list[Detection]) -> None:
         """Draw what came up to now."""
 
 
@@ -40,13 +41,13 @@ class Screen(Protocol):
 class Playing:
     """A play in real time, and what was counted."""
 
-    hearing: Hearing
+    evaluation: Evaluation
     counters: dict[str, Any]
     emulator: dict[str, Any]
     verdicts: list[str]
     recording: Path
     agrees: bool
-    """Whether the recording, read again, says what was said live."""
+    """Whether the recording, read again, gives the detections that were made live."""
 
 
 def play_live(
@@ -76,7 +77,7 @@ def play_live(
     contacts, force = truth(acts)
     shown = screen(contacts, len(force) * FRAME_US * 1e-6)
     recording = folder / "recording.mcap"
-    said: list[Said] = []
+    said: list[Detection] = []
     # The tare ends where the board marks its start, well before a second is over.
     with Live(0, host="127.0.0.1", readout=readout, tare=1.0, record=recording) as live:
         command = [sys.executable, "-m", "taxel", "emulate", "--json", "--port", str(live.address[1])]
@@ -94,7 +95,7 @@ def play_live(
                 if time.monotonic() > drawn + _DRAW_EVERY_S:
                     drawn = time.monotonic()
                     shown.draw(live.counters, live.picture, said)
-            told, complaint = board.communicate()
+            printed, complaint = board.communicate()
         finally:
             if board.poll() is None:
                 board.terminate()
@@ -105,13 +106,13 @@ def play_live(
             said.append(one)
         tare = live.tare
         summary = live.stop()
-    emulator = json.loads(told)
+    emulator = json.loads(printed)
     found = heard(said)
     events = taxel.open(recording).events
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
-    hearing = listen(events, acts, readout, found)
-    again = again[again.t >= hearing.start_us]
-    mine = hearing.found
+    evaluation = evaluate_events(events, acts, readout, found)
+    again = again[again.t >= evaluation.start_us]
+    mine = evaluation.found
     agrees = len(again) == len(mine) and bool(
         (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
     )
@@ -119,6 +120,7 @@ def play_live(
     if summary.counters["late"]:
         verdicts.append(
             f"{summary.counters['late']} events came after the readout's time had moved on, 5 frames behind the host's "
-            f"clock: this machine was too busy, and what they told was known later than it could have been"
+            "clock: this machine was too busy, and detections of them came late, moved or were missed; the recording has "
+            "every event, and --no-clock simulates without the clock"
         )
-    return Playing(hearing, summary.counters, emulator, verdicts, recording, agrees)
+    return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)

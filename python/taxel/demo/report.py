@@ -17,7 +17,7 @@ import numpy as np
 
 import taxel
 from taxel.demo import pictures
-from taxel.demo.hearing import Hearing
+from taxel.demo.evaluation import Evaluation
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
 from taxel.demo.naming import ANSWERED_MS, QUESTIONS, named
 from taxel.demo.script import script
@@ -30,15 +30,21 @@ from taxel.wire import FRAME_US
 
 __all__ = ["GUESSES", "Material", "figures", "write"]
 
-#: What nobody measured, and how much hangs on it.
+#: Parameters of the simulation without a measurement, and which results depend on them.
 GUESSES = (
-    ("The foam's dashpot, 1 ms", "carries the delays: the rows at 0.3 ms and without it say how far"),
-    ("The foam's modulus, 50 to 75 kPa, and its collapse", "carry depth, length of contact and number of taxels"),
-    ("The ramp: an RC curve that ends at 3 V", "makes 0.02 N 4.5 ticks; one that reached 95 % of 5 V would hide it"),
-    ("Noise of half a tick, floor of 3", "carry idle events and the weakest touch that is heard"),
-    ("Taxels that differ: gain by a fifth, offset by 20 mV", "a sensor that drifts or sticks would do worse"),
-    ("Force on a taxel to the power 0.7", "no maker's curve was found"),
-    ("Friction of 0.6 of the force", "on a slant it makes the ball roll: what is said of the slant hangs on it"),
+    ("The foam's dashpot, 1 ms", "sets the delays: the rows at 0.3 ms and without it show how far"),
+    ("The foam's modulus, 50 to 75 kPa, and its collapse", "set depth, length of contact and number of loaded taxels"),
+    (
+        "The ramp: an RC curve that ends at 3 V",
+        "gives 4.5 ticks for 0.02 N; a ramp that reached 95 % of 5 V would give 1.35, below the noise floor",
+    ),
+    ("Noise of half a tick, floor of 3", "set the rate of events at rest and the weakest touch that is detected"),
+    (
+        "Taxels that differ: gain by a fifth, offset by 20 mV",
+        "drift or stuck taxels, which are not simulated, would add errors",
+    ),
+    ("Force on a taxel to the power 0.7", "sets how readings grow with force; no curve of a manufacturer was found"),
+    ("Friction of 0.6 of the force", "makes the ball roll on a slant: the estimate of the slant depends on it"),
 )
 
 
@@ -49,11 +55,11 @@ class Material:
     seed: int
     scenes: int
     live: bool
-    hearing: Hearing
-    noise: Hearing
-    dashpots: dict[float, Hearing]
+    evaluation: Evaluation
+    noise: Evaluation
+    dashpots: dict[float, Evaluation]
     """By the dashpot's time, ms: the same scenes with another foam."""
-    footfalls: Hearing | None = None
+    footfalls: Evaluation | None = None
     footfall_note: str = ""
     counters: dict[str, Any] | None = None
     """What the host counted while it ran."""
@@ -63,21 +69,22 @@ class Material:
     """One line each: losses, frames."""
     recording: str | None = None
     agrees: bool | None = None
-    """Whether the recording, read again, says what was said live."""
+    """Whether the recording, read again, gives the detections that were made live."""
     extra: dict[str, Any] = field(default_factory=dict)
 
 
 def figures(material: Material) -> dict[str, Any]:
     """Return all figures of a report as plain values."""
-    hearing = material.hearing
+    evaluation = material.evaluation
     noise_s = (material.noise.stop_us - material.noise.start_us) * 1e-6
-    every = hearing.events
-    seconds = (hearing.stop_us - hearing.start_us) * 1e-6
+    every = evaluation.events
+    seconds = (evaluation.stop_us - evaluation.start_us) * 1e-6
     impacts = [
-        len(hearing.events.between(c.start_us - 500.0, c.stop_us + 1_000.0)) / (c.stop_us - c.start_us + 1_500.0) * 1e6
-        for c in hearing.contacts
+        1e6 * len(every.between(c.start_us - 500.0, c.stop_us + 1_000.0)) / (c.stop_us - c.start_us + 1_500.0)
+        for c in evaluation.contacts
         if c.kind == "first"
     ]
+    scenes = [act for act in script(material.seed, material.scenes) if isinstance(act, Scene)]
     return {
         "what": "taxel demo",
         "seed": material.seed,
@@ -87,10 +94,10 @@ def figures(material: Material) -> dict[str, Any]:
         else "without the clock: board time as fast as it goes, no socket",
         "board_seconds": seconds,
         "machine": _machine(),
-        "neuron": hearing.judged.to_dict(),
-        "plain_rule": hearing.judged_plain.to_dict(),
-        "delay_split_ms": _split(hearing),
-        "which_drop": named(hearing, [act for act in script(material.seed, material.scenes) if isinstance(act, Scene)]),
+        "neuron": evaluation.judged.to_dict(),
+        "plain_rule": evaluation.judged_plain.to_dict(),
+        "delay_split_ms": _split(evaluation),
+        "which_drop": named(evaluation, scenes),
         "events": len(every),
         "events_per_s": len(every) / seconds,
         "events_per_s_in_first_impacts": _quantiles(impacts),
@@ -135,7 +142,7 @@ def _new(path: Path, text: str) -> None:
 
 
 def _page(material: Material, values: Mapping[str, Any]) -> str:
-    hearing = material.hearing
+    evaluation = material.evaluation
     with mpl.rc_context(STYLE):
         figures_of = _figures(material, values)
         drawn = {name: chart(figure) for name, figure in figures_of.items()}
@@ -146,18 +153,18 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
         values=values,
         pictures=drawn,
         tables={
-            "neuron": _table(hearing.judged),
-            "plain": _table(hearing.judged_plain),
+            "neuron": _table(evaluation.judged),
+            "plain": _table(evaluation.judged_plain),
             "footfalls": None if material.footfalls is None else _table(material.footfalls.judged),
         },
         answered_ms=ANSWERED_MS,
         which_drop=_which_drop(values["which_drop"]),
-        dashpots=_dashpots({1.0: hearing, **material.dashpots}),
+        dashpots=_dashpots({1.0: evaluation, **material.dashpots}),
         goals=GOALS,
-        firsts={label: hearing.judged.row("first", label).touches for label in LABELS},
-        said=sum(len(hearing.found[label]) for label in LABELS),
-        rest_s=hearing.start_us * 1e-6,
-        within={label: _share(hearing.judged.within_goal(label)) for label in LABELS},
+        firsts={label: evaluation.judged.row("first", label).touches for label in LABELS},
+        detections=sum(len(evaluation.found[label]) for label in LABELS),
+        rest_s=evaluation.start_us * 1e-6,
+        within={label: _share(evaluation.judged.within_goal(label)) for label in LABELS},
         guesses=GUESSES,
         losses=_losses(material),
         delays=delays,
@@ -168,46 +175,46 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
 
 
 def _figures(material: Material, values: Mapping[str, Any]) -> dict[str, Any]:
-    hearing = material.hearing
-    drawn: dict[str, Any] = {"rates": pictures.rates(hearing), "noise": pictures.noise(material.noise)}
-    first = next((c for c in hearing.contacts if c.kind == "first"), None)
+    evaluation = material.evaluation
+    drawn: dict[str, Any] = {"rates": pictures.rates(evaluation), "noise": pictures.noise(material.noise)}
+    first = next((c for c in evaluation.contacts if c.kind == "first"), None)
     if first is not None:
-        later = [c for c in hearing.contacts if c.kind == "first" and c is not first]
-        end = later[0].start_us if later else hearing.stop_us
-        hand = [c.stop_us for c in hearing.contacts if c.start_us < end]
-        drawn["scene"] = pictures.scene_picture(hearing, first.start_us - 60_000.0, max(hand) + 60_000.0)
-        drawn["close_up"] = pictures.close_up(hearing, first)
-        drawn["maps"] = pictures.maps(hearing, first)
-        drawn["delays"] = pictures.delays_by_class(hearing.judged, hearing.judged_plain)
+        later = [c for c in evaluation.contacts if c.kind == "first" and c is not first]
+        end = later[0].start_us if later else evaluation.stop_us
+        hand = [c.stop_us for c in evaluation.contacts if c.start_us < end]
+        drawn["scene"] = pictures.scene_picture(evaluation, first.start_us - 60_000.0, max(hand) + 60_000.0)
+        drawn["close_up"] = pictures.close_up(evaluation, first)
+        drawn["maps"] = pictures.maps(evaluation, first)
+        drawn["delays"] = pictures.delays_by_class(evaluation.judged, evaluation.judged_plain)
     if values["delay_split_ms"]:
         drawn["split"] = pictures.delay_split(values["delay_split_ms"])
     return drawn
 
 
-def _split(hearing: Hearing) -> dict[str, dict[str, float]]:
+def _split(evaluation: Evaluation) -> dict[str, dict[str, float]]:
     """Return the medians of what a delay is made of, ms, for impacts: physics, kernel, frame, host.
 
-    Physics: from the true moment to the start of the frame in which two neighbouring taxels first told of it (or fewer
+    Physics: from the true moment to the start of the frame in which two neighbouring taxels first showed it (or fewer
     than two were left). Kernel: from there to the crossing. Frame: on to the end of the crossing's frame. Host: until
-    it was said.
+    the host reported it.
     """
     split = {}
-    for row in hearing.judged.rows:
+    for row in evaluation.judged.rows:
         if row.name not in ("first impact", "bounce, 0.4 m/s and more") or not row.found:
             continue
-        said = hearing.found[row.label]
-        delay = hearing.readout.neurons[row.label].delay_ms
+        mine = evaluation.found[row.label]
+        delay = evaluation.readout.neurons[row.label].delay_ms
         parts = []
         for touch, place in row.places:
-            contact = hearing.contacts[touch]
-            stamp = hearing.first_input(contact, row.label)
+            contact = evaluation.contacts[touch]
+            stamp = evaluation.first_input(contact, row.label)
             if stamp is None:
                 continue
             true = contact.start_us if row.label == "contact" else contact.stop_us
             begin = np.ceil(stamp / FRAME_US) * FRAME_US
-            crossing = said.t[place] + to_us(delay)
-            known = float(said.known[place])
-            host = float(said.said[place]) - known if said.said is not None else 0.0
+            crossing = mine.t[place] + to_us(delay)
+            known = float(mine.known[place])
+            host = float(mine.said[place]) - known if mine.said is not None else 0.0
             parts.append([begin - true, crossing - begin, known - crossing, host])
         if parts:
             medians = to_ms(np.median(np.array(parts), axis=0))
@@ -263,7 +270,7 @@ def _which_drop(found: Mapping[str, Any]) -> dict[str, Any]:
     lines = []
     for n, drop in enumerate(found["drops"]):
         for name, question in QUESTIONS.items():
-            said = [
+            answers = [
                 {
                     "says": question.answers[int(np.argmax(one["probable"]))],
                     "sure": f"{100 * max(one['probable']):.0f} %",
@@ -271,23 +278,25 @@ def _which_drop(found: Mapping[str, Any]) -> dict[str, Any]:
                 }
                 for one in drop["said"].get(name, [])
             ]
-            lines.append({"drop": n + 1, "of": name, "true": f"{drop['true'][name]:.0f} {question.unit}", "said": said})
+            lines.append(
+                {"drop": n + 1, "of": name, "true": f"{drop['true'][name]:.0f} {question.unit}", "said": answers}
+            )
     count = len(found["drops"])
     right = {name: [f"{k} of {count}" for k in counts] for name, counts in found["right"].items()}
     return {"lines": lines, "right": right, "chance": {name: _share(v) for name, v in found["chance"].items()}}
 
 
-def _dashpots(heard: Mapping[float, Hearing]) -> list[dict[str, str]]:
+def _dashpots(by_ms: Mapping[float, Evaluation]) -> list[dict[str, str]]:
     lines = []
-    for ms, hearing in heard.items():
+    for ms, evaluation in by_ms.items():
         line = {"dashpot": f"{ms:g} ms" if ms else "none"}
         for label in LABELS:
-            row = hearing.judged.row("first", label)
+            row = evaluation.judged.row("first", label)
             line[label] = _line(row)["p50"] + " / " + _line(row)["p95"]
-            line[f"{label}_within"] = _share(hearing.judged.within_goal(label))
+            line[f"{label}_within"] = _share(evaluation.judged.within_goal(label))
         line["found"] = ", ".join(
-            f"{sum(r.found for r in hearing.judged.rows if r.label == label and _fast(r))} of "
-            f"{sum(r.touches for r in hearing.judged.rows if r.label == label and _fast(r))}"
+            f"{sum(r.found for r in evaluation.judged.rows if r.label == label and _fast(r))} of "
+            f"{sum(r.touches for r in evaluation.judged.rows if r.label == label and _fast(r))}"
             for label in LABELS
         )
         lines.append(line)

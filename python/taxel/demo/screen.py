@@ -1,4 +1,4 @@
-"""What is drawn while the demo runs: the picture, the counters, what was said."""
+"""The terminal display while the demo runs: pressure picture, counters, detections."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from rich.table import Table
 from rich.text import Text
 
 from taxel.demo.judging import LABELS
-from taxel.live import Said, delays
+from taxel.detections import Detection
+from taxel.live import delays
 from taxel.simulate import Contact
 from taxel.spikes import to_ms
 
@@ -27,7 +28,7 @@ _PICTURE_WIDTH, _PICTURE_HEIGHT, _LEAST_WIDTH, _LEAST_HEIGHT = 36, 18, 40, 5
 
 
 class Screen:
-    """What is drawn while it runs: the picture, the counters, what was said."""
+    """The display: pressure picture, counters, detections."""
 
     def __init__(self, drawing: Drawing, contacts: list[Contact], seconds: float) -> None:
         self._drawing = drawing
@@ -40,7 +41,7 @@ class Screen:
         self._before: tuple[float, int] = (0.0, 0)
         self._rate = 0.0
 
-    def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], said: list[Said]) -> None:
+    def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], said: list[Detection]) -> None:
         """Draw what came up to now."""
         now = (counters["board_us"] or 0) * 1e-6
         then, events = self._before
@@ -57,14 +58,14 @@ class Screen:
             ("events", f"{counters['events']:,}"),
             ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
             ("arrived to decoded", delays(counters["decode_latency"])),
-            ("known to said", delays(counters["said_latency"])),
+            ("known to detected", delays(counters["said_latency"])),
             *((label, str(sum(one.label == label for one in said))) for label in LABELS),
         ):
             rows.add_row(Text(name, style="dim"), value)
         state = "taring" if counters["taring"] else f"{min(now, self._seconds):5.1f} of {self._seconds:.1f} s"
         width, height = self._drawing.console.size
         if width < _PICTURE_WIDTH + _LEAST_WIDTH or height < _PICTURE_HEIGHT + _LEAST_HEIGHT:
-            # No room for the picture: the counters alone, and what was said.
+            # No room for the picture: counters and detections alone.
             pictured, taken = [], len(rows.rows) + 2
         else:
             pictured, taken = [Panel(_blocks(picture), title="pressure", width=_PICTURE_WIDTH)], _PICTURE_HEIGHT
@@ -78,7 +79,7 @@ class Screen:
             )
         )
 
-    def _newest(self, said: list[Said], width: int, rows: int) -> list[Text]:
+    def _newest(self, said: list[Detection], width: int, rows: int) -> list[Text]:
         """Return the last lines that find room, the newest last; a long one takes more than one row."""
         lines: list[Text] = []
         for one in reversed(said):
@@ -89,14 +90,14 @@ class Screen:
             lines.insert(0, line)
         return lines
 
-    def _line(self, said: Said) -> Text:
+    def _line(self, said: Detection) -> Text:
         true = self._true[said.label]
         colour = "red" if said.label == "contact" else "blue"
         line = Text(f"{said.t * 1e-6:8.3f} s  ").append(f"{said.label:<8}", style=f"bold {colour}")
         if len(true):
             nearest = int(np.abs(true - said.t).argmin())
             line.append(f"{self._kinds[nearest]:<7} known {to_ms(said.known - true[nearest]):+6.2f} ms, ")
-            line.append(f"said {to_ms(said.said - true[nearest]):+6.2f} ms after the truth", style="dim")
+            line.append(f"out {to_ms(said.said - true[nearest]):+6.2f} ms after the truth", style="dim")
         return line
 
 

@@ -16,8 +16,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from taxel._core import ProblemError
+from taxel.demo.evaluation import Evaluation, evaluate_acts
 from taxel.demo.footfalls import NOTE, footfalls
-from taxel.demo.hearing import Hearing, hear
 from taxel.demo.playing import play_live
 from taxel.demo.report import Material, figures, write
 from taxel.demo.screen import Screen
@@ -43,12 +43,12 @@ def show(
     readout: Path | None = None,
     folder: Path | None = None,
 ) -> tuple[dict[str, Any], Path]:
-    """Play, hear, judge, write the report; return its figures and its page.
+    """Play, detect, judge, write the report; return its figures and its page.
 
     Parameters
     ----------
     console : Console
-        Where it says what it does.
+        Where progress and results are printed.
     scenes : int, 1 or more
     seed : int, optional
         Drawn where it is left out.
@@ -70,7 +70,7 @@ def show(
     """
     if noise_s is not None and not 0.5 <= noise_s <= 86_400:
         raise ProblemError(f"noise is {noise_s} s: must be 0.5 to 86400")
-    heard_by = shipped() if readout is None else Readout.load(readout)
+    used = shipped() if readout is None else Readout.load(readout)
     laid = None if data is None else footfalls(data)
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
     if folder is None:
@@ -80,11 +80,11 @@ def show(
     console.print(f"[bold]taxel demo[/bold]: {scenes} scene(s) of seed [bold]{seed}[/bold]")
     counters: dict[str, Any] = {}
     if not live:
-        hearing = _hear(console, f"playing {scenes} scenes without the clock", script(seed, scenes), heard_by, seed)
+        evaluation = _evaluate(console, f"playing {scenes} scenes without the clock", script(seed, scenes), used, seed)
     else:
         with Drawing(console=console, refresh_per_second=10, transient=True) as drawing:
-            playing = play_live(heard_by, folder, seed=seed, scenes=scenes, screen=lambda *told: Screen(drawing, *told))
-        hearing = playing.hearing
+            playing = play_live(used, folder, seed=seed, scenes=scenes, screen=lambda *given: Screen(drawing, *given))
+        evaluation = playing.evaluation
         counters = {
             "counters": playing.counters,
             "emulator": playing.emulator,
@@ -95,20 +95,20 @@ def show(
         for verdict in playing.verdicts:
             console.print(f"[dim]{verdict}[/dim]", soft_wrap=not console.is_terminal)
     seconds = (60.0 if live else 120.0) if noise_s is None else noise_s
-    quiet = _hear(console, f"hearing {seconds:g} s of noise without the clock", _noise(seconds), heard_by, seed)
+    quiet = _evaluate(console, f"detecting in {seconds:g} s of noise without the clock", _noise(seconds), used, seed)
     # In real time there is a minute for all of it: a few scenes show what the dashpot does.
     few = min(scenes, 4) if live else scenes
     dashpots = {
-        ms: _hear(console, f"hearing a dashpot of {ms:g} ms", script(seed, few, dashpot_ms=ms), heard_by, seed)
+        ms: _evaluate(console, f"playing with a dashpot of {ms:g} ms", script(seed, few, dashpot_ms=ms), used, seed)
         for ms in _DASHPOTS
     }
-    stepped = None if laid is None else _hear(console, "laying footfalls over the array", laid, heard_by, seed)
+    stepped = None if laid is None else _evaluate(console, "laying footfalls over the array", laid, used, seed)
     with _busy(console, "writing the report"):
         material = Material(
             seed=seed,
             scenes=scenes,
             live=live,
-            hearing=hearing,
+            evaluation=evaluation,
             noise=quiet,
             dashpots=dashpots,
             footfalls=stepped,
@@ -117,8 +117,8 @@ def show(
         )
         page = write(folder, material)
     values = figures(material)
-    _say(console, hearing, quiet)
-    _say_which(console, values["which_drop"])
+    _print_table(console, evaluation, quiet)
+    _print_answers(console, values["which_drop"])
     console.print(f"[dim]{time.monotonic() - began:.0f} s in all[/dim]")
     return values, page
 
@@ -127,41 +127,41 @@ def _noise(seconds: float) -> list[Act]:
     return [Silence(50.3 + 1000.0 * seconds)]
 
 
-def _busy(console: Console, said: str) -> Progress:
+def _busy(console: Console, task: str) -> Progress:
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
-    bar.add_task(said, total=None)
+    bar.add_task(task, total=None)
     return bar
 
 
-def _hear(console: Console, said: str, acts: Sequence[Act], readout: Readout, seed: int) -> Hearing:
-    with _busy(console, said) as bar:
-        return hear(
+def _evaluate(console: Console, task: str, acts: Sequence[Act], readout: Readout, seed: int) -> Evaluation:
+    with _busy(console, task) as bar:
+        return evaluate_acts(
             acts, readout, seed=seed, watch=lambda share: bar.update(bar.task_ids[0], completed=share, total=1.0)
         )
 
 
-def _say(console: Console, hearing: Hearing, quiet: Hearing) -> None:
+def _print_table(console: Console, evaluation: Evaluation, quiet: Evaluation) -> None:
     table = Table(box=None, pad_edge=False)
-    for name in ("touch", "said", "found", "error, ms", "known, ms"):
-        table.add_column(name, justify="left" if name in ("touch", "said") else "right", no_wrap=True)
-    for row in hearing.judged.rows:
+    for name in ("touch", "label", "found", "error, ms", "known, ms"):
+        table.add_column(name, justify="left" if name in ("touch", "label") else "right", no_wrap=True)
+    for row in evaluation.judged.rows:
         if not row.touches:
             continue
         error = f"{row.errors_ms.mean():+.2f}" if row.found else "-"
         known = "{:.2f} / {:.2f}".format(*np.percentile(row.delays_ms, [50, 95])) if row.found else "-"
         table.add_row(row.name, row.label, f"{row.found} of {row.touches}", error, known)
     console.print(table)
-    console.print("[dim]error: said minus true, mean; known: minus true, median / 95 %[/dim]")
-    false = sum(len(times) for times in hearing.judged.false.values())
+    console.print("[dim]error: time minus true, mean; known: minus true, median / 95 %[/dim]")
+    false = sum(len(times) for times in evaluation.judged.false.values())
     noise_s = (quiet.stop_us - quiet.start_us) * 1e-6
-    within = sum(hearing.judged.false_within.values())
+    within = sum(evaluation.judged.false_within.values())
     off = f" ({within} within a press, more than 50 ms off)" if within else ""
-    console.print(f"said of nothing: {false} in the scenes{off}, {len(quiet.found)} in {noise_s:.0f} s of noise")
+    console.print(f"false detections: {false} in the scenes{off}, {len(quiet.found)} in {noise_s:.0f} s of noise")
 
 
-def _say_which(console: Console, found: dict[str, Any]) -> None:
-    """Say how often ball, height and slant were named rightly, by time."""
+def _print_answers(console: Console, found: dict[str, Any]) -> None:
+    """Print how often ball, height and slant were named rightly, by time."""
     count = len(found["drops"])
     for name, right in found["right"].items():
         by_time = ", ".join(f"{k} after {ms} ms" for k, ms in zip(right, found["answered_ms"], strict=True))

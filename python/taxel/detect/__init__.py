@@ -1,6 +1,6 @@
 """Spikes to detections, live and from recordings, and their score."""
 
-from taxel.detect.examples import Example
+from taxel.detect.examples import Example, Outcome
 from taxel.detect.folds import Fold, Judged, Part, Trained, choose, judge
 from taxel.detect.readout import Learner, Readout, ReadoutStream, run
 from taxel.detect.scoring import Score, Spread, score
@@ -12,6 +12,7 @@ __all__ = [
     "Fold",
     "Judged",
     "Learner",
+    "Outcome",
     "Part",
     "Readout",
     "ReadoutStream",

@@ -1,4 +1,8 @@
-"""The labelled example: what a readout learns from and is judged on."""
+"""The labelled example: what a readout learns from and is judged on; and what came of one.
+
+Neighbours that differ: `taxel.formats.Trial` is a recording of a published data set, with its subject and condition;
+`taxel.information.LabelledTrial` a stretch of time with one label as a whole, which a classifier tells from others.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,15 @@ import numpy as np
 from taxel._base.arguments import column, instance, shown, text
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.detect.scoring import Score
+from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
-__all__ = ["Example", "array_of", "checked"]
+__all__ = ["Example", "Outcome", "array_of", "checked"]
 
 
 class Example(NamedTuple):
@@ -41,6 +47,26 @@ class Example(NamedTuple):
     source: Events | Frames | Recorded | SpikeTrains
     labels: Mapping[str, Any]
     tare: Tare | None = None
+
+
+class Outcome(NamedTuple):
+    """What a readout detected in an example, and how that scores where its labels are known.
+
+    Attributes
+    ----------
+    name : str
+        Of the recording, for reports.
+    example : Example
+        Without labels where nobody knows what happened.
+    found : Detections
+    score : Score, optional
+        None of an example without labels.
+    """
+
+    name: str
+    example: Example
+    found: Detections
+    score: Score | None = None
 
 
 def checked(examples: Sequence[Example]) -> list[Example]:

@@ -184,6 +184,10 @@ class Readout:
     def from_json(cls, text: str) -> Readout:
         """Return the readout that `to_json` wrote.
 
+        Parameters
+        ----------
+        text : str
+
         Raises
         ------
         FormatError : no readout, one of another version, or parts that make no sense
@@ -195,6 +199,16 @@ class Readout:
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the readout to a JSON file, whole or not at all, and return its path.
 
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
+
         Raises
         ------
         FileExistsError : the file is there already and `overwrite` is false
@@ -204,6 +218,10 @@ class Readout:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Readout:
         """Read a readout from the file that `save` wrote: the same to the last bit.
+
+        Parameters
+        ----------
+        path : path
 
         Raises
         ------
@@ -313,7 +331,7 @@ class Readout:
         tare: Tare | None = None,
         wire_version: int = 1,
     ) -> ReadoutStream:
-        """Begin to listen: the same detections as of the whole, wherever the input is cut.
+        """Begin to receive piece by piece: the same detections as of the whole, wherever the input is cut.
 
         Parameters
         ----------
@@ -323,7 +341,7 @@ class Readout:
             How long the board's frame (or a picture) lasts; 192 is the board at reset.
         tare : Tare, optional
             The taxels' rest, where the encoder needs one and has none.
-        wire_version : {1, 2}
+        wire_version : int, from 1 to 2
             Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
 
         Raises
@@ -352,6 +370,22 @@ class ReadoutStream:
     """Read out events or frames piece by piece, as `Readout.stream` begins it.
 
     Every call returns the detections that became certain by it.
+
+    Parameters
+    ----------
+    readout : Readout
+    array : Array, optional
+        The sensor; the readout's own where it is left out, or else that of the first piece.
+    frame_us : float, us
+        How long the board's frame (or a picture) lasts; 192 is the board at reset.
+    tare : Tare, optional
+        The taxels' rest, where the encoder needs one and has none.
+    wire_version : int, from 1 to 2
+        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
+
+    Raises
+    ------
+    ProblemError : another array than the readout was trained on, or a tare that is missing
 
     Examples
     --------
@@ -394,6 +428,15 @@ class ReadoutStream:
 
         An event that is earlier than what came before counts as coming now, and is counted as `late`.
 
+        Parameters
+        ----------
+        x : Events or Frames
+
+        Returns
+        -------
+        Detections
+            Those that became certain by it.
+
         Raises
         ------
         ProblemError : neither, another array's, events without intensities where the encoder reads them, frames out of
@@ -406,7 +449,22 @@ class ReadoutStream:
         raise ProblemError(f"x is {shown(x)}: a readout listens to taxel.Events or taxel.Frames")
 
     def advance(self, t_us: int) -> Detections:
-        """Say that nothing will come any more before `t_us` (us of the board); an earlier time changes nothing."""
+        """Promise that nothing will come any more before a time; an earlier time changes nothing.
+
+        Parameters
+        ----------
+        t_us : int, us
+            By the board's clock.
+
+        Returns
+        -------
+        Detections
+            Those that became certain by it.
+
+        Raises
+        ------
+        ProblemError : no whole number of us
+        """
         t = whole("t_us", t_us, -(2**52), 2**52)
         return Detections([], [], []) if self._core is None else Detections._from_parts(self._core.advance(t))
 
@@ -434,9 +492,9 @@ def run(
     tare: Tare | None = None,
     wire_version: int | None = None,
 ) -> Detections:
-    """Return what a readout says of a whole recording: the same as it would have said live.
+    """Return what a readout detects in a whole recording: the same as it would have detected live.
 
-    Time moves on for a second of silence after the end, so that what was heard last is said too. Taxels that were
+    Time moves on for a second of silence after the end, so that what came last is detected too. Taxels that were
     zeroed while a recording was made (`Recording.zeroings`) are zeroed here as well; its events alone are not.
 
     Parameters
@@ -447,12 +505,12 @@ def run(
         of this signature applies.
     frame_us : float, us, optional
         How long the board's frame lasts, at whose end a crossing is `known`. Left out: what the recording's registers
-        say; of frames, their median distance; else 192, the board at reset.
+        hold; of frames, their median distance; else 192, the board at reset.
     tare : Tare, optional
         The taxels' rest, where the encoder needs one and has none.
-    wire_version : {1, 2}, optional
+    wire_version : int, from 1 to 2, optional
         Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
-        Left out: what the recording's registers say, else 1.
+        Left out: what the recording's registers hold, else 1.
 
     Returns
     -------

@@ -24,7 +24,15 @@ _APART_US = 10**12
 
 
 class Spread(NamedTuple):
-    """Mean, standard deviation of the sample, median, 2.5th and 97.5th percentile; NaN where there are too few."""
+    """Mean, standard deviation of the sample, median, 2.5th and 97.5th percentile; NaN where there are too few.
+
+    Attributes
+    ----------
+    mean, sd, median : float, in the unit of the values
+        The standard deviation is that of the sample; NaN where there are too few.
+    low, high : float, in the unit of the values
+        The 2.5th and 97.5th percentile.
+    """
 
     mean: float
     sd: float
@@ -35,6 +43,18 @@ class Spread(NamedTuple):
     @classmethod
     def of(cls, values: ArrayLike) -> Spread:
         """Return the spread of values.
+
+        Parameters
+        ----------
+        values : float64, shape (n,), any unit
+
+        Returns
+        -------
+        Spread
+
+        Raises
+        ------
+        ProblemError : something that is no sequence of numbers
 
         Examples
         --------
@@ -52,19 +72,19 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Score:
-    """Say how detections met reference events, of one label or of all together.
+    """Hold how detections and reference events fit together, of one label or of all.
 
     Attributes
     ----------
     label : str
         "all" where it stands for several labels.
-    pairs : int64, shape (found, 2)
+    pairs : int64, shape (found, 2), indices
         Which detection belongs to which reference event, by their places in what was scored.
-    missed_events, false_detections : int64
-        Places of the reference events that nothing was said of, and of the detections of nothing.
-    false_near : int
+    missed_events, false_detections : int64, shape (n,), indices
+        Places of the reference events without a detection, and of the detections without an event.
+    false_near : int, 0 or more
         How many of the false ones lie within the window of a reference event: the thesis' false positives (6.5.2).
-    errors_ms, delays_ms : float64, shape (found,)
+    errors_ms, delays_ms : float64, shape (found,), ms
         `t` minus reference (negative is early) and `known` minus reference.
     by_label : dict of str to Score
         Empty in the score of one label.
@@ -171,7 +191,7 @@ def score(
     found : Detections
     truth : mapping of str to int, us; or int, shape (events,), us; or Detections
         Times of the reference events by label. Times alone are of the one label that `found` has.
-    window_ms : float, ms, or one a reference event, or a mapping of str to either
+    window_ms : float, ms; or shape (events,), one a reference event; or a mapping of str to either
         How far a detection may lie from its event, either way, 0 to 3 600 000; a mapping goes by label. 50 as in 6.5.
 
     Returns

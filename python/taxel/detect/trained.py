@@ -13,7 +13,15 @@ __all__ = ["TrainedNeuron"]
 
 
 class TrainedNeuron(NamedTuple):
-    """A neuron with the weights (mV) it was trained to, and how much later than the event it fires (ms)."""
+    """A trained neuron: what it is, and the weights with which it fires at a label's events.
+
+    Attributes
+    ----------
+    neuron : Neuron
+    weights : float64, shape (trains,), mV
+    delay_ms : float, ms, 0 or more
+        How much later than the event it was trained to fire.
+    """
 
     neuron: Neuron
     weights: NDArray[np.float64]

@@ -83,14 +83,50 @@ class Recipe:
                 learner_from(f"neurons.{label}.search", {**self.learner, **point})
 
     def learner_of(self, label: str) -> tuple[ConeR, float]:
-        """Return the learner of a label, not yet fitted, and the delay it is trained with (ms)."""
+        """Return the learner of a label, not yet fitted, and the delay with which it is trained.
+
+        Parameters
+        ----------
+        label : str
+
+        Returns
+        -------
+        ConeR
+        float, ms
+
+        Raises
+        ------
+        ProblemError : a label that the recipe does not know
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> Recipe(LevelCrossing([1.0]), {"delay_ms": 1.0}, {"contact": {"ub": 2.0}}).learner_of("contact")[1]
+        1.0
+        """
         own = self.neurons.get(text("label", label), {})
         if not isinstance(own, Mapping):
             raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
         return learner_from(f"neurons.{label}", {**self.learner, **self.points_of(label)[0]})
 
     def points_of(self, label: str) -> list[dict[str, Any]]:
-        """Return the parameters of a label's neuron, and behind them the others that the recipe lists for a search."""
+        """Return the parameters of a label's neuron, and behind them the others that the recipe lists for a search.
+
+        Parameters
+        ----------
+        label : str
+
+        Raises
+        ------
+        ProblemError : a label that the recipe does not know
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> recipe = Recipe(LevelCrossing([1.0]), {}, {"contact": {"ub": 2.0, "search": [{"ub": 3.0}]}})
+        >>> recipe.points_of("contact")
+        [{'ub': 2.0}, {'ub': 3.0}]
+        """
         own = dict(self.neurons.get(text("label", label), {}))
         listed = several(f"neurons.{label}.search", own.pop("search", ()))
         return [own, *({**own, **mapping(f"neurons.{label}.search", point)} for point in listed)]
@@ -106,9 +142,22 @@ class Recipe:
         The encoder is a table with its `name` and parameters, where "none" stands for None: TOML has no word for it.
         What a recipe's file says of the recordings that it `fits` and of any `other` label is for `load`.
 
+        Parameters
+        ----------
+        values : mapping
+
+        Returns
+        -------
+        Recipe
+
         Raises
         ------
         ProblemError : a key that is not known (names it), or no encoder
+
+        Examples
+        --------
+        >>> Recipe.from_dict({"encoder": {"name": "fa1"}, "learner": {"tau": 5.0}}).learner
+        {'tau': 5.0}
         """
         if not isinstance(values, Mapping):
             raise ProblemError(f"recipe is {shown(values)}: must be values by name")

@@ -1,10 +1,10 @@
-"""Other people's files: one module a format, each giving trials (pictures or events, and what happened when).
+"""Files of other makers: one module for each format, which reads trials (frames or events, with reference events).
 
 Examples
 --------
 >>> from taxel import formats
->>> sorted(formats.FORMATS)
-['emed', 'gaitndd', 'gaitpdb', 'icub', 'moticon', 'pedar', 'plate', 'popu', 'tekscan']
+>>> formats.FORMATS["plate"].about
+'A footscan-type plate, one barefoot footfall a trial (jiku-data, SpeedPP2DS; J. Biomech. 41:1987, 2008).'
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["FORMATS", "Format", "Trial", "trials"]
 
 @dataclass(frozen=True)
 class Format:
-    """Tell one format: how to know its files, and how to read them.
+    """Describe a format: how to recognise its files, and how to read them.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Format:
 
 
 def _of(name: str) -> Format:
-    """Return what the module of a format says: its first line, `files` and `trials`."""
+    """Return the format of a module: its first line, `files` and `trials`."""
     module = import_module(f"taxel.formats.{name}")
     return Format((module.__doc__ or "").split("\n", maxsplit=1)[0], module.files, module.trials)
 
@@ -83,6 +83,13 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
     FormatError : no format, or several, or a file that does not hold what it should (names file and line)
     ProblemError : a format that is none
     FileNotFoundError : nothing is there
+
+    Examples
+    --------
+    >>> list(trials("a folder that is not there"))
+    Traceback (most recent call last):
+    ...
+    FileNotFoundError: [Errno 2] No such file or directory: 'a folder that is not there'
     """
     place = Path(checked_path("path", path))
     if not place.exists():

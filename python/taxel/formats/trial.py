@@ -21,7 +21,9 @@ MARGIN_US = 100_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trial:
-    """Hold one recording of one sensor: its pictures or events, and the reference times of what happened.
+    """Hold one recording of a published data set: its pictures or events, its subject, and reference times.
+
+    `taxel.open` makes a `Recording` of it; a `taxel.detect.Example` has labels and no subject, group or condition.
 
     Parameters
     ----------
@@ -30,7 +32,7 @@ class Trial:
     person : str
     recorded : Frames or Events
         Pictures that are missing in the file are missing here too: their times jump.
-    truth : mapping from event to int64 times, us
+    truth : mapping from event to int64, shape (events,), us
         Ascending; "contact", "heel_off", "foot_off" where the recording knows them.
     source : str
         Where the truth comes from, in one sentence; it stands beside every figure. "" where there is none.
@@ -40,14 +42,21 @@ class Trial:
         "healthy", "patient", or "".
     scored : (int, int), us, optional
         Within it the truth is complete; outside nothing may be counted as false. All of it where it is left out.
-    series : mapping from name to float64, shape (pictures,) or (events,)
-        Further columns of the file, such as the total force that the maker reckoned.
+    series : mapping from name to float64, shape (pictures,) or (events,), in the file's unit
+        Further columns of the file, such as the total force that the maker computed.
     about : mapping
         What else is known: condition, speed, age ...
 
     Raises
     ------
     ProblemError : truth that does not ascend, or a column of another length than the recording
+
+    Examples
+    --------
+    >>> from taxel.array import Array
+    >>> events = Events([0, 200], [0, 1], [0, 0], [True, False], array=Array(1, 2))
+    >>> Trial("walk 1", "anna", events, {"contact": np.array([100])}, "an instrumented plate")
+    Trial(walk 1: Events(2 events, 0 to 200 us, 1 x 2 taxels, no intensities), 1 contact)
     """
 
     name: str
@@ -64,6 +73,10 @@ class Trial:
     def __post_init__(self) -> None:
         if not isinstance(self.recorded, Frames | Events):
             raise ProblemError(f"recorded is {arguments.shown(self.recorded)}: must be taxel.Frames or taxel.Events")
+        for name in ("name", "person", "source", "foot", "group"):
+            arguments.text(name, getattr(self, name))
+        for name in ("truth", "series", "about"):
+            arguments.mapping(name, getattr(self, name))
         for event, times in self.truth.items():
             arguments.column(event, times, np.int64)
             back = np.flatnonzero(np.diff(times) <= 0)
@@ -71,8 +84,8 @@ class Trial:
                 k = int(back[0])
                 raise ProblemError(f"{self.name}: {event} {k + 1} at {times[k + 1]} us is not after {times[k]} us")
         for name, column in self.series.items():
-            if len(column) != len(self.recorded):
-                raise ProblemError(f"{self.name}: {name} has {len(column)} values for {self.recorded!r}")
+            if np.shape(column)[:1] != (len(self.recorded),):
+                raise ProblemError(f"{self.name}: {name} has shape {np.shape(column)} for {self.recorded!r}")
         if self.scored is None:
             t = self.recorded.t
             object.__setattr__(self, "scored", (int(t.min()), int(t.max())) if len(t) else (0, 0))

@@ -23,16 +23,16 @@ class Point:
 
     Attributes
     ----------
-    period_ms, window_ms : float
-    taxels : int
+    period_ms, window_ms : float, ms
+    taxels : int, 1 or more
     kind : {"all", "random", "pooled"}
         All taxels that ever send an event, some of them drawn anew in each draw, or the means of squares of all.
     found : Estimate
-    events : float
+    events : float, 0 or more
         A trial, to the window.
-    silent : float
+    silent : float, share of all
         The share of trials without any event.
-    kbps : float
+    kbps : float, 0 or more
         Kilobits a second on the wire while touched.
     verdict : Verdict, optional
         Against the finest period with all taxels, to the same window; None where it is that.
@@ -79,7 +79,16 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """Hold what something else than the touch's pattern tells; `found` is None where the recordings cannot say."""
+    """Hold how many bits something else than the touch's pattern gives.
+
+    Attributes
+    ----------
+    name : str
+    found : Estimate, or None
+        None where the recordings do not hold what it needs.
+    about : str
+        What it is, in one sentence.
+    """
 
     name: str
     found: Estimate | None
@@ -94,7 +103,7 @@ class Answer:
     ----------
     labels : dict of str to int
         Trials by label.
-    groups : int
+    groups : int, 0 or more
         How many; 0 where none are named.
     encoder : str
     full : Point
@@ -115,7 +124,10 @@ class Answer:
         By column of the table: the bits about it, by period.
     notes : tuple of str
         What these recordings cannot tell, and what was left out.
-    draws, seed : int
+    draws : int, 1 or more
+    seed : int, 0 or more
+    wire : str
+        By which version of the wire the costs are counted.
     """
 
     labels: dict[str, int]

@@ -37,16 +37,16 @@ def confusion_matrix(
 
     Parameters
     ----------
-    labels, responses : shape (trials,)
+    labels, responses : labels, shape (trials,)
         Of any kind that can be compared: numbers or texts.
-    classes : shape (classes,), optional
+    classes : labels, shape (classes,), optional
         The order of rows and columns; all labels and responses, sorted, where it is left out.
 
     Returns
     -------
     counts : int64, shape (classes, classes)
         Row: the label; column: the response.
-    classes : shape (classes,)
+    classes : labels, shape (classes,)
 
     Raises
     ------
@@ -85,7 +85,7 @@ def label_entropy(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 
     Parameters
     ----------
-    counts : int, shape (..., labels, responses)
+    counts : int, shape (..., labels, responses), 0 or more
 
     Returns
     -------
@@ -108,7 +108,7 @@ def plug_in(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 
     Parameters
     ----------
-    counts : int, shape (..., labels, responses)
+    counts : int, shape (..., labels, responses), 0 or more
 
     Returns
     -------
@@ -141,7 +141,7 @@ def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
 
     Parameters
     ----------
-    counts : int, shape (..., responses)
+    counts : int, shape (..., responses), 0 or more
 
     Returns
     -------
@@ -197,7 +197,7 @@ def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 
     Parameters
     ----------
-    counts : int, shape (..., labels, responses)
+    counts : int, shape (..., labels, responses), 0 or more
 
     Returns
     -------
@@ -233,7 +233,7 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
 
     Parameters
     ----------
-    counts : int, shape (labels, responses)
+    counts : int, shape (labels, responses), 0 or more
     repetitions : int, 1 or more
         How often the trials are dealt out anew.
     seed : int, 0 or more
@@ -283,7 +283,7 @@ def local_information(counts: ArrayLike) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    counts : int, shape (..., labels, responses)
+    counts : int, shape (..., labels, responses), 0 or more
 
     Returns
     -------
@@ -292,6 +292,11 @@ def local_information(counts: ArrayLike) -> NDArray[np.float64]:
     Raises
     ------
     ProblemError : counts that make no sense
+
+    Examples
+    --------
+    >>> local_information([[4, 0], [0, 4]])[0, 0]
+    np.float64(1.0)
     """
     table = _table(counts).astype(np.float64)
     total = table.sum((-1, -2), keepdims=True)

@@ -26,9 +26,13 @@ class Code(ABC):
     Parameters
     ----------
     window_ms : float, ms, above 0
-        How long is listened.
+        How long spikes are counted.
     resolution_ms : float, ms, 0 or more
-        How finely who reads can tell times; spikes closer than that came together.
+        How finely the reader can tell times; spikes closer than that came together.
+
+    Raises
+    ------
+    ProblemError : a window or a resolution that makes no sense
     """
 
     window_ms: float
@@ -53,6 +57,11 @@ class Code(ABC):
         Raises
         ------
         ProblemError : values outside 0 to 1
+
+        Examples
+        --------
+        >>> FirstSpikeLatency(window_ms=10.0).encode([0.5], onset_ms=3.0).times
+        array([8.])
         """
         given, onset = floats("values", values), number("onset_ms", onset_ms, "ms")
         if given.ndim != 1 or not ((given >= 0) & (given <= 1)).all():
@@ -75,6 +84,15 @@ class Code(ABC):
         -------
         float64, shape (trains,), 0 to 1
             0 where a train is silent within the window.
+
+        Raises
+        ------
+        ProblemError : no spike trains, or an onset that is no number
+
+        Examples
+        --------
+        >>> FirstSpikeLatency(window_ms=10.0).decode(SpikeTrains.from_lists([[5.0]], stop=10.0))
+        array([0.5])
         """
         instance("trains", trains, SpikeTrains)
         onset = trains.start if onset_ms is None else number("onset_ms", onset_ms, "ms")
@@ -113,6 +131,10 @@ class RateCode(Code):
     most_hz : float, above 0
         The rate of a value of 1.
 
+    Raises
+    ------
+    ProblemError : a window, a resolution or a rate that makes no sense
+
     Examples
     --------
     >>> code = RateCode(window_ms=100.0, most_hz=100.0)
@@ -143,7 +165,17 @@ class RateCode(Code):
 
 @dataclass(frozen=True, kw_only=True)
 class FirstSpikeLatency(Code):
-    """Say a value by how soon after a reference signal the first spike comes: one spike a train.
+    """Encode a value by how soon after a reference signal the first spike comes: one spike a train.
+
+    Parameters
+    ----------
+    window_ms : float, ms, above 0
+    resolution_ms : float, ms, 0 or more
+        As in `Code`.
+
+    Raises
+    ------
+    ProblemError : a window or a resolution that makes no sense
 
     Examples
     --------
@@ -164,9 +196,19 @@ class FirstSpikeLatency(Code):
 
 @dataclass(frozen=True, kw_only=True)
 class RelativeLatency(FirstSpikeLatency):
-    """Say a value by how long after the population's first spike a train's own first spike comes: no reference.
+    """Encode a value by how long after the population's first spike a train's own first spike comes: no reference.
 
     What is read is relative to the largest value, which reads 1.
+
+    Parameters
+    ----------
+    window_ms : float, ms, above 0
+    resolution_ms : float, ms, 0 or more
+        As in `Code`.
+
+    Raises
+    ------
+    ProblemError : a window or a resolution that makes no sense
 
     Examples
     --------
@@ -183,9 +225,19 @@ class RelativeLatency(FirstSpikeLatency):
 
 @dataclass(frozen=True, kw_only=True)
 class RankOrder(RelativeLatency):
-    """Say values by the order of the trains' first spikes alone.
+    """Encode values by the order of the trains' first spikes alone.
 
     The first reads 1, the others the share of trains that they do not follow; those that came together share a rank.
+
+    Parameters
+    ----------
+    window_ms : float, ms, above 0
+    resolution_ms : float, ms, 0 or more
+        As in `Code`.
+
+    Raises
+    ------
+    ProblemError : a window or a resolution that makes no sense
 
     Examples
     --------
@@ -225,11 +277,11 @@ def compare_codes(
     Parameters
     ----------
     trials : sequence of SpikeTrains, equally many trains each
-    labels : shape (trials,)
+    labels : labels, shape (trials,)
     codes : mapping from name to Code
     onsets_ms : float64, shape (trials,), ms, optional
         The reference signal of each trial; its start where left out.
-    groups : shape (trials,), optional
+    groups : labels, shape (trials,), optional
         What must not be split between folds.
     folds : int, 2 or more
     seed : int, 0 or more
@@ -245,6 +297,13 @@ def compare_codes(
     Notes
     -----
     Thesis 2.3.2, figure 2.7.
+
+    Examples
+    --------
+    >>> code = FirstSpikeLatency(window_ms=10.0)
+    >>> trials = [code.encode([0.1 + 0.8 * (k % 2) + 0.01 * k]) for k in range(8)]
+    >>> round(compare_codes(trials, ["soft", "hard"] * 4, {"first": code}, folds=2)["first"].right, 2)
+    1.0
     """
     given = [instance("trials", one, SpikeTrains) for one in several("trials", trials)]
     wanted: dict[str, Code] = mapping("codes", codes)

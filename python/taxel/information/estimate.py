@@ -41,24 +41,24 @@ class Estimate:
 
     Attributes
     ----------
-    bits : float
+    bits : float, bits
         Corrected (`panzeri_treves`), the mean over draws.
-    interval : (float, float)
+    interval : (float, float), bits
         Where trials, or whole groups, redrawn put it, shifted onto `bits`. Where trials are few it holds the truth less
         often than it says: of 95 % some 55 to 99 at 20 trials a label, 78 to 95 at 40. Where fewer trials were named
         wrongly than there are labels, redraws miss errors that did not come: then down to what Fano's inequality leaves
         of the largest share of errors that so few allow (Clopper and Pearson, trial by trial).
-    plug_in, extrapolated : float
+    plug_in, extrapolated : float, bits
         As counted, and by `quadratic_extrapolation`. That the three agree does not mean that they are right.
-    most : float
+    most : float, bits
         The labels' entropy: the most there can be.
-    right : float
+    right : float, from 0 to 1
         The share of trials whose answer is their label.
     counts : int64, shape (draws, labels, labels)
-    classes : shape (labels,)
-    local : float64, shape (trials,)
-        What each trial's answer told, the mean over draws.
-    trials_for_tenth : int
+    classes : labels, shape (labels,)
+    local : float64, shape (trials,), bits
+        What each trial's answer gave, the mean over draws.
+    trials_for_tenth : int, 0 or more
         How many trials would bring the interval (95 %) to a tenth of a bit either way.
     warnings : tuple of str
         By the number of trials a label and by the interval.
@@ -98,15 +98,15 @@ class Estimate:
 
 @dataclass(frozen=True)
 class ZeroTest:
-    """Hold what labels shuffled before training still seem to tell.
+    """Hold what labels shuffled before training still seem to give.
 
     Attributes
     ----------
-    shuffled : tuple of float
+    shuffled : tuple of float, bits
         Corrected bits, one a shuffle.
-    level : float
+    level : float, bits
         Below it lie 95 % of them: what is not above it is not told from nothing.
-    p : float
+    p : float, from 0 to 1
         How often, under the shuffle, as much as was found comes out; never below 1 / (shuffles + 1).
 
     Notes
@@ -136,11 +136,11 @@ def estimate(
 
     Parameters
     ----------
-    labels : shape (trials,)
+    labels : labels, shape (trials,)
         Texts or whole numbers; two labels at least.
-    responses : shape (trials,) or (draws, trials)
+    responses : labels, shape (trials,) or (draws, trials)
         What was answered; several draws (of the sampling's phase, of the folds) are averaged.
-    groups : shape (trials,), optional
+    groups : labels, shape (trials,), optional
         What belongs together (person, session, pose): whole groups are redrawn, and few of them widen the interval by
         Student's t.
     redraws : int, 2 or more
@@ -230,10 +230,10 @@ def zero_test(
     ----------
     answer : function of labels, shape (trials,)
         Trains anew on these labels and returns the responses, shape (trials,).
-    labels : shape (trials,)
+    labels : labels, shape (trials,)
     found : float, bits
         What the labels as they are gave.
-    groups : shape (trials,), optional
+    groups : labels, shape (trials,), optional
         Where each group has one label, whole groups change theirs; else labels are shuffled within each group.
     shuffles : int, 1 or more
     seed : int, 0 or more
@@ -245,6 +245,12 @@ def zero_test(
     Raises
     ------
     ProblemError : labels that make no sense
+
+    Examples
+    --------
+    >>> test = zero_test(lambda labels: labels, ["ball", "edge"] * 20, 1.0, shuffles=3)
+    >>> len(test.shuffled)
+    3
     """
     callback("answer", answer)
     truth, random = words("labels", labels), np.random.default_rng(whole("seed", seed, 0))

@@ -28,10 +28,10 @@ class FoldSums:
 
     Parameters
     ----------
-    x : shape (trials, features)
+    x : numbers, shape (trials, features)
         More trials than features. int8 for spikes; may be a memory map (``numpy.load(..., mmap_mode="r")``).
-    y : shape (trials,)
-    folds : int, shape (trials,)
+    y : labels, shape (trials,)
+    folds : int, shape (trials,), from 0 on
         The fold in which each trial is tested, as `taxel.information.folds` gives it.
     keep : {"folds", "total"}
         "folds": every fold's scatter stays in memory, ``folds * features ** 2 / 2`` numbers (of four bytes for spikes,
@@ -41,8 +41,8 @@ class FoldSums:
 
     Attributes
     ----------
-    classes : shape (classes,)
-    folds : int64, shape (trials,)
+    classes : labels, shape (classes,)
+    folds : int64, shape (trials,), from 0 on
 
     Raises
     ------
@@ -122,7 +122,7 @@ class FoldSums:
         ----------
         merge : dict from class to class, optional
             What each class counts as: the trials are told apart by that, as if they had been so labelled.
-        features : int, optional
+        features : int, 1 or more, optional
             Only the first so many: in rasters sample by sample, what was there until some time.
         ridge, priors
             As in `LDA`.
@@ -159,7 +159,7 @@ class FoldSums:
                 training = self._total - self._summed(name)
                 if into is not None:
                     training = training.merged(into, len(classes))
-                model.from_moments(training if used == count else training.first(used), shift)
+                model._from_moments(training if used == count else training.first(used), shift)
                 for block, mine in blocks(self._table[:, :used], np.flatnonzero(self.folds == name), np.float64, None):
                     found[mine] = classes[(block @ model.coef_.T + model.intercept_).argmax(1)]
                 if progress is not None:
@@ -183,10 +183,15 @@ def fold_predictions(
 
     Parameters
     ----------
-    x, y, folds, keep
+    x : numbers, shape (trials, features)
+    y : labels, shape (trials,)
+    folds : int, shape (trials,), from 0 on
         As in `FoldSums`, which answers several questions about the same trials.
-    ridge, priors
+    ridge : float, 0 or more
+    priors : {"training", "equal"}
         As in `LDA`.
+    keep : {"folds", "total"}
+        As in `FoldSums`.
     progress : function of (done, all), optional
         Steps: a fold summed, a fold predicted. What it raises ends the work.
 
@@ -201,6 +206,12 @@ def fold_predictions(
     Notes
     -----
     150 000 trials of 5000 features, 300 classes, 10 folds: 3.75 TFLOP of products and 0.4 of factors.
+
+    Examples
+    --------
+    >>> x = [[0.0], [4.0], [1.0], [5.0], [0.5], [4.5], [0.2], [4.2]]
+    >>> fold_predictions(x, ["a", "b"] * 4, [0, 0, 0, 0, 1, 1, 1, 1]).tolist()
+    ['a', 'b', 'a', 'b', 'a', 'b', 'a', 'b']
     """
     if progress is not None:
         callback("progress", progress)

@@ -17,11 +17,11 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
 
     Parameters
     ----------
-    labels : shape (trials,)
+    labels : labels, shape (trials,)
         Texts or whole numbers; two at least.
     count : int, 2 or more
         Folds; fewer where there are fewer groups.
-    groups : shape (trials,), optional
+    groups : labels, shape (trials,), optional
         What must not be split between folds: a person, a session, the variants of one trial.
     seed : int, 0 or more
 

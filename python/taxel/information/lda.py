@@ -72,19 +72,24 @@ class LDA(Classifier):
 
         Parameters
         ----------
-        x : shape (trials, features)
-        y : shape (trials,)
+        x : numbers, shape (trials, features)
+        y : labels, shape (trials,)
             Texts or whole numbers.
 
         Raises
         ------
         ProblemError : trials or labels that make no sense
+
+        Examples
+        --------
+        >>> LDA().fit([[0.0], [1.0], [4.0], [5.0]], ["a", "a", "b", "b"]).coef_.shape
+        (2, 1)
         """
         table = feature_table(x)
         self.classes_, row = labelled(y, len(table))
         if table.shape[1] < len(table) - len(self.classes_):
             shift = table.mean(0, dtype=np.float64)
-            return self.from_moments(ClassMoments.of(table, row, len(self.classes_), shift=shift), shift)
+            return self._from_moments(ClassMoments.of(table, row, len(self.classes_), shift=shift), shift)
         values = table.astype(np.float64)
         centre = values.mean(0)
         values -= centre
@@ -106,7 +111,7 @@ class LDA(Classifier):
         self.rank_ = gram.rank_
         return self
 
-    def from_moments(self, moments: ClassMoments, shift: NDArray[np.float64] | None = None) -> Self:
+    def _from_moments(self, moments: ClassMoments, shift: NDArray[np.float64] | None = None) -> Self:
         """Learn from sums over trials from which `shift` was taken off; `classes_` is the caller's to set."""
         found = solved(moments, _ridge(self.ridge), self.priors, shift)
         self.coef_, self.intercept_, self.rank_ = found[:3]
@@ -120,11 +125,25 @@ class LDA(Classifier):
         return self
 
     def decision_function(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Return each class' discriminant, shape (trials, classes): its log probability, but for a constant a trial.
+        """Return each class' discriminant: its log probability, but for a constant a trial.
+
+        Parameters
+        ----------
+        x : numbers, shape (trials, features)
+
+        Returns
+        -------
+        float64, shape (trials, classes)
 
         Raises
         ------
         ProblemError : not fitted, or other features
+
+        Examples
+        --------
+        >>> lda = LDA().fit([[0.0], [1.0], [4.0], [5.0]], ["a", "a", "b", "b"])
+        >>> lda.decision_function([[4.0]]).argmax(1)
+        array([1])
         """
         weights = self._fitted("coef_")
         table = feature_table(x)
@@ -136,7 +155,25 @@ class LDA(Classifier):
         return found
 
     def predict(self, x: ArrayLike) -> NDArray[Any]:
-        """Return the class of the largest discriminant, trial by trial."""
+        """Return the class of the largest discriminant, trial by trial.
+
+        Parameters
+        ----------
+        x : numbers, shape (trials, features)
+
+        Returns
+        -------
+        shape (trials,), of the kind of the labels
+
+        Raises
+        ------
+        ProblemError : not fitted, or other features
+
+        Examples
+        --------
+        >>> LDA().fit([[0.0], [1.0], [4.0], [5.0]], ["a", "a", "b", "b"]).predict([[0.5], [4.5]]).tolist()
+        ['a', 'b']
+        """
         scores = self.decision_function(x)
         return np.asarray(self.classes_[scores.argmax(1)])
 
@@ -198,13 +235,19 @@ class GramLDA(Classifier):
 
         Parameters
         ----------
-        gram : shape (trials, trials)
+        gram : float64, shape (trials, trials), in the features' unit squared
             Inner products of the training trials.
-        y : shape (trials,)
+        y : labels, shape (trials,)
 
         Raises
         ------
         ProblemError : a matrix that is not square, or labels that make no sense
+
+        Examples
+        --------
+        >>> x = np.array([[0.0], [1.0], [4.0], [5.0]])
+        >>> GramLDA(features=1).fit(x @ x.T, ["a", "a", "b", "b"]).classes_.tolist()
+        ['a', 'b']
         """
         square = gram_matrix(gram)
         self.classes_, row = labelled(y, len(square))
@@ -233,7 +276,7 @@ class GramLDA(Classifier):
 
         Parameters
         ----------
-        gram : shape (trials, training trials)
+        gram : float64, shape (trials, training trials), in the features' unit squared
             Inner products with the training trials.
 
         Raises
@@ -247,7 +290,27 @@ class GramLDA(Classifier):
         return np.asarray(across @ weights + self.intercept_)
 
     def predict(self, gram: ArrayLike) -> NDArray[Any]:
-        """Return the class of the largest discriminant, trial by trial."""
+        """Return the class of the largest discriminant, trial by trial.
+
+        Parameters
+        ----------
+        gram : float64, shape (trials, training trials), in the features' unit squared
+            Inner products with the training trials.
+
+        Returns
+        -------
+        shape (trials,), of the kind of the labels
+
+        Raises
+        ------
+        ProblemError : not fitted, or products with other trials
+
+        Examples
+        --------
+        >>> x = np.array([[0.0], [1.0], [4.0], [5.0]])
+        >>> GramLDA(features=1).fit(x @ x.T, ["a", "a", "b", "b"]).predict(np.array([[4.5]]) @ x.T).tolist()
+        ['b']
+        """
         return np.asarray(self.classes_[self.decision_function(gram).argmax(1)])
 
 

@@ -58,9 +58,9 @@ class NearestNeighbours(Classifier):
 
         Parameters
         ----------
-        distances : shape (trials, trials)
+        distances : float64, shape (trials, trials), in any unit
             Of the training trials from each other; only their number is looked at.
-        y : shape (trials,)
+        y : labels, shape (trials,)
 
         Raises
         ------
@@ -77,11 +77,18 @@ class NearestNeighbours(Classifier):
 
         Parameters
         ----------
-        distances : shape (trials, training trials)
+        distances : float64, shape (trials, training trials), in any unit
 
         Raises
         ------
         ProblemError : not fitted, or another number of training trials
+
+        Examples
+        --------
+        >>> x = np.array([0.0, 1.0, 4.0, 5.0])
+        >>> fitted = NearestNeighbours().fit(np.abs(x[:, None] - x), ["a", "a", "b", "b"])
+        >>> fitted.predict(np.abs(np.array([[4.2]]) - x)).tolist()
+        ['b']
         """
         row = self._fitted("row_")
         across = numbers("distances", distances, np.float64)
@@ -96,7 +103,7 @@ def distances_of(gram: ArrayLike) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    gram : shape (trials, trials)
+    gram : float64, shape (trials, trials), in the features' unit squared
 
     Returns
     -------

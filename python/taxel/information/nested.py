@@ -28,8 +28,8 @@ class Nested:
 
     Attributes
     ----------
-    responses : shape (trials,)
-    folds : int64, shape (trials,)
+    responses : labels, shape (trials,)
+    folds : int64, shape (trials,), from 0 on
         In which each trial was tested.
     chosen : dict from fold to (int, float)
         Which matrix and which ridge (or how many neighbours) that fold's training trials chose among themselves.
@@ -59,13 +59,13 @@ def nested_predictions(
 
     Parameters
     ----------
-    grams : sequence of float64, shape (trials, trials)
+    grams : sequence of float64, shape (trials, trials), in the features' unit squared
         Inner products of all trials, a matrix for each way to see them (each smoothing); those first are preferred
         where they do as well.
     features : sequence of int
         How many features vary in each.
-    y : shape (trials,)
-    groups : shape (trials,), optional
+    y : labels, shape (trials,)
+    groups : labels, shape (trials,), optional
         What must not be split, neither between folds nor inside them.
     count, inner : int, 2 or more
         Folds, and folds among the training trials.

@@ -63,7 +63,7 @@ class ClassMoments:
 
         Parameters
         ----------
-        x : shape (trials, features)
+        x : numbers, shape (trials, features)
             Any numbers; may be a memory map, which is read by blocks of rows.
         y : int64, shape (trials,)
             The number of each trial's class.

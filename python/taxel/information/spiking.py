@@ -65,7 +65,7 @@ class ConeRReadout(Classifier):
         ----------
         patterns : sequence of SpikeTrains
             The same trains and window in each.
-        y : shape (patterns,)
+        y : labels, shape (patterns,)
 
         Raises
         ------
@@ -84,6 +84,10 @@ class ConeRReadout(Classifier):
     def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
         """Return each class' potential at the window's end, mV, shape (patterns, classes).
 
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+
         Raises
         ------
         ProblemError : not fitted, or patterns that make no sense
@@ -95,7 +99,20 @@ class ConeRReadout(Classifier):
         ).reshape(len(trains), len(learners))
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
-        """Return a label a pattern."""
+        """Return a label a pattern.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+
+        Returns
+        -------
+        shape (patterns,), of the kind of the labels
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that make no sense
+        """
         return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
 
 
@@ -145,7 +162,7 @@ class TempotronReadout(Classifier):
         Parameters
         ----------
         patterns : sequence of SpikeTrains
-        y : shape (patterns,)
+        y : labels, shape (patterns,)
 
         Raises
         ------
@@ -161,6 +178,10 @@ class TempotronReadout(Classifier):
     def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
         """Return each class' highest potential, shape (patterns, classes).
 
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+
         Raises
         ------
         ProblemError : not fitted, or patterns that make no sense
@@ -172,7 +193,20 @@ class TempotronReadout(Classifier):
         )
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
-        """Return a label a pattern."""
+        """Return a label a pattern.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+
+        Returns
+        -------
+        shape (patterns,), of the kind of the labels
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that make no sense
+        """
         return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
 
 
@@ -213,8 +247,8 @@ def readout_responses(
     name : {"cone_r", "tempotron"}
     spikes : Spikes
     window_us : float, us
-    labels : shape (trials,)
-    folds : int64, shape (trials,)
+    labels : labels, shape (trials,)
+    folds : int64, shape (trials,), from 0 on
 
     Returns
     -------

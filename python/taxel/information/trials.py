@@ -17,7 +17,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.labels import Label, ahead_us
+from taxel.labels import Note, ahead_us
 from taxel.recording import Recording
 from taxel.spikes import to_ms, to_us
 
@@ -30,6 +30,9 @@ _KNOWN = (*_COLUMNS, "stop_us", "group", "host_ns")
 @dataclass(frozen=True, eq=False)
 class LabelledTrial:
     """Hold one trial: where it lies, what it is called, what it belongs to.
+
+    Its label is that of the whole stretch, which a classifier tells from others; a `taxel.detect.Example` has the times
+    of labelled events, at which a neuron learns to fire.
 
     Parameters
     ----------
@@ -50,6 +53,12 @@ class LabelledTrial:
     Raises
     ------
     ProblemError : a source of another kind, an empty label, or an end that does not lie after the start
+
+    Examples
+    --------
+    >>> events = Events([0, 200], [0, 1], [0, 0], [True, False], array=Array(1, 2))
+    >>> LabelledTrial(events, "ball", 0, 500).array.shape
+    (1, 2)
     """
 
     source: Events | Frames
@@ -136,7 +145,7 @@ def read_trials(
         where = f"{place}, line {line}"
         told, host_ns = (_whole(where, name, row[name]) if row.get(name) else None for name in ("stop_us", "host_ns"))
         start = _whole(where, "t_us", row["t_us"])
-        ahead = ahead_us(Label("", row["label"], start, host_ns), one.path, clocks.get(id(one)), place)
+        ahead = ahead_us(Note(row["label"], start, host_ns or 0), one.path, clocks.get(id(one)), place)
         start, stop = start - ahead, None if told is None else told - ahead
         if stop is None and window_ms is None:
             raise ProblemError(f"{where}: has no stop_us; give it, or the trials' length by --window-ms")

@@ -1,4 +1,4 @@
-"""What learners of spike times that take all examples at once share: fit, predict."""
+"""The base of learners of spike times that are fitted to all examples at once: fit, predict."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ __all__ = ["BatchLearner"]
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class BatchLearner(SpikeLearner):
-    """Learn spike times from all examples at once; what the compiled part says of the fit ends in ``_``."""
+    """Learn spike times from all examples at once; the results of the compiled part end in ``_``."""
 
     weights_: NDArray[np.float64] = field(init=False)
-    #: What else was learnt, by name, as the compiled part reads it again.
+    #: Further results by name, which the compiled part reads again in `predict`.
     _said: dict[str, Any] = field(init=False)
 
     def fit(self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> Self:
@@ -47,14 +47,23 @@ class BatchLearner(SpikeLearner):
         ProblemError : patterns or targets that make no sense (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
-        self.weights_, said = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
-        self._said = json.loads(said)
+        self.weights_, learnt = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
+        self._said = json.loads(learnt)
         for name, value in self._said.items():
             setattr(self, f"{name}_", value)
         return self
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
         """Return when the learner fires, one array a pattern, ms.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains as in `fit`.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
 
         Raises
         ------
@@ -66,8 +75,8 @@ class BatchLearner(SpikeLearner):
     def _fired(self, patterns: Sequence[SpikeTrains], instead: dict[str, Any]) -> list[NDArray[np.float64]]:
         """Return the output spikes; `instead` replaces what was learnt, by name."""
         weights = self._fitted()
-        said = json.dumps(self._said | instead)
+        learnt = json.dumps(self._said | instead)
         trains = [
             instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))
         ]
-        return [_core.run_batch(self._kind, self._json(), weights, said, parts) for parts in trains]
+        return [_core.run_batch(self._kind, self._json(), weights, learnt, parts) for parts in trains]

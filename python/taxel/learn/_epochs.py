@@ -1,4 +1,4 @@
-"""What learners by epochs share: fit, predict, one presentation."""
+"""The base of learners by epochs: fit, predict, one presentation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["AfterSpike", "EpochLearner", "Updates", "keep"]
 AfterSpike = Literal["subtract", "membrane", "reset"]
 Updates = Literal["batch", "pattern"]
 
-#: What all rules share.
+#: Defaults of all rules.
 _DEFAULT = defaults("inst")
 
 
@@ -31,7 +31,7 @@ _DEFAULT = defaults("inst")
 class EpochLearner(SpikeLearner):
     """Learn spike times by epochs: present each pattern, compare the output spikes with the targets, correct.
 
-    What a rule's source gives is its default; `INST`, of which everything was published, says what each parameter is.
+    Defaults are the published values of a rule; `INST`, of which all were published, documents each parameter.
     """
 
     eta: float | None
@@ -90,7 +90,7 @@ class EpochLearner(SpikeLearner):
         Raises
         ------
         ProblemError : patterns, targets or first weights that make no sense (names pattern and target)
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the best weights so far are kept
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         trains, times = examples(patterns, targets)
         first = None if start is None else floats("start", start)
@@ -102,6 +102,15 @@ class EpochLearner(SpikeLearner):
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
         """Return the output spikes of the trained neuron, one array a pattern, ms.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains as in `fit`.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
 
         Raises
         ------
@@ -115,13 +124,13 @@ class EpochLearner(SpikeLearner):
     def change(
         self, weights: ArrayLike, pattern: SpikeTrains, targets: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what one presentation asks of the weights, over the learning rate, and the output spikes in it.
+        """Return the change of the weights by one presentation, over the learning rate, and its output spikes.
 
         Parameters
         ----------
         weights : float64, shape (trains,), mV
         pattern : SpikeTrains
-        targets : float64, ms, ascending
+        targets : float64, shape (targets,), ms, ascending
 
         Returns
         -------
@@ -156,7 +165,7 @@ class EpochLearner(SpikeLearner):
 
 
 def keep(learner: Any, trained: tuple[Any, ...]) -> None:
-    """Put what was learnt on the learner, then raise the Ctrl-C that may have come meanwhile."""
+    """Set the results on the learner, then raise the exception of a Ctrl-C that came meanwhile."""
     weights, right, best_epoch, status, interrupt = trained
     learner.weights_, learner.right_ = weights, right
     learner.best_epoch_, learner.status_ = best_epoch, status

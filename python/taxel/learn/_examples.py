@@ -1,4 +1,4 @@
-"""What every learner is given: patterns with their targets."""
+"""The arguments of every learner: patterns with their targets."""
 
 from __future__ import annotations
 
@@ -14,6 +14,6 @@ __all__ = ["examples"]
 
 
 def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[float64]]]:
-    """Return patterns and targets as the compiled part takes them; refuse what is none, by name."""
+    """Return patterns and targets for the compiled part; refuse other types, by name."""
     trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))]
     return trains, [floats(f"targets of pattern {p}", t, "ms") for p, t in enumerate(several("targets", targets))]

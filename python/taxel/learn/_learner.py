@@ -1,4 +1,4 @@
-"""What all learners share: parameters, what is asked of one that was not fitted, how well it does."""
+"""The base of all learners: parameters, the error before `fit`, the score."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DEFAULT = defaults("matching")
 
 
 class Learner(Parameters):
-    """Learn weights; what is learnt ends in ``_``."""
+    """Learn weights; results end in ``_``."""
 
     def _fitted(self) -> NDArray[float64]:
         """Return the weights; refuse where there are none yet."""
@@ -43,7 +43,7 @@ class SpikeLearner(Learner, ABC):
     def score(
         self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike], window_ms: float = _DEFAULT.window_ms
     ) -> float:
-        """Return how well the output spikes meet the targets.
+        """Return how well the output spikes match the targets.
 
         Parameters
         ----------

@@ -20,26 +20,37 @@ class Chronotron(EpochLearner):
 
     Parameters
     ----------
-    rule : {"E", "I"}
-        E-learning or I-learning.
+    eta : float, above 0
+        Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
+    initial : (float, float), mV
+        First weights are drawn evenly between these two.
+    epochs : int, 1 or more
+        Epochs at most.
+    updates : {"batch", "pattern"}
+        Whether weights change once an epoch, or after each pattern in an order drawn anew.
     tau, tau_s : float, ms, above 0
         Membrane and synapse, as in `INST`; 15 and `tau` / 4 where left out (‡).
+    theta_0 : float, mV, above 0
+        Threshold; has no default.
+    after_spike : {"subtract", "membrane", "reset"}, optional
+        As in `INST`; "subtract" for E-learning, "membrane" for I-learning, where left out.
+    step_ms, within_ms : float, ms, above 0
+    until_right : bool
+    seed : int, 0 or more
+    max_seconds : float, s, above 0, optional
+        As in `INST`, from `step_ms` on.
+    rule : {"E", "I"}
+        E-learning or I-learning.
     tau_q : float, ms, above 0, optional
         E-learning: a move over `dt` costs ``(dt / tau_q)**2 / 2``, to add or to remove a spike 1; `tau` where left
         out (‡).
     gamma_r : float, ms, above 0, optional
         E-learning: weight of the moves; `tau_q` where left out (‡).
-    eta, initial, epochs, updates, theta_0
-        Training and threshold, as in `INST`; none has a default.
-    after_spike : {"subtract", "membrane", "reset"}, optional
-        As in `INST`; "subtract" for E-learning, "membrane" for I-learning, where left out.
-    step_ms, within_ms, until_right, seed, max_seconds
-        As in `INST`.
 
     Attributes
     ----------
     weights_, right_, epochs_, best_epoch_, status_, neuron_
-        What was learnt, as `INST` has it.
+        As in `INST`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""CONE-R: the best weights where targets and silence cannot all be met."""
+"""CONE-R: the best weights where no weights satisfy all targets and all silence."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ class ConeR(SpikeLearner):
         The neuron to be trained; ``Neuron()`` where it is left out. Whatever its `time`, it is trained on the grid of
         its `step_ms`, which is also the step of the silent rows.
     kappa : float, above 0
-        What the potential shall reach behind a target, in thresholds.
+        The potential that B aims at behind a target, in thresholds.
     delta_t_ms : float, ms, 0 or more, optional
-        How far behind; ``0.1 * tau`` where left out.
+        Delay of that after the target; ``0.1 * tau`` where left out.
     lambdas : five floats, 0 or more
         Shares of l1, l2, B, C, D in the objective; only their ratios matter.
     lb, ub : float, or float sequence of shape (trains,), mV
-        Least and largest weight, for all synapses or one a synapse. All normalisers are taken at ``-max(|lb|, |ub|)``
-        and ``+max(|lb|, |ub|)``, synapse by synapse.
+        Least and largest weight, for all synapses or one a synapse. All normalisers are computed at
+        ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``, synapse by synapse.
     divide_b_by : {"B_max", "targets"}
         B over its largest value, as printed, or over the number of targets.
     norm : {"norm", "square"}
@@ -77,7 +77,7 @@ class ConeR(SpikeLearner):
     status_ : {"solved", "stopped"}
         "stopped": the gap is above `tolerance`, as `max_seconds` or Ctrl-C ended the fit, or nothing closed it.
     engine_ : {"native", "cone solver"}
-        Who found these weights: "cone solver" also where the native engine's result could not be proven.
+        Which engine found these weights: "cone solver" also where the native engine's result could not be proven.
     rounds_, rows_ : int
         Rounds of multipliers or of row generation; rows on their kink, or handed to the cone solver, in the last one.
     silent_rows_ : int
@@ -173,7 +173,7 @@ class ConeR(SpikeLearner):
         Raises
         ------
         ProblemError : patterns or targets that make no sense (names pattern and target)
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the best so far is kept
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
 
         Warns
         -----
@@ -187,7 +187,8 @@ class ConeR(SpikeLearner):
 
         Parameters
         ----------
-        patterns, targets
+        patterns : sequence of SpikeTrains
+        targets : sequence of float sequences, ms
             As in `fit`.
 
         Returns
@@ -203,6 +204,15 @@ class ConeR(SpikeLearner):
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
         """Return the output spikes of the trained neuron, one array a pattern, ms.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains as in `fit`.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
 
         Raises
         ------
@@ -221,32 +231,53 @@ class ConeR(SpikeLearner):
 
 
 class ConeRProblem:
-    """The rows of one set of examples; made by `ConeR.prepare`.
+    """Hold the rows of one set of examples; made by `ConeR.prepare`.
+
+    Parameters
+    ----------
+    cone : ConeR
+        The learner whose neuron, margin and horizon state the rows.
+    patterns : sequence of SpikeTrains
+    targets : sequence of float sequences, ms
+        As in `ConeR.fit`.
 
     Attributes
     ----------
     silent_rows : int
         Rows that demand silence.
+
+    Raises
+    ------
+    ProblemError : as `ConeR.prepare`
+
+    Examples
+    --------
+    >>> from taxel import Neuron
+    >>> trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
+    >>> cone = ConeR(neuron=Neuron(tau=10.0, after_spike="reset"), lb=-1.0, ub=1.0)
+    >>> rows = cone.prepare([trains], [[20.0]])
+    >>> [round(rows.fit(cone.set_params(kappa=kappa)).objective_, 4) for kappa in (1.1, 1.2)]
+    [0.0046, 0.0055]
     """
 
     def __init__(self, cone: ConeR, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
         trains, times = examples(patterns, targets)
         self._trains = len(trains[0][1]) - 1 if trains else 0
-        self._heard = _heard(instance("cone", cone, ConeR), trains)
-        if self._heard is not None:
-            trains = [(parts[0], np.append(parts[1][self._heard], parts[1][-1]), *parts[2:]) for parts in trains]
-        _weighed("patterns", self._trains if self._heard is None else len(self._heard), "trains have spikes")
+        self._counted = _counted(instance("cone", cone, ConeR), trains)
+        if self._counted is not None:
+            trains = [(parts[0], np.append(parts[1][self._counted], parts[1][-1]), *parts[2:]) for parts in trains]
+        _weighed("patterns", self._trains if self._counted is None else len(self._counted), "trains have spikes")
         self._problem = _core.ConeRProblem(self._handed(cone)[0], trains, times)
         self.silent_rows: int = self._problem.silent_rows
 
     def _handed(self, cone: ConeR) -> tuple[str, NDArray[np.float64]]:
         """Return a learner's parameters for the trains that are weighed, and the largest weights of the others."""
-        if self._heard is None:
+        if self._counted is None:
             return cone._json(), np.zeros(0)
         cone._check()
         plain = cone._plain()
         silent = np.ones(self._trains, bool)
-        silent[self._heard] = False
+        silent[self._counted] = False
         largest = np.zeros(silent.sum())
         for name, away in (("lb", np.greater), ("ub", np.less)):
             bound = np.asarray(plain[name], np.float64)
@@ -260,7 +291,7 @@ class ConeRProblem:
                 )
             largest = np.maximum(largest, np.abs(bound[silent] if bound.ndim else bound))
             if bound.ndim:
-                plain[name] = bound[self._heard].tolist()
+                plain[name] = bound[self._counted].tolist()
         return parameters(plain), largest
 
     def fit(
@@ -277,7 +308,8 @@ class ConeRProblem:
         cone : ConeR
             May differ from the one that laid out the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `norm`,
             `tolerance`, `engine` and `max_seconds`.
-        start, progress
+        start : ConeR, or float64 of shape (trains,), mV, optional
+        progress : function of (round, rows, objective, gap), optional
             As in `ConeR.fit`.
 
         Returns
@@ -293,9 +325,9 @@ class ConeRProblem:
         if progress is not None:
             callback("progress", progress)
         (weights, *others), signal = self._problem.fit(*self._handed(instance("cone", cone, ConeR)), first, progress)
-        if self._heard is not None:
+        if self._counted is not None:
             every = np.zeros(self._trains)
-            every[self._heard] = weights
+            every[self._counted] = weights
             weights = every
         _keep(cone, (weights, *others), self.silent_rows, self._problem.rows)
         if signal is not None:
@@ -312,11 +344,11 @@ class ConeRProblem:
         return self._weighed(start.weights_), multipliers if rows == self._problem.rows else None
 
     def _weighed(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        if self._heard is None:
+        if self._counted is None:
             return weights
         if weights.shape != (self._trains,):
             raise ProblemError(f"weights: {weights.size} for {self._trains} trains, must be one a train")
-        return weights[self._heard]
+        return weights[self._counted]
 
 
 def _weighed(name: str, count: int, what: str) -> None:
@@ -328,8 +360,8 @@ def _weighed(name: str, count: int, what: str) -> None:
         )
 
 
-def _heard(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] | None:
-    """Return the trains that have a spike in some pattern, or that bounds hold away from 0; None: nothing to leave out.
+def _counted(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] | None:
+    """Return the trains with a spike in some pattern, or with bounds away from 0; None where these are all trains.
 
     The weight of any other is 0 whatever else is learnt, and of a whole array's trains nearly all are such.
     """
@@ -346,7 +378,7 @@ def _heard(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] 
 
 
 def _keep(cone: ConeR, found: Any, silent_rows: int, all_rows: int) -> None:
-    """Put what was found on the learner."""
+    """Set the results of a fit on the learner."""
     weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable, refires), multipliers = found
     cone.weights_ = weights
     cone.objective_ = objective

@@ -1,4 +1,4 @@
-"""CONE-X: weights that fire a neuron at its targets and nowhere else, exactly, or the proof that there are none."""
+"""CONE-X: weights with which a neuron fires exactly at its targets and nowhere else, or a proof that none do."""
 
 from __future__ import annotations
 
@@ -25,14 +25,19 @@ __all__ = ["Certificate", "ConeX", "ConeXProblem", "Margin", "Row"]
 class Row(NamedTuple):
     """Name a row of a problem by pattern and time.
 
-    Attributes
+    Parameters
     ----------
     kind : {"target", "silence", "slope"}
         The potential at a target equals the threshold (6.9a); it stays below at a time (6.9b); it comes up to a target
         from below.
-    pattern : int
-    at : int or float
-        Which target of the pattern; in silence when, ms.
+    pattern : int, 0 or more
+    at : int, 0 or more, or float, ms
+        The number of the target in its pattern; of a row of silence, its time.
+
+    Examples
+    --------
+    >>> Row("silence", 0, 17.5)
+    Row(kind='silence', pattern=0, at=17.5)
     """
 
     kind: Literal["target", "silence", "slope"]
@@ -44,11 +49,10 @@ class Row(NamedTuple):
 class Certificate:
     """Prove that no weights within the bounds meet the named rows together (Farkas).
 
-    Attributes
+    Parameters
     ----------
     rows : list of Row
-    multipliers : float64, shape (rows,)
-        Of targets any sign, of all other rows 0 or more.
+    multipliers : float64, shape (rows,), of any sign at targets, else 0 or more
     gap : float, mV
         By how much the bounds fail what the rows demand.
     at_all : bool
@@ -56,6 +60,12 @@ class Certificate:
         this margin.
     text : str
         Which patterns, which targets, which silences conflict.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
+    >>> print(str(ConeX().fit([trains], [[40.0]]).certificate_)[:95])
+    no weights within the bounds fire at pattern 0 target 0 (40 ms): no input counts before it. Imp
     """
 
     rows: list[Row]
@@ -72,9 +82,9 @@ class Certificate:
 
 
 class Margin(NamedTuple):
-    """Say how far below the threshold silence stays.
+    """Hold how far below the threshold silence stays.
 
-    Attributes
+    Parameters
     ----------
     mv : float, mV
         Away from targets.
@@ -91,10 +101,10 @@ _DEFAULT = defaults("cone_x")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ConeX(SpikeLearner):
-    """Learn weights by CONE-X: every target met and every silence kept, with the least norms and missed lift.
+    """Learn weights by CONE-X: exact at every target, silent elsewhere, with the least norms and missed lift.
 
     In continuous time (the default) silence holds at every instant. On the grid it is the thesis' problem 6.11, which
-    asks for silence at 1 ms points only: most such weights fire early or once more between them.
+    requires silence at 1 ms points only: most such weights fire early or once more between them.
 
     Parameters
     ----------
@@ -102,13 +112,13 @@ class ConeX(SpikeLearner):
         The neuron to be trained; ``Neuron()`` where it is left out. With its ``time="grid"`` its `step_ms` is also the
         step of the silent rows.
     kappa : float, above 0
-        What the potential shall reach behind a target, in thresholds.
+        The potential that B aims at behind a target, in thresholds.
     delta_t_ms : float, ms, 0 or more, optional
-        How far behind; ``0.1 * tau`` where left out.
+        Delay of that after the target; ``0.1 * tau`` where left out.
     lambdas : three floats, 0 or more
         Shares of l1, l2, B in the objective; only their ratios matter. All 0: any weights will do.
     lb, ub : float or float64 of shape (trains,), mV
-        Least and largest weight, finite. All normalisers are taken at ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``.
+        Least and largest weight, finite. All normalisers are computed at ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``.
     divide_b_by : {"B_max", "targets"}
         B over its largest value, as printed, or over the number of targets.
     norm : {"norm", "square"}
@@ -116,7 +126,7 @@ class ConeX(SpikeLearner):
     margin : float, mV, 0 or more, optional
         How far below the threshold silence shall stay; where left out ``theta_0 / 300`` (1e-3 by default) in
         continuous time, 0 on the grid. Where neither it nor `slope` is given and no weights keep it, in continuous time
-        a tenth, a hundredth and a thousandth of both are tried (`problem_.margin` says which it was), so that
+        a tenth, a hundredth and a thousandth of both are tried (`problem_.margin` is the last), so that
         "infeasible" holds for any margin (``certificate_.at_all``); with one that is given it holds for that one. On
         the grid the best weights touch the threshold at many points, and a neuron that is run on the grid fires where
         it is touched: ask for 1e-9 or more.
@@ -126,18 +136,18 @@ class ConeX(SpikeLearner):
     horizon : float or float64 of shape (patterns,), ms, optional
         Where silence ends; the later of a pattern's stop and its last target + `tau` where left out.
     tolerance : float, from 1e-12 to 0.1
-        The proven relative gap at which a fit counts as solved.
+        The proven relative gap at which the search ends.
     max_seconds : float, s, above 0, optional
         After so long a fit ends with the best so far.
 
     Attributes
     ----------
     status_ : {"solved", "infeasible", "stopped"}
-        "solved": silence keeps at least half its margin, the neuron, run on the patterns, fires within 1e-6 ms of every
-        target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion where theta_0 is not
-        0.3 mV), and no weights that keep the whole margin have an objective smaller by more than `tolerance` of it, or
-        by more than 1e-10 of what B is without weights. "infeasible": `certificate_` proves it. "stopped": neither is
-        known.
+        "solved": silence keeps at least half its margin, and the neuron, run on the patterns, fires within 1e-6 ms of
+        every target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion where theta_0 is
+        not 0.3 mV). Unless the search ended early (`reason_`), no weights that keep the whole margin have an objective
+        smaller by more than `tolerance` of it, or by more than 1e-10 of what B is without weights. "infeasible":
+        `certificate_` proves it. "stopped": neither is known.
     weights_ : float64, shape (trains,), mV
         The best so far where stopped; NaN where infeasible.
     objective_ : float
@@ -146,20 +156,21 @@ class ConeX(SpikeLearner):
         Its terms: l1, l2, B.
     gap_ : float
         How far, relative to it, the objective can lie above the least one over all weights that keep the whole margin:
-        a proven bound, whatever the engine said. (In continuous time these weights keep `margin_`, a little less.)
+        a proven bound, independent of the engine. (In continuous time these weights keep `margin_`, a little less.)
     margin_ : Margin
-        The margin that holds, at least half of what was asked for (`problem_.margin`); on the grid, as `mv`, the least
+        The margin that holds, at least half of that of the problem (`problem_.margin`); on the grid, as `mv`, the least
         threshold - potential over the silent points.
     reason_ : str or None
-        Why, where stopped: what is not met, with its pattern and time.
+        Where stopped: the row that is violated or the spike that is wrong, with its pattern and time. Where solved:
+        None, or why `gap_` is above `tolerance`: `max_seconds` or Ctrl-C ended the search, or rounding did.
     violation_ : float, mV
         How far the worst row is broken: targets missed, silence with half its margin.
     engine_ : {"native", "cone solver"}
-        What closed the gap: taxel's own engine, or row generation around Clarabel where the own one did not.
+        Which engine closed the gap: taxel's own, or row generation around Clarabel where the own one did not.
     certificate_ : Certificate or None
         The proof, where infeasible.
     problem_ : ConeXProblem
-        The problem, which states its rows when asked.
+        The problem, which states its rows one by one.
     rounds_ : int
         Rounds of row generation.
     held_ : list of (Row, float)
@@ -248,7 +259,7 @@ class ConeX(SpikeLearner):
         Raises
         ------
         ProblemError : patterns or targets that make no sense (names pattern and target)
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the best so far is kept, `status_` is "stopped"
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         if progress is not None:
             callback("progress", progress)
@@ -284,6 +295,15 @@ class ConeX(SpikeLearner):
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
         """Return the output spikes of the trained neuron, one array a pattern, ms.
 
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains as in `fit`.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
+
         Raises
         ------
         ProblemError : patterns that make no sense
@@ -293,7 +313,15 @@ class ConeX(SpikeLearner):
 
 
 class ConeXProblem:
-    """State the rows of a problem when asked, by pattern and time; never all of them at once.
+    """State the rows of a problem one by one, by pattern and time; never all of them at once.
+
+    Parameters
+    ----------
+    cone : ConeX
+        The learner whose parameters state the problem.
+    patterns : sequence of SpikeTrains
+    targets : sequence of float sequences, ms
+        As in `ConeX.fit`.
 
     Attributes
     ----------
@@ -302,6 +330,18 @@ class ConeXProblem:
         One array a pattern.
     margin : Margin
         How far below the threshold its rows keep silence.
+
+    Raises
+    ------
+    ProblemError : as `ConeX.fit`
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[5.0], [12.0]], stop=60.0)
+    >>> problem = ConeXProblem(ConeX(), [trains], [[20.0]])
+    >>> coefficients, threshold = problem.target(0, 0)
+    >>> coefficients.round(3), threshold
+    (array([0.368, 0.313]), 0.3)
     """
 
     def __init__(self, cone: ConeX, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
@@ -357,11 +397,11 @@ class ConeXProblem:
         return self._problem.row(name, flag("margin", margin))
 
     def target(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
-        """State what a target asks (6.9a): the coefficients of the potential there, which equals the threshold.
+        """State the row of a target (6.9a): the coefficients of the potential there, which equals the threshold.
 
         Parameters
         ----------
-        pattern, target : int
+        pattern, target : int, 0 or more
 
         Returns
         -------
@@ -375,11 +415,11 @@ class ConeXProblem:
         return self.row(("target", pattern, whole("target", target, 0)))
 
     def silence(self, pattern: int, t: float, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
-        """State what silence asks at a time (6.9b): coefficients of the potential, and what it must not exceed.
+        """State the row of silence at a time (6.9b): coefficients of the potential, and its limit.
 
         Parameters
         ----------
-        pattern : int
+        pattern : int, 0 or more
         t : float, ms
         margin : bool
             False: with margin 0.
@@ -392,16 +432,23 @@ class ConeXProblem:
 
         Raises
         ------
-        ProblemError : a time at which nothing is asked
+        ProblemError : a time at which silence is not required
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[5.0], [12.0]], stop=60.0)
+        >>> coefficients, limit = ConeXProblem(ConeX(), [trains], [[20.0]]).silence(0, 50.0)
+        >>> coefficients.round(3), round(limit, 3)
+        (array([0.149, 0.201]), 0.38)
         """
         return self.row(("silence", pattern, t), margin=margin)
 
     def slope(self, pattern: int, target: int, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
-        """State how the potential comes up to a target from below (continuous time only).
+        """State the row of the slope at a target, where the potential rises to the threshold (continuous time only).
 
         Parameters
         ----------
-        pattern, target : int
+        pattern, target : int, 0 or more
         margin : bool
             False: with slope 0.
 
@@ -419,11 +466,11 @@ class ConeXProblem:
         return self.row(("slope", pattern, whole("target", target, 0)), margin=margin)
 
     def behind(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
-        """State what B looks at behind a target (6.10): the coefficients of the potential, and what it shall reach.
+        """State the row of B behind a target (6.10): the coefficients of the potential, and the value that it aims at.
 
         Parameters
         ----------
-        pattern, target : int
+        pattern, target : int, 0 or more
 
         Returns
         -------

@@ -19,15 +19,24 @@ class FILT(INST):
 
     Parameters
     ----------
+    eta : float, above 0, optional
+    initial : (float, float), mV, optional
+    epochs : int, 1 or more
+    updates : {"batch", "pattern"}
+    tau, tau_s, theta_0 : float, ms and mV, above 0
+    after_spike : {"subtract", "membrane", "reset"}
+    step_ms, within_ms : float, ms, above 0
+    until_right : bool
+    seed : int, 0 or more
+    max_seconds : float, s, above 0, optional
+        All up to here as in `INST`.
     tau_q : float, ms, above 0
         Time constant of the filter (†).
-    eta, initial, epochs, updates, tau, tau_s, theta_0, after_spike, step_ms, within_ms, until_right, seed, max_seconds
-        As in `INST`.
 
     Attributes
     ----------
     weights_, right_, epochs_, best_epoch_, status_, neuron_
-        What was learnt, as `INST` has it.
+        As in `INST`.
 
     Raises
     ------

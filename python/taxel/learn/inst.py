@@ -24,7 +24,7 @@ class INST(EpochLearner):
         Learning rate, weight a unit of `change`; ``600 / (trains * targets of all patterns)`` where left out (†).
     initial : (float, float), mV, optional
         First weights are drawn evenly between these two; ``(0, 200 / trains)`` where left out (†).
-    epochs : int
+    epochs : int, 1 or more
         Epochs at most (†).
     updates : {"batch", "pattern"}
         Whether weights change once an epoch (†), or after each pattern in an order drawn anew.
@@ -37,24 +37,24 @@ class INST(EpochLearner):
         What an output spike does: the potential falls by ``theta_0 exp(-s/tau)`` (†); it is put to 0 and currents go on
         (leaky integrate and fire); or all inputs up to the spike are lost.
     step_ms : float, ms, above 0
-        The neuron is looked at every so often; inputs keep their true times.
+        Time between two comparisons of potential and threshold; inputs keep their true times.
     within_ms : float, ms, above 0
         A pattern is right where it has one output spike a target, each within this of its own.
     until_right : bool
         Whether to end as soon as every pattern is right.
     seed : int, 0 or more
-        Of the first weights and the order of patterns.
+        Seed of the first weights and of the order of patterns.
     max_seconds : float, s, above 0, optional
         Ends the training with the best weights so far.
 
     Attributes
     ----------
     weights_ : float64, shape (trains,), mV
-        Those with most patterns right, the latest such.
+        The weights with most patterns right; the latest of several.
     right_ : float64, shape (epochs done + 1,)
         The share of patterns right after 0, 1, 2 ... epochs.
     epochs_, best_epoch_ : int
-        Epochs done; after how many the weights were those.
+        Epochs done, and the epoch after which `weights_` held.
     status_ : {"right", "epochs", "stopped"}
         Every pattern was right; all epochs were used up; Ctrl-C or `max_seconds`.
     neuron_ : Neuron or None

@@ -25,17 +25,28 @@ _DEFAULT = defaults("online_cone_r")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class OnlineConeR(ConeR):
-    """Learn weights by CONE-R as patterns arrive: one comes into a sliding window, the oldest leaves it.
+    """Learn weights by CONE-R as patterns arrive: each is added to a sliding window, which the oldest leaves.
 
     After each pattern the weights are those of a fit to the whole window, to the same proven gap, in a fraction of its
     time: rows are laid out once, and the solver starts from the fit before.
 
     Parameters
     ----------
+    neuron : Neuron, optional
+    kappa : float, above 0
+    delta_t_ms : float, ms, 0 or more, optional
+    lambdas : five floats, 0 or more
+    lb, ub : float, or float sequence of shape (trains,), mV
+    divide_b_by : {"B_max", "targets"}
+    norm : {"norm", "square"}
+    margin : float, mV, 0 or more
+    horizon : float, ms, optional
+    tolerance : float, from 1e-10 to 0.1
+    engine : {"native", "cone solver"}
+    max_seconds : float, s, above 0, optional
+        All up to here as in `ConeR`.
     window : int, 1 or more
-        How many patterns it holds.
-    neuron, kappa, delta_t_ms, lambdas, lb, ub, divide_b_by, norm, margin, horizon, tolerance, engine, max_seconds
-        As in `ConeR`.
+        How many patterns the window holds.
 
     Attributes
     ----------
@@ -71,13 +82,13 @@ class OnlineConeR(ConeR):
 
     patterns_: int = field(init=False)
 
-    #: What the window was begun with and holds, for a copy or a pickle to lay out again.
+    #: Parameters and patterns of the window, from which a copy or a pickle is built.
     _begun: str = field(init=False)
     _held: deque[tuple[Any, Any]] = field(init=False)
     _stream: _core.OnlineConeR = field(init=False)
 
     def partial_fit(self, pattern: SpikeTrains, targets: ArrayLike) -> Self:
-        """Take one more pattern into the window, and fit the weights to what it holds then.
+        """Add a pattern to the window, and fit the weights to all patterns that the window then holds.
 
         Parameters
         ----------
@@ -95,13 +106,14 @@ class OnlineConeR(ConeR):
         ------
         ProblemError : a pattern or targets that make no sense (names them, counted from the first that ever came); the
             window is then as before
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the pattern is in the window, the best so far is kept
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the pattern is in the window, the weights are the
+            best so far
 
         Warns
         -----
         UserWarning : as `ConeR.fit`
         """
-        with self._alone():
+        with self._locked():
             if not hasattr(self, "_stream"):
                 self._begin()
             self._add(pattern, targets, "pattern", "targets")
@@ -115,14 +127,16 @@ class OnlineConeR(ConeR):
         start: ConeR | ArrayLike | None = None,
         progress: Callable[[int, int, float, float], object] | None = None,
     ) -> Self:
-        """Forget all that came, take these patterns into the window (the last of them stay), and fit once.
+        """Empty the window, add these patterns (the last of them stay), and fit once.
 
         Parameters
         ----------
-        patterns, targets
+        patterns : sequence of SpikeTrains
+        targets : sequence of float sequences, ms
             As in `ConeR.fit`.
-        start, progress
-            Not for a window: it starts from its own last fit.
+        start : ConeR, or float64 of shape (trains,), mV, refused
+        progress : function, refused
+            A window starts from its own last fit, and reports no rounds.
 
         Returns
         -------
@@ -137,18 +151,18 @@ class OnlineConeR(ConeR):
             raise ProblemError("start: a window starts from its own last fit")
         if progress is not None:
             callback("progress", progress)
-            raise ProblemError("progress: a window tells none")
+            raise ProblemError("progress: a window reports none")
         trains, times = several("patterns", patterns), several("targets", targets)
         if len(trains) != len(times) or not trains:
             raise ProblemError(f"targets: {len(times)} lists for {len(trains)} patterns, must be one a pattern")
-        with self._alone():
+        with self._locked():
             self._begin()
             for p, (pattern, wanted) in enumerate(zip(trains, times, strict=True)):
                 self._add(pattern, wanted, f"pattern {p}", f"targets of pattern {p}")
             return self._fit()
 
-    def _alone(self) -> Lock:
-        """Return what lets one thread in: a window and what is told of its last fit belong together."""
+    def _locked(self) -> Lock:
+        """Return the lock of this learner: its window and the attributes of its last fit change together."""
         lock: Lock = vars(self).setdefault("_lock", Lock())
         return lock
 

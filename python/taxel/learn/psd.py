@@ -19,25 +19,38 @@ class PSD(EpochLearner):
 
     Parameters
     ----------
-    tau, tau_1, tau_2 : float, ms, above 0
-        Membrane; slow and fast time constant of the current ``V0 (exp(-s/tau_1) - exp(-s/tau_2))``, peak 1, which the
-        membrane filters once more, over 1 MOhm (‡).
+    eta : float, above 0
+        Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
+    initial : (float, float), mV
+        First weights are drawn evenly between these two.
+    epochs : int, 1 or more
+        Epochs at most.
+    updates : {"batch", "pattern"}
+        Whether weights change once an epoch, or after each pattern in an order drawn anew.
+    tau : float, ms, above 0
+        Membrane (‡).
     tau_s : float, ms, above 0 and below `tau`, optional
         Where given, the neuron is that of `INST`, driven by a current ``exp(-s/tau_s)`` whose potential peaks at 1 mV,
         and the rule's current serves the rule alone.
-    eta, initial, epochs, updates, theta_0
-        Training and threshold, as in `INST`; none has a default.
+    theta_0 : float, mV, above 0
+        Threshold; has no default.
     after_spike : {"subtract", "membrane", "reset"}
         As in `INST`; leaky integrate and fire ("membrane") was used.
+    step_ms, within_ms : float, ms, above 0
+    until_right : bool
+    seed : int, 0 or more
+    max_seconds : float, s, above 0, optional
+        As in `INST`, from `step_ms` on.
+    tau_1, tau_2 : float, ms, above 0
+        Slow and fast time constant of the current ``V0 (exp(-s/tau_1) - exp(-s/tau_2))``, peak 1, which the membrane
+        filters once more, over 1 MOhm (‡).
     refractory : float, ms, 0 or more
         How long the membrane stays at 0 after a spike; with "membrane" alone.
-    step_ms, within_ms, until_right, seed, max_seconds
-        As in `INST`.
 
     Attributes
     ----------
     weights_, right_, epochs_, best_epoch_, status_, neuron_
-        What was learnt, as `INST` has it.
+        As in `INST`.
 
     Raises
     ------

@@ -54,7 +54,7 @@ class SKIM(BatchLearner):
     within_ms : float, ms, above 0
         A target is found where an output spike lies within this of it; 50 as in 6.5.2.
     seed : int, 0 or more
-        Of fixed weights and delays.
+        Seed of the fixed weights and delays.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class SKIM(BatchLearner):
     rows_ : int
         Rows of the least-squares problem.
     threshold_ : float
-        The one with the fewest missed and false spikes on the training patterns; the lowest of several.
+        The threshold with the fewest missed and false spikes on the training patterns; the lowest of several.
     scores_ : list of (threshold, found, missed, false)
         Of each threshold, on the training patterns.
 
@@ -141,6 +141,15 @@ class SKIM(BatchLearner):
     def rows(self, pattern: SpikeTrains) -> NDArray[np.float64]:
         """Return the rows of the least-squares problem that a pattern gives, shape (times, branches or trains).
 
+        Parameters
+        ----------
+        pattern : SpikeTrains
+
+        Returns
+        -------
+        float64, shape (times, branches or trains)
+            A row every `step_ms` from the start of the pattern on.
+
         Raises
         ------
         ProblemError : a pattern that makes no sense
@@ -152,10 +161,24 @@ class SKIM(BatchLearner):
     def output(self, pattern: SpikeTrains) -> NDArray[np.float64]:
         """Return the output at ``start + k * step_ms``.
 
+        Parameters
+        ----------
+        pattern : SpikeTrains
+
+        Returns
+        -------
+        float64, shape (times,)
+
         Raises
         ------
         ProblemError : a pattern that makes no sense
         NotFittedError : before `fit`
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[float(t)] for t in range(0, 120, 3)], stop=200.0)
+        >>> int(SKIM(tau=8.0).fit([trains], [[60.0]]).output(trains).argmax())
+        63
         """
         return _core.output_skim(self._json(), self._fitted(), instance("pattern", pattern, SpikeTrains)._parts())
 
@@ -165,8 +188,12 @@ class SKIM(BatchLearner):
         Parameters
         ----------
         patterns : sequence of SpikeTrains
-        threshold : float, optional
+        threshold : float, in units of the output, at most 1 at a target, optional
             `threshold_` where left out.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
 
         Raises
         ------

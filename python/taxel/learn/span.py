@@ -19,19 +19,32 @@ class SPAN(EpochLearner):
 
     Parameters
     ----------
-    tau_a : float, ms, above 0
-        Time constant of the filter; has no default.
-    eta, initial, epochs, updates, tau, tau_s, theta_0
-        Training and neuron, as in `INST`; none has a default.
+    eta : float, above 0
+        Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
+    initial : (float, float), mV
+        First weights are drawn evenly between these two.
+    epochs : int, 1 or more
+        Epochs at most.
+    updates : {"batch", "pattern"}
+        Whether weights change once an epoch, or after each pattern in an order drawn anew.
+    tau, tau_s : float, ms, above 0
+        Membrane and synapse, as in `INST`; neither has a default.
+    theta_0 : float, mV, above 0
+        Threshold; has no default.
     after_spike : {"subtract", "membrane", "reset"}
         As in `INST`; leaky integrate and fire ("membrane") was used.
-    step_ms, within_ms, until_right, seed, max_seconds
-        As in `INST`.
+    step_ms, within_ms : float, ms, above 0
+    until_right : bool
+    seed : int, 0 or more
+    max_seconds : float, s, above 0, optional
+        As in `INST`, from `step_ms` on.
+    tau_a : float, ms, above 0
+        Time constant of the filter; has no default.
 
     Attributes
     ----------
     weights_, right_, epochs_, best_epoch_, status_, neuron_
-        What was learnt, as `INST` has it.
+        As in `INST`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""STDP: a neuron that finds a pattern which repeats in its inputs, without being told."""
+"""STDP: a neuron that finds a pattern which repeats in its inputs, without labels or targets."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _DEFAULT = defaults("stdp")
 class STDP(SpikeLearner):
     """Let spike-timing-dependent plasticity shape weights from 0 to 1, until the neuron fires where a pattern repeats.
 
-    Nobody tells it that there is a pattern, when it comes, or how long it is.
+    It learns without labels: neither that there is a pattern, nor when it comes, nor how long it is, is an input.
 
     Parameters
     ----------
@@ -100,8 +100,8 @@ class STDP(SpikeLearner):
         ----------
         patterns : sequence of SpikeTrains
             The same trains in all.
-        targets : not looked at
-            Nobody tells it anything; so that it stands in a pipeline of scikit-learn's.
+        targets : object, optional
+            Not read; pipelines of scikit-learn pass it.
 
         Returns
         -------
@@ -111,7 +111,7 @@ class STDP(SpikeLearner):
         Raises
         ------
         ProblemError : no patterns, or one that makes no sense (names it)
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; what was learnt until then is kept
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; what was learnt until then stays
         """
         given = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
         if not given:
@@ -119,7 +119,7 @@ class STDP(SpikeLearner):
         self._neuron = _core.STDP(self._json(), len(given[0]))
         for one in given:
             self._neuron.rest()
-            self._take(one)
+            self._learn(one)
         return self
 
     def partial_fit(self, piece: SpikeTrains) -> Self:
@@ -137,18 +137,36 @@ class STDP(SpikeLearner):
 
         Raises
         ------
-        ProblemError : another number of trains, or a piece that begins before the last one's end; nothing is then taken
+        ProblemError : another number of trains, or a piece that begins before the last one's end; nothing then changes
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
+
+        Examples
+        --------
+        >>> stdp = STDP(threshold=0.9)
+        >>> for start in (0.0, 100.0):
+        ...     piece = SpikeTrains.from_lists([[start + 10.0], [start + 10.0]], start=start, stop=start + 100.0)
+        ...     stdp = stdp.partial_fit(piece)
+        >>> stdp.spikes_.round(2), stdp.weights_.round(3)
+        (array([112.71]), array([0.526, 0.526]))
         """
         instance("piece", piece, SpikeTrains)
         if not hasattr(self, "_neuron"):
             self._neuron = _core.STDP(self._json(), len(piece))
             if hasattr(self, "weights_"):
                 self._neuron.set_weights(self._fitted())
-        return self._take(piece)
+        return self._learn(piece)
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
         """Return when the neuron fires with the weights as they are, one array a pattern, each begun at rest; ms.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains as in `fit`.
+
+        Returns
+        -------
+        list of float64, shape (spikes,), ms
 
         Raises
         ------
@@ -157,14 +175,14 @@ class STDP(SpikeLearner):
         """
         weights = self._fitted()
         given = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
-        said = []
+        fired = []
         for one in given:
             neuron = _core.STDP(self._json(), len(weights))
             neuron.set_weights(weights)
-            said.append(neuron.push(one._parts(), False))
-        return said
+            fired.append(neuron.push(one._parts(), False))
+        return fired
 
-    def _take(self, piece: SpikeTrains) -> Self:
+    def _learn(self, piece: SpikeTrains) -> Self:
         try:
             self.spikes_ = self._neuron.push(piece._parts(), True)
         finally:

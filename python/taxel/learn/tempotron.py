@@ -1,4 +1,4 @@
-"""Tempotron: to fire on some patterns and not on others, at whatever time."""
+"""Tempotron: a neuron that fires on some patterns and not on others, at whatever time."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ class Tempotron(Learner):
         How much of the last change the next one carries on, from error to error (†).
     initial_sd : float, 0 or more
         First weights are drawn normally around 0, this wide (†).
-    epochs : int
+    epochs : int, 1 or more
         Epochs at most.
     seed : int, 0 or more
-        Of the first weights and the order of patterns.
+        Seed of the first weights and of the order of patterns.
     max_seconds : float, s, above 0, optional
         Ends the training with the best weights so far.
 
     Attributes
     ----------
     weights_ : float64, shape (trains,)
-        Those after the epoch with fewest errors, the latest such.
+        The weights after the epoch with fewest errors; the latest of several.
     right_ : float64, shape (epochs done,)
         The share of patterns right as they were presented, epoch by epoch.
     epochs_, best_epoch_ : int
-        Epochs done; after how many the weights were those.
+        Epochs done, and the epoch after which `weights_` held.
     status_ : {"right", "epochs", "stopped"}
         An epoch had no error; all epochs were used up; Ctrl-C or `max_seconds`.
 
@@ -112,8 +112,9 @@ class Tempotron(Learner):
         ----------
         patterns : sequence of SpikeTrains
             The same trains in each; signed ones split into ON and OFF.
-        labels : bool, shape (patterns,)
-        start : float64, shape (trains,), optional
+        labels : bool, shape (patterns,), one or more
+            Whether the neuron shall fire.
+        start : float64, shape (trains,), in thresholds of 1 mV, optional
             First weights, instead of drawn ones.
         progress : function of (epochs done, share of patterns right), optional
             Called after each epoch; what it raises ends the training.
@@ -126,7 +127,7 @@ class Tempotron(Learner):
         Raises
         ------
         ProblemError : patterns, labels or first weights that make no sense
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the best weights so far are kept
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         given = enumerate(several("patterns", patterns))
         trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in given]
@@ -140,6 +141,15 @@ class Tempotron(Learner):
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.bool_]:
         """Return whether the trained neuron fires, pattern by pattern.
 
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains in each.
+
+        Returns
+        -------
+        bool, shape (patterns,)
+
         Raises
         ------
         ProblemError : patterns that make no sense
@@ -149,7 +159,18 @@ class Tempotron(Learner):
         return np.array([np.isfinite(self.peak(weights, s)[2]) for s in several("patterns", patterns)], dtype=bool)
 
     def score(self, patterns: Sequence[SpikeTrains], labels: ArrayLike) -> float:
-        """Return the share of patterns on which the trained neuron does what the label says.
+        """Return the share of patterns on which the trained neuron agrees with the label.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains in each.
+        labels : bool, shape (patterns,), one or more
+            Whether the neuron shall fire.
+
+        Returns
+        -------
+        float, from 0 to 1
 
         Raises
         ------
@@ -162,33 +183,47 @@ class Tempotron(Learner):
         return float(np.mean(fired == np.array(wanted)))
 
     def peak(self, weights: ArrayLike, pattern: SpikeTrains) -> tuple[float, float, float]:
-        """Return the largest potential, its time and the time of the output spike, infinite without one; ms.
+        """Return the largest potential, its time, and the time of the output spike.
 
         Parameters
         ----------
-        weights : float64, shape (trains,)
+        weights : float64, shape (trains,), mV
         pattern : SpikeTrains
+
+        Returns
+        -------
+        potential : float, mV
+        time : float, ms
+        spike : float, ms
+            Infinite where the neuron does not fire.
 
         Raises
         ------
         ProblemError : weights or a pattern that make no sense
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[10.0], [20.0]], stop=60.0)
+        >>> [round(value, 3) for value in Tempotron().peak([0.5, 0.25], trains)]
+        [0.614, 24.05, inf]
         """
         trains = instance("pattern", pattern, SpikeTrains)._parts()
         return _core.peak_tempotron(self._json(), floats("weights", weights), trains)
 
     def change(self, weights: ArrayLike, pattern: SpikeTrains, label: bool) -> NDArray[np.float64]:
-        """Return what one presentation asks of the weights, over the learning rate: 0 where the neuron is right.
+        """Return the change of the weights by one presentation, over the learning rate: 0 where the neuron is right.
 
         Parameters
         ----------
-        weights : float64, shape (trains,)
+        weights : float64, shape (trains,), mV
         pattern : SpikeTrains
         label : bool
+            Whether the neuron shall fire.
 
         Returns
         -------
         float64, shape (trains,)
-            The potential that each input makes at the peak: taken off where a spike is false, added where one is
+            The potential that each input makes at the peak: negative where a spike is false, positive where one is
             missed.
 
         Raises

@@ -1,11 +1,15 @@
 """From a board's datagrams to detections, while they come, and what a browser is shown of them."""
 
+import warnings
+from typing import Any
+
+from taxel.detections import Detection
 from taxel.live.bridge import Bridge
 from taxel.live.client import PanelClient
 from taxel.live.live import Live
 from taxel.live.panel import Panel
 from taxel.live.remote import Remote
-from taxel.live.said import Said, heard
+from taxel.live.said import heard
 from taxel.live.sending import PORT, send
 from taxel.live.source import Source
 from taxel.live.summary import Summary
@@ -19,7 +23,6 @@ __all__ = [
     "Panel",
     "PanelClient",
     "Remote",
-    "Said",
     "Source",
     "Summary",
     "Viewer",
@@ -27,3 +30,11 @@ __all__ = [
     "heard",
     "send",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Return what had another name until version 0.1."""
+    if name == "Said":
+        warnings.warn("taxel.live.Said is taxel.Detection now", DeprecationWarning, stacklevel=2)
+        return Detection
+    raise AttributeError(f"module 'taxel.live' has no attribute {name!r}")

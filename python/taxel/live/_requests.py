@@ -80,7 +80,7 @@ def _reasons() -> Iterator[None]:
 class RequestHandler:
     """Handle the requests of a panel's server, which calls from several threads at a time.
 
-    What a method raises is the reason that the client is told.
+    The text of an exception is the reason that the client shows.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class RequestHandler:
         with _reasons():
             labels = Labels(table)
         name = labels.named(recording)
-        return [(row.label, row.t_us) for row in labels.rows if row.recording == name]
+        return [(row.text, row.t or 0) for row in labels.rows if row.recording == name]
 
     def write_labels(self, table: Path, rows: Sequence[tuple[str, int]]) -> None:
         """Write a table of labels."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -12,7 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.live.client import Curves, Detection, Item, Note, Picture, Spikes, Subject
+from taxel.detections import Detection
+from taxel.labels import Note
+from taxel.live.client import Curves, Item, Picture, Spikes, Subject
 
 __all__ = ["ToFoxglove"]
 
@@ -135,8 +138,9 @@ class ToFoxglove:
                         self._row("/spikes", t[0], encoder=item.encoder, train=train.tolist(), value=value.tolist())
             case Detection():
                 when = {"known_us": item.known, "said_us": item.said, "latency_us": item.latency}
-                self._row("/detections", item.t, label=item.label, **when, slope=item.slope)
-            case Note():
+                slope = None if math.isnan(item.slope) else item.slope
+                self._row("/detections", item.t, label=item.label, **when, slope=slope)
+            case Note() if item.t is not None:
                 level = self._messages.LogLevel.Info
                 note = self._messages.Log(timestamp=self._stamp(item.t), level=level, message=item.text, name="note")
                 self._notes.log(note, log_time=_ns(item.t))

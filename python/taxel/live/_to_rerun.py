@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from taxel.detections import Detection
+from taxel.labels import Note
 from taxel.live._external_viewer import Disconnected
-from taxel.live.client import Curves, Detection, Item, Note, Picture, Spikes, Subject
+from taxel.live.client import Curves, Item, Picture, Spikes, Subject
 from taxel.spikes import to_ms
 
 __all__ = ["ToRerun"]
@@ -91,7 +93,7 @@ class ToRerun:
                 self._stream.log("detections", self._rerun.TextLog(_described(item), level="INFO"))
                 if item.latency is not None:
                     self._stream.log("latency_ms", self._rerun.Scalars(to_ms(item.latency)))
-            case Note():
+            case Note() if item.t is not None:
                 self._at(item.t)
                 self._stream.log("notes", self._rerun.TextLog(item.text, level="INFO"))
 

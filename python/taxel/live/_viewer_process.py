@@ -16,9 +16,11 @@ from collections import Counter, deque
 from typing import Any
 
 from taxel._core import Error
+from taxel.detections import Detection
 from taxel.encode import Encoder
+from taxel.labels import Note
 from taxel.live._external_viewer import Disconnected, ExternalViewer
-from taxel.live.client import Item, PanelClient, Picture, Subject
+from taxel.live.client import Curves, Item, PanelClient, Picture, Spikes, Subject
 
 __all__ = ["BoundedQueue", "main"]
 
@@ -56,7 +58,8 @@ class BoundedQueue:
             if isinstance(item, Picture) == pictures:
                 del self._items[n]
                 self._pictures -= pictures
-                self.lost[item.kind] += item.count
+                kind, number = _kind_and_count(item)
+                self.lost[kind] += number
                 return
 
     def take_all(self, timeout: float) -> list[tuple[Subject, Item]]:
@@ -160,10 +163,26 @@ class Relay:
             time.sleep(_LOOK_EVERY_S)
 
 
+def _kind_and_count(item: Item) -> tuple[str, int]:
+    """Return what counts of a viewer call an item, and for how many it counts."""
+    match item:
+        case Picture():
+            return "pictures", 1
+        case Curves():
+            return "curves", len(item.t)
+        case Spikes():
+            return "spikes", len(item.t)
+        case Detection():
+            return "detections", 1
+        case Note():
+            return "notes", 1
+
+
 def _counted(items: list[tuple[Subject, Item]]) -> Counter[str]:
     count: Counter[str] = Counter()
     for _, item in items:
-        count[item.kind] += item.count
+        kind, number = _kind_and_count(item)
+        count[kind] += number
     return count
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import struct
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
@@ -17,13 +18,15 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, number, shown, text
 from taxel._core import ProblemError
+from taxel.detections import Detection
 from taxel.encode import Encoder
+from taxel.labels import Note
 from taxel.spikes import to_us
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
 
-__all__ = ["Curves", "Detection", "Item", "Note", "PanelClient", "Picture", "Spikes", "Subject"]
+__all__ = ["Curves", "Item", "PanelClient", "Picture", "Spikes", "Subject"]
 
 #: Pressure of a taxel without any event so far, and time of a picture before the first event.
 _UNKNOWN, _NO_TIME = 65_535, -(2**63)
@@ -79,8 +82,6 @@ class Picture:
         The largest value above rest, and the largest change either way, of the last 10 s; 1 at least.
     """
 
-    kind: ClassVar[str] = "pictures"
-    count: ClassVar[int] = 1
     t: int
     above: NDArray[np.uint16]
     known: NDArray[np.bool_]
@@ -102,17 +103,11 @@ class Curves:
         Column and row of the centre; NaN where nothing is pressed.
     """
 
-    kind: ClassVar[str] = "curves"
     t: NDArray[np.int64]
     force: NDArray[np.uint32]
     area: NDArray[np.uint32]
     x: NDArray[np.float32]
     y: NDArray[np.float32]
-
-    @property
-    def count(self) -> int:
-        """How many times."""
-        return len(self.t)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,57 +124,11 @@ class Spikes:
         How many more there were than the server sends at once.
     """
 
-    kind: ClassVar[str] = "spikes"
     encoder: str
     t: NDArray[np.int64]
     train: NDArray[np.int64]
     value: NDArray[np.float64]
     left_out: int
-
-    @property
-    def count(self) -> int:
-        """How many spikes."""
-        return len(self.t)
-
-
-@dataclass(frozen=True)
-class Detection:
-    """Hold a detection of a readout.
-
-    Attributes
-    ----------
-    label : str
-    t, known : int, us
-        When the event was, and when it could first be detected.
-    said, latency : int or None, us
-        When the detection was reported, and how long after `known`; None in a recording.
-    slope : float or None, mV/ms
-    """
-
-    kind: ClassVar[str] = "detections"
-    count: ClassVar[int] = 1
-    label: str
-    t: int
-    known: int
-    said: int | None = None
-    latency: int | None = None
-    slope: float | None = None
-
-
-@dataclass(frozen=True)
-class Note:
-    """Hold a note or a label of a recording.
-
-    Attributes
-    ----------
-    text : str
-    t : int, us
-    """
-
-    kind: ClassVar[str] = "notes"
-    count: ClassVar[int] = 1
-    text: str
-    t: int
 
 
 Item = Picture | Curves | Spikes | Detection | Note
@@ -331,8 +280,9 @@ class PanelClient:
         elif kind == "registers":
             self._noise_floor = message["values"]["noise_floor"]
         elif kind == "detection" and self._subject is not None:
-            times = message["t_us"], message["known_us"], message["said_us"], message["latency_us"]
-            yield self._subject, Detection(message["label"], *times, message["slope_mv_per_ms"])
+            slope = math.nan if message["slope_mv_per_ms"] is None else message["slope_mv_per_ms"]
+            times = message["t_us"], message["known_us"], slope, message["said_us"]
+            yield self._subject, Detection(message["label"], *times)
         elif kind == "spikes" and self._subject is not None:
             yield self._subject, _spikes(message)
         elif kind == "transport":
@@ -484,4 +434,4 @@ def _spikes(message: dict[str, Any]) -> Spikes:
 
 def _time_of(item: Detection | Note) -> int:
     """Return the time at which an item is yielded: of a detection, when it was known."""
-    return item.known if isinstance(item, Detection) else item.t
+    return item.known if isinstance(item, Detection) else item.t or 0

@@ -116,6 +116,6 @@ class LslOutlet:
         self._clock, self._outlet = lsl.local_clock, lsl.StreamOutlet(about)
 
     def __call__(self, said: Any) -> None:
-        """Send one: a `taxel.live.Said`."""
+        """Send one: a `taxel.Detection`."""
         ago_s = (time.time_ns() - said.said_ns) * 1e-9 + (said.said - said.t) * 1e-6
         self._outlet.push_sample([said.label], self._clock() - ago_s)

@@ -1,51 +1,44 @@
-"""Detections as they come, with the time at which each was reported."""
+"""Detections of a `Live`, with the time of their output."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any
 
-from taxel.detections import Detections
+from taxel._base.arguments import instance, several
+from taxel.detections import Detection, Detections
 
-__all__ = ["Said", "heard"]
+__all__ = ["heard"]
 
 
-class Said(NamedTuple):
-    """Report what was detected, and when: all times but the last in us of the board's clock.
+def heard(said: Sequence[Detection]) -> Detections:
+    """Return detections of a `Live` as columns.
 
-    Attributes
+    Parameters
     ----------
-    label : str
-    t : int, us
-        When the event was: the crossing less the encoder's latency and the trained delay.
-    known : int, us
-        When it could first be known: the end of the board's frame in which the potential crosses.
-    slope : float, mV/ms
-        How steeply the potential crossed its threshold, as a measure of how sure.
-    said : int, us
-        When it was output, by the host's clock less the estimated offset between the clocks.
-    said_ns : int, ns since 1970
-        The same by the host's clock.
-    repaired : bool
-        Whether it may rest on values that states of wire version 2 repaired after a loss.
+    said : sequence of Detection
+
+    Returns
+    -------
+    Detections
+
+    Raises
+    ------
+    ProblemError : something that is no detection
+
+    Examples
+    --------
+    >>> heard([Detection("contact", 1000, 1344)])
+    Detections(1: contact 1; 1000 to 1000 us)
     """
-
-    label: str
-    t: int
-    known: int
-    slope: float
-    said: int
-    said_ns: int
-    repaired: bool = False
-
-
-def heard(said: Sequence[Said]) -> Detections:
-    """Return detections of a `Live` as `Detections`."""
+    said = [instance("said", one, Detection) for one in several("said", said)]
+    times = [one.said for one in said]
+    reported: Any = None if None in times else times
     return Detections._of(
-        [s.label for s in said],
-        [s.t for s in said],
-        [s.known for s in said],
-        [s.slope for s in said],
-        [s.said for s in said],
-        [s.repaired for s in said],
+        [one.label for one in said],
+        [one.t for one in said],
+        [one.known for one in said],
+        [one.slope for one in said],
+        reported,
+        [one.repaired for one in said],
     )

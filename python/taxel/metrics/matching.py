@@ -19,14 +19,19 @@ _DEFAULT = defaults("matching")
 
 
 class Matching(NamedTuple):
-    """Say how spikes met targets, over all patterns.
+    """Hold how spikes match targets, over all patterns.
 
-    Attributes
+    Parameters
     ----------
-    found, missed, false : int
+    found, missed, false : int, 0 or more
         Targets with a spike of their own, targets without, spikes without a target.
-    errors_ms : float64, shape (found,)
+    errors_ms : float64, shape (found,), ms
         Spike minus target; negative is early.
+
+    Examples
+    --------
+    >>> Matching(found=3, missed=1, false=0, errors_ms=np.array([0.1, 0.0, -0.2])).f1
+    0.8571428571428571
     """
 
     found: int
@@ -36,7 +41,7 @@ class Matching(NamedTuple):
 
     @property
     def f1(self) -> float:
-        """Found ones, twice, as a share of targets and spikes; 1 where there is neither."""
+        """Twice the targets found, over targets and spikes together; 1 where there is neither."""
         both = 2 * self.found + self.missed + self.false
         return 2 * self.found / both if both else 1.0
 
@@ -90,7 +95,8 @@ def f1(spikes: Sequence[ArrayLike], targets: Sequence[ArrayLike], *, window_ms: 
 
     Parameters
     ----------
-    spikes, targets, window_ms
+    spikes, targets : sequence of float sequences, ms, ascending
+    window_ms : float, ms, from 0 to 3.6e6
         As in `matching`.
 
     Returns

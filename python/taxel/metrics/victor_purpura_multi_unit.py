@@ -34,7 +34,7 @@ def victor_purpura_multi_unit(a: SpikeTrains, b: SpikeTrains, *, q: float, k: fl
     Notes
     -----
     Aronov (2003), J. Neurosci. Methods 124:175. Exact, as a matching of least cost between the spikes of both patterns,
-    by shortest augmenting paths; only pairs that cost less than 2 are looked at. For n spikes with p such pairs time
+    by shortest augmenting paths; only pairs that cost less than 2 are compared. For n spikes with p such pairs time
     O(n (p + n log n)) at worst, about O(p) where few compete, whatever the number of trains; memory O(n).
 
     Examples

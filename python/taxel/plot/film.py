@@ -105,12 +105,12 @@ def film(
             done = 0
             with writer.saving(figure, str(film), dpi=80):
                 for n, (t, end) in enumerate(zip(times, ends, strict=True)):
-                    assert events.intensity is not None  # asked above
+                    assert events.intensity is not None  # checked above
                     held[index[done:end]] = np.asarray(events.intensity)[done:end]
                     done = end
                     if rest is None:
                         rest = held.copy()
-                    # A taxel that was not heard of before the start is at rest until it speaks.
+                    # A taxel without events before the start is at rest until its first one.
                     rest = np.where(rest == 0, held, rest)
                     image.set_data(np.clip(held - rest, 0, None).reshape(rows, columns))
                     cursor.set_xdata([to_ms(t - begin)] * 2)
@@ -153,8 +153,8 @@ def _stage(events: Events, times: NDArray[np.float64]) -> tuple[Figure, AxesImag
 
 
 def _most(events: Events) -> float:
-    """Return how far the taxels rise, ticks: of those that spoke, above the least that each said."""
-    assert events.intensity is not None  # asked before
+    """Return how far the taxels rise, ticks: of those with events, above the least intensity of each."""
+    assert events.intensity is not None  # checked before
     index = events.array.index(events.x, events.y)
     values = np.asarray(events.intensity, np.float64)
     least = np.full(events.array.rows * events.array.columns, np.inf)

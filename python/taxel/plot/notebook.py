@@ -27,9 +27,23 @@ Drawn = Events | Frames | SpikeTrains | Detections | Recording | Health
 def html(noun: Drawn) -> str:
     """Return a noun's line and a small picture of it as HTML; where there is nothing to draw, the line alone.
 
+    Parameters
+    ----------
+    noun : Events, Frames, SpikeTrains, Detections, Recording or Health
+
+    Returns
+    -------
+    str
+
     Raises
     ------
-    ProblemError : nothing that draws itself
+    ProblemError : another object
+
+    Examples
+    --------
+    >>> import taxel
+    >>> html(taxel.SpikeTrains.from_lists([[1.0, 5.0], [3.0]], stop=10.0)).startswith("<code>SpikeTrains(")
+    True
     """
     line = f"<code>{escape(repr(noun))}</code>"
     # A figure of its own, which no window and no notebook shows a second time.

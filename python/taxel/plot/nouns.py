@@ -30,7 +30,29 @@ def axes(ax: Axes | None, size: tuple[float, float]) -> Axes:
 
 
 def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
-    """Draw spike times to the right (ms), trains upwards; ON and OFF in two colours where spikes are signed."""
+    """Draw spike times to the right (ms), trains upwards; ON and OFF in two colours where spikes are signed.
+
+    Parameters
+    ----------
+    trains : SpikeTrains
+    ax : matplotlib.axes.Axes, optional
+        New axes are made where none are given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ProblemError : no spike trains; no axes of matplotlib
+
+    Examples
+    --------
+    >>> import taxel
+    >>> ax = raster(taxel.SpikeTrains.from_lists([[1.0, 5.0], [3.0]], stop=10.0))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('time (ms)', 'train')
+    """
     instance("trains", trains, SpikeTrains)
     ax = axes(ax, (8, 4))
     times, train = trains.to_numpy()
@@ -47,7 +69,32 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
 
 
 def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) -> Axes:
-    """Draw one picture: the last at or before `at` us, or the one with the largest sum."""
+    """Draw one picture: the last at or before a time, or the one with the largest sum.
+
+    Parameters
+    ----------
+    frames : Frames
+        At least one.
+    at : int, us, optional
+        Of the frames' clock.
+    ax : matplotlib.axes.Axes, optional
+        New axes are made where none are given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ProblemError : no frames, or none in them; no number; no axes of matplotlib
+
+    Examples
+    --------
+    >>> import numpy as np, taxel
+    >>> frames = taxel.Frames(np.arange(12.0).reshape(2, 2, 3), [0, 1500], unit="kPa")
+    >>> pressure_map(frames).get_title(), pressure_map(frames, at=1000).get_title()
+    ('1.500 ms', '0.000 ms')
+    """
     instance("frames", frames, Frames)
     until = None if at is None else number("at", at)
     if not len(frames):
@@ -65,7 +112,28 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
 
 
 def event_picture(events: Events, ax: Axes | None = None) -> Axes:
-    """Draw how often each taxel rose, in one colour, and how often it fell, in another; both together are dark."""
+    """Draw how often each taxel rose, in one colour, and how often it fell, in another; both together are dark.
+
+    Parameters
+    ----------
+    events : Events
+    ax : matplotlib.axes.Axes, optional
+        New axes are made where none are given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ProblemError : no events; no axes of matplotlib
+
+    Examples
+    --------
+    >>> import taxel
+    >>> event_picture(taxel.Events([0, 2500], [1, 1], [0, 0], [True, False], array=taxel.Array(2, 3))).get_title()
+    '2 events, 2.5 ms'
+    """
     instance("events", events, Events)
     ax = axes(ax, (5.6, 4.4))
     picture = np.ones((*events.array.shape, 3))
@@ -75,7 +143,7 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
     most = max(1.0, *(float(count.max()) for count in counts))
     for count, colour, name in zip(counts, (ON, OFF), ("rises", "falls"), strict=True):
         shades = LinearSegmentedColormap.from_list(name, ["white", colour])
-        # The least that is there shows beside taxels that never spoke.
+        # A single event stands out against taxels without any.
         share = np.where(count > 0, 0.15 + 0.85 * count / most, 0.0)
         picture *= shades(share)[..., :3]
         scale = ScalarMappable(Normalize(0, most), shades)
@@ -86,7 +154,29 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
 
 
 def detections(found: Detections, ax: Axes | None = None) -> Axes:
-    """Draw each label's detections as marks over time (s), a row a label."""
+    """Draw each label's detections as marks over time (s), a row a label.
+
+    Parameters
+    ----------
+    found : Detections
+    ax : matplotlib.axes.Axes, optional
+        New axes are made where none are given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ProblemError : no detections; no axes of matplotlib
+
+    Examples
+    --------
+    >>> import taxel
+    >>> ax = detections(taxel.Detections(["contact", "lift"], [1000, 9000], [1200, 9100]))
+    >>> [label.get_text() for label in ax.get_yticklabels()]
+    ['contact', 'lift']
+    """
     instance("found", found, Detections)
     ax = axes(ax, (8, 2.4))
     for row, label in enumerate(found.labels):

@@ -26,7 +26,34 @@ def overview(recording: Recording, figure: None = None) -> Figure: ...
 @overload
 def overview(recording: Recording, figure: F) -> F: ...
 def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBase:
-    """Draw events a second (or the sum of pressure) over time, and the activity of each taxel."""
+    """Draw events a second (or the sum of pressure) over time, and the activity of each taxel.
+
+    Parameters
+    ----------
+    recording : Recording
+    figure : matplotlib.figure.FigureBase, optional
+        A figure, or a part of one, to draw in; a new one is made where none is given.
+
+    Returns
+    -------
+    matplotlib.figure.FigureBase
+
+    Raises
+    ------
+    ProblemError : no recording; no figure of matplotlib
+    FormatError : the recording's file is damaged
+
+    Examples
+    --------
+    >>> import os, tempfile, taxel
+    >>> events = taxel.Events([0, 2500], [1, 1], [0, 0], [True, False], array=taxel.Array(2, 3))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = os.path.join(folder, "touch.npz")
+    ...     lost = taxel.convert(events, path)
+    ...     figure = overview(taxel.open(path))
+    >>> figure.axes[0].get_title(), figure.axes[0].get_ylabel()
+    ('touch.npz', 'events/s')
+    """
     instance("recording", recording, Recording)
 
     if figure is None:
@@ -41,7 +68,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         for on, colour, name in ((True, "#c44e52", "rises"), (False, "#4c72b0", "falls")):
             rate = np.histogram(t[events.p == on], bins)[0] / width
             over.stairs(rate, bins, color=colour, label=name)
-        # From one event a bin on: touches stand beside a tare that is a thousand times louder.
+        # Logarithmic from one event a bin on: a tare has a thousand times more events a second than a touch.
         over.set_yscale("symlog", linthresh=1 / width)
         over.set_ylabel("events/s")
         over.legend(loc="upper right")
@@ -64,7 +91,32 @@ def pressure(frames: Frames, above: float = 0.0, figure: None = None) -> Figure:
 @overload
 def pressure(frames: Frames, above: float = 0.0, *, figure: F) -> F: ...
 def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = None) -> FigureBase:
-    """Draw contact area, peak, sum and centre of pressure over time; taxels that read more than `above` are loaded."""
+    """Draw contact area, peak, sum and centre of pressure over time.
+
+    Parameters
+    ----------
+    frames : Frames
+    above : float, from 0, in the frames' unit
+        Taxels that read more are loaded.
+    figure : matplotlib.figure.FigureBase, optional
+        A figure, or a part of one, to draw in; a new one is made where none is given.
+
+    Returns
+    -------
+    matplotlib.figure.FigureBase
+
+    Raises
+    ------
+    ProblemError : no frames; no finite number; no figure of matplotlib
+
+    Examples
+    --------
+    >>> import numpy as np, taxel
+    >>> array = taxel.Array(2, 3, pitch_mm=2.0)
+    >>> frames = taxel.Frames(np.arange(12.0).reshape(2, 2, 3), [0, 1500], unit="kPa", array=array)
+    >>> [ax.get_ylabel() for ax in pressure(frames).axes]
+    ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
+    """
     instance("frames", frames, Frames)
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
@@ -85,7 +137,31 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
 
 
 def health_map(health: Health, ax: Axes | None = None) -> Axes:
-    """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
+    """Draw the activity of each taxel, with those marked that are dead, stuck or noisy.
+
+    Parameters
+    ----------
+    health : Health
+        As `taxel.recording.health` returns it.
+    ax : matplotlib.axes.Axes, optional
+        New axes are made where none are given.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ProblemError : no health of a recording; no axes of matplotlib
+
+    Examples
+    --------
+    >>> import taxel
+    >>> from taxel.recording import health
+    >>> events = taxel.Events([0, 2500], [1, 1], [0, 0], [True, False], array=taxel.Array(2, 3))
+    >>> health_map(health(events)).get_xlabel()
+    'x (column)'
+    """
     instance("health", health, Health)
     ax = axes(ax, (5, 4.4))
     image = ax.imshow(np.log10(1.0 + health.activity), origin="upper", cmap="Greys", interpolation="nearest")

@@ -6,7 +6,7 @@ from taxel.recording.cut import cut
 from taxel.recording.health import Health, health
 from taxel.recording.kinds import ENDINGS, kind_of_file
 from taxel.recording.merge import merge
-from taxel.recording.notes import BoardChange, Datagrams, Note, Zeroing
+from taxel.recording.notes import BoardChange, Datagrams, Zeroing
 from taxel.recording.opening import open_any, open_recording
 from taxel.recording.recording import Recording
 

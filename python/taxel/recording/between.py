@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._core import ProblemError
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
@@ -16,13 +17,14 @@ __all__ = ["Apart", "between"]
 
 
 def between(of: Contents, start: float, stop: float) -> Contents:
-    """Return the part of ``start <= t < stop`` (us); notes without a time are left out.
+    """Return the part of ``start <= t < stop`` (us); notes without a time are left out, and stand in its `lost`.
 
     What the taxels held at its beginning is known from what came before it. Taxels that were zeroed before it stay so.
     """
     return after(
         "between",
         of,
+        lambda: _without_a_time(of),
         events=once(lambda: None if of.events is None else of.events.between(start, stop)) if of.has_events else None,
         frames=None if of.has_events else once(lambda: None if of.frames is None else of.frames.between(start, stop)),
         stretch=once(lambda: _stretch(of, start, stop)),
@@ -35,6 +37,11 @@ def between(of: Contents, start: float, stop: float) -> Contents:
         ),
         sources=once(lambda: _sources(of, start, stop)),
     )
+
+
+def _without_a_time(of: Contents) -> list[str]:
+    count = sum(note.t is None for note in of.notes)
+    return [f"{count} notes without a time"] * bool(count)
 
 
 class Apart(Mapping[str, Contents]):
@@ -85,11 +92,9 @@ def _held_at(of: Contents, start: float) -> NDArray[np.uint16] | None:
     events = of.events if of.has_events else None
     if events is None or events.intensity is None or events.present is None:
         return of.held
-    before = np.flatnonzero(events.present & (events.t < start))
-    if not len(before):
+    before = events.between(-np.inf, start)
+    if before.present is None or not before.present.any():
         return of.held
-    now = np.full(of.array.shape, UNKNOWN, np.uint16) if of.held is None else of.held.copy()
-    last = before[np.argsort(events.t[before], kind="stable")]
-    # Of values at one place the last one stays.
-    now[events.y[last], events.x[last]] = events.intensity[last]
-    return now
+    begins = np.full(of.array.shape, UNKNOWN, np.uint16) if of.held is None else of.held
+    values = _core.HeldValues(before._parts(), None, begins.astype(np.float32).reshape(-1))
+    return values.at(np.array([before.t.max()])).astype(np.uint16).reshape(of.array.shape)

@@ -10,6 +10,7 @@ from typing import Any, Generic, Self, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -17,7 +18,8 @@ from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.notes import BoardChange, Datagrams, Note, Samples, Zeroing
+from taxel.labels import Note
+from taxel.recording.notes import BoardChange, Datagrams, Samples, Zeroing
 from taxel.wire import Registers
 
 __all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "once", "several"]
@@ -25,7 +27,7 @@ __all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "once",
 T = TypeVar("T")
 
 #: Value of a taxel without any event so far, where files hold what the taxels held.
-UNKNOWN = 65_535
+UNKNOWN = _core.UNKNOWN
 
 
 class Once(Generic[T]):

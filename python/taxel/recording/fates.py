@@ -55,7 +55,7 @@ columns              =      ~      ~      =         =          =         =      
 truncated            =      =      ~      =         =          =         =       ~      ~     -    =    -   =
 rebuilt              =      =      ~      =         =          =         =       ~      ~     -    =    -   =
 sources              ~      -      -      ~         ~          =         =       =      -     -    -    -   -
-lost                 =      ~      ~      ~         =          ~         =       ~      ~     ~    ~    ~   ~
+lost                 ~      ~      ~      ~         =          ~         =       ~      ~     ~    ~    ~   ~
 """
 
 _HEADER, *_ROWS = _TABLE.strip("\n").splitlines()

@@ -17,10 +17,11 @@ from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
+from taxel.labels import Note
 from taxel.recording.contents import UNKNOWN, Contents, anything
 from taxel.recording.fates import after
 from taxel.recording.kinds import verdict_of
-from taxel.recording.notes import Note, Zeroing
+from taxel.recording.notes import Zeroing
 from taxel.recording.recording import Recording
 from taxel.wire import Registers
 

@@ -1,4 +1,4 @@
-"""What stands in a recording beside its events: notes, zeroed taxels, changes of the board, raw bytes and lines."""
+"""What stands in a recording beside its events and notes: zeroed taxels, changes of the board, raw bytes and lines."""
 
 from __future__ import annotations
 
@@ -9,25 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["BoardChange", "Datagrams", "Note", "Samples", "Zeroing"]
-
-
-@dataclass(frozen=True)
-class Note:
-    """Hold what a person wrote down while recording.
-
-    Parameters
-    ----------
-    text : str
-    t : int, us, optional
-        The board's time, where it was known.
-    at_ns : int, ns since 1970
-        The host's time.
-    """
-
-    text: str
-    t: int | None
-    at_ns: int
+__all__ = ["BoardChange", "Datagrams", "Samples", "Zeroing"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +20,7 @@ class Zeroing:
     ----------
     t : int, us
         When: after all events up to then, before later ones.
-    x, y : int
+    x, y : int, taxels
         The taxel's column and row.
     rest : float, ticks
         What it rests at from then on.
@@ -66,10 +48,15 @@ class BoardChange:
     change : str
         "reset": the board was reset, so its taxels hold nothing until their next event. "wire": it speaks another
         version of the wire.
-    version : int or None
+    version : int, 1 or more, or None
         Of the wire from here on.
     asked : bool
         Whether the host asked for that change; else the board's datagrams showed it.
+
+    Examples
+    --------
+    >>> BoardChange(5000, 1_700_000_000_000_000_000, "reset").asked
+    False
     """
 
     t: int | None
@@ -93,11 +80,17 @@ class Datagrams:
     Parameters
     ----------
     arrived_ns : int64, shape (n,), ns since 1970
-    number : uint64, shape (n,)
+    number : uint64, shape (n,), from 0 on
         Our own arrival number: a hole in it is a datagram that was received but is not here.
-    offsets : int64, shape (n + 1,)
+    offsets : int64, shape (n + 1,), bytes
         Where each begins in `payload`, and at last where all end.
-    payload : uint8, shape (bytes,)
+    payload : uint8, shape (bytes,), bytes as received
+
+    Examples
+    --------
+    >>> empty = np.zeros(0, np.int64)
+    >>> len(Datagrams(empty, empty.astype(np.uint64), np.zeros(1, np.int64), np.zeros(0, np.uint8)))
+    0
     """
 
     arrived_ns: NDArray[np.int64]

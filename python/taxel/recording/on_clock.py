@@ -14,9 +14,9 @@ from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.labels import Note
 from taxel.recording.contents import Contents, alone, once
 from taxel.recording.fates import after
-from taxel.recording.notes import Note
 from taxel.recording.read_mcap import ascending
 
 __all__ = ["HOST", "on_clock"]

@@ -18,11 +18,12 @@ from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.labels import Note
 from taxel.recording.between import Apart, between
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
 from taxel.recording.kinds import kind_of_file, verdict_of
-from taxel.recording.notes import BoardChange, Datagrams, Note, Zeroing
+from taxel.recording.notes import BoardChange, Datagrams, Zeroing
 from taxel.recording.on_clock import on_clock
 from taxel.recording.pictures import calibrated, pictures
 from taxel.tare import Tare
@@ -38,6 +39,11 @@ class Recording:
     """Hold a file, opened: everything is read when it is first asked for.
 
     Made by `taxel.open`.
+
+    Parameters
+    ----------
+    contents : Contents
+        What `taxel.open` read.
 
     Attributes
     ----------
@@ -333,16 +339,40 @@ class Recording:
         return dict(self._contents.rebuilt)
 
     def between(self, start: float, stop: float) -> Recording:
-        """Return the part of ``start <= t < stop`` (us of the board's clock); notes without a time are left out.
+        """Return the part of ``start <= t < stop`` (us of the board's clock).
+
+        Notes without a time are left out, and stand in its `lost`.
+
+        Parameters
+        ----------
+        start, stop : float, us
 
         Raises
         ------
         ProblemError : a start that lies after the stop, or is no number
+
+        Examples
+        --------
+        >>> import pathlib, tempfile, taxel
+        >>> place = pathlib.Path(tempfile.mkdtemp()) / "two.npz"
+        >>> events = taxel.Events([0, 192], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+        >>> _ = taxel.convert(events, place)
+        >>> taxel.open(place).between(100, 200)
+        Recording(two.npz: 1 events, 192 to 192 us, 8 x 8 taxels)
         """
         return Recording(between(self._contents, *window("us", start, stop)))
 
     def with_notes(self, notes: Iterable[Note]) -> Recording:
-        """Return the same recording with further notes."""
+        """Return the same recording with further notes.
+
+        Parameters
+        ----------
+        notes : iterable of Note
+
+        Raises
+        ------
+        ProblemError : something that is no `taxel.Note`
+        """
         more = tuple(instance("notes", note, Note) for note in several("notes", notes))
         return Recording(with_notes(self._contents, more))
 

@@ -12,11 +12,11 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.beside import calibration_beside, has_calibration
 from taxel.recording.contents import Contents, once
 from taxel.recording.csv import array_in_csv
 from taxel.recording.fates import after, sensor
 from taxel.recording.kinds import ENDINGS, verdict_of
+from taxel.recording.sidecars import calibration_beside, has_calibration
 from taxel.recording.write_mcap import cut_raw, encoded
 
 __all__ = ["STAMP_US", "is_made", "stored"]
@@ -120,7 +120,7 @@ def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
         changed |= {name: vars(of)[name] for name in stay}
         bad = of.counts.get("lines_that_could_not_be_read", 0)
         lines = [f"{bad} lines that could not be read"] * bool(bad)
-        return after(ending, of, lambda: [*lines, *_left_beside(of, place)], **(common | changed))
+        return after(ending, of, lambda: [*lines, *_mended(of), *_left_beside(of, place)], **(common | changed))
     events = _events(of, place)
     changed |= {"events": once(lambda: events), "frames": None, "payload": None}
     if not is_made(of):
@@ -128,14 +128,19 @@ def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
         changed |= {name: vars(of)[name] for name in same}
         if of.datagrams is None and of.payload is not None:
             changed["datagrams"] = cut_raw(of.payload)
-        return after(ending, of, lambda: _left_beside(of, place), **common, **changed)
+        return after(ending, of, lambda: [*_mended(of), *_left_beside(of, place)], **common, **changed)
     clock = of.clock if of.clock is not None and len(of.clock.board_us) else None
     lost = ["raw datagrams"] * of.holds("datagrams") + ["raw bytes (words that are no events)"] * of.holds("payload")
     origin_us, datagrams, unmarked = encoded(events, of.held, clock)
     lost += [f"that {len(unmarked) - _MOST} of the events are repaired"] * (len(unmarked) > _MOST)
     changed |= {"datagrams": datagrams, "version_2": True, "differences": False, "clock": clock}
     changed |= {"origin_us": origin_us, "unmarked": tuple(unmarked[:_MOST].tolist())}
-    return after(ending, of, lambda: [*lost, *_left_beside(of, place)], **common, **changed)
+    return after(ending, of, lambda: [*lost, *_mended(of), *_left_beside(of, place)], **common, **changed)
+
+
+def _mended(of: Contents) -> list[str]:
+    """Say what a new .mcap, which is whole, states in its verdict alone: that it was made of a damaged file."""
+    return ["that its end is missing"] * of.truncated + ["what reading had to put up with"] * of.holds("rebuilt")
 
 
 def _events(of: Contents, place: Path) -> Events:

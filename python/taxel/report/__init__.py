@@ -1,7 +1,25 @@
 """Pages with pictures, each one file that needs no other."""
 
-from taxel._base.files import write_whole
-from taxel.report.information import write_information
-from taxel.report.listening import Listened, write_listening
+import warnings
+from typing import Any
 
-__all__ = ["Listened", "write_information", "write_listening", "write_whole"]
+from taxel._base.files import write_whole
+from taxel._base.provenance import Sources, installed_sources
+from taxel.detect import Example, Outcome
+from taxel.report.information import write_information
+from taxel.report.listening import write_listening
+
+__all__ = ["Sources", "installed_sources", "write_information", "write_listening", "write_whole"]
+
+
+def __getattr__(name: str) -> Any:
+    """Return what had another name until version 0.1."""
+    if name != "Listened":
+        raise AttributeError(f"module 'taxel.report' has no attribute {name!r}")
+    text = "taxel.report.Listened is taxel.detect.Outcome now, of a taxel.detect.Example"
+    warnings.warn(text, DeprecationWarning, stacklevel=2)
+    return _listened
+
+
+def _listened(name: str, source: Any, found: Any, tare: Any = None, truth: Any = None, score: Any = None) -> Outcome:
+    return Outcome(name, Example(source, truth or {}, tare), found, score)

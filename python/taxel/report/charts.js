@@ -1,5 +1,5 @@
 // Draws the charts of a report. uPlot gives scales, axes, the cursor and what is dragged out; the shapes come from the
-// page's own JSON (charts.py says what it holds) and are painted by hand, since a figure mixes lines, bars and maps.
+// page's own JSON (charts.py makes it) and are painted by hand, since a figure mixes lines, bars and maps.
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const styles = () => getComputedStyle(document.documentElement);
@@ -78,7 +78,7 @@ function logSplits(min, max) {
 }
 
 function axisOf(axis, upright, width) {
-  const said = {
+  const marks = {
     label: axis.label || undefined,
     labelSize: axis.label ? 20 : 0,
     labelFont: FONT,
@@ -94,9 +94,9 @@ function axisOf(axis, upright, width) {
     const names = new Map(axis.names.map(([at, name]) => [at, upright ? folded(name, most) : fitted(name, lean ? 110 : 200)]));
     measure.font = FONT;
     const widest = Math.max(0, ...[...names.values()].flatMap((name) => name.split("\n")).map((name) => measure.measureText(name).width));
-    said.splits = (u, k, min, max) => axis.names.map(([at]) => at).filter((at) => at >= min && at <= max);
-    // Of names that would stand in one another the first is said.
-    said.values = (u, splits) => {
+    marks.splits = (u, k, min, max) => axis.names.map(([at]) => at).filter((at) => at >= min && at <= max);
+    // Of names that would overlap the first is shown.
+    marks.values = (u, splits) => {
       let last = null;
       return splits.map((at) => {
         const name = names.get(at) ?? "";
@@ -107,15 +107,15 @@ function axisOf(axis, upright, width) {
         return name;
       });
     };
-    said.filter = (u, splits) => splits;
-    said.size = upright ? widest + 14 : lean ? widest * 0.75 + 16 : 24;
-    if (lean) said.rotate = -45;
+    marks.filter = (u, splits) => splits;
+    marks.size = upright ? widest + 14 : lean ? widest * 0.75 + 16 : 24;
+    if (lean) marks.rotate = -45;
   }
   if (axis.scale === "log" && !axis.names) {
     // uPlot's own would begin at the scale's end, whatever number that is.
-    said.splits = (u, k, min, max) => logSplits(min, max);
+    marks.splits = (u, k, min, max) => logSplits(min, max);
     // Few decades: as many numbers as fit; many: the powers alone; within one step: all.
-    said.filter = (u, splits) => {
+    marks.filter = (u, splits) => {
       const scale = u.scales[upright ? "y" : "x"];
       const wide = scale.max / scale.min;
       const first = wide < 12 ? "123456789" : wide < 1000 ? "125" : "1";
@@ -123,19 +123,19 @@ function axisOf(axis, upright, width) {
       return round.filter((v) => v !== null).length > 1 ? round : splits;
     };
   }
-  if (axis.names) return said;
+  if (axis.names) return marks;
   const large = axis.scale === "log" ? 1e4 : 1e5;
-  said.values = (u, splits) => splits.map((v) => (v === null ? "" : Math.abs(v) >= large || (v !== 0 && Math.abs(v) < 1e-4) ? v.toExponential().replace("e+", "e") : String(+v.toPrecision(9))));
+  marks.values = (u, splits) => splits.map((v) => (v === null ? "" : Math.abs(v) >= large || (v !== 0 && Math.abs(v) < 1e-4) ? v.toExponential().replace("e+", "e") : String(+v.toPrecision(9))));
   if (upright) {
-    said.size = (u, values) => {
+    marks.size = (u, values) => {
       measure.font = FONT;
       return 14 + Math.max(34, ...(values ?? []).map((v) => measure.measureText(v ?? "").width));
     };
   } else {
-    said.size = 26;
-    said.space = Math.min(56, width / 4);
+    marks.size = 26;
+    marks.space = Math.min(56, width / 4);
   }
-  return said;
+  return marks;
 }
 
 /** Paints what stands in one pair of axes. */
@@ -227,7 +227,7 @@ function paint(u, spec, images) {
     c.textBaseline = { top: "top", bottom: "bottom", baseline: "alphabetic" }[text.rise] ?? "middle";
     const inside = text.within === "axes";
     const at = [inside ? left + text.x * width : x(text.x), inside ? top + (1 - text.y) * height : y(text.y)];
-    // What was zoomed out of sight says nothing; the margins are the figure's own.
+    // What is zoomed out of sight has no name; the margins are the figure's own.
     const slack = 14 * ratio;
     const seen = inside || (at[0] > left - slack && at[0] < left + width + slack && at[1] > top - slack && at[1] < top + height + slack);
     if (seen) text.text.split("\n").forEach((one, k) => c.fillText(one, at[0], at[1] + 15 * ratio * k));
@@ -364,7 +364,7 @@ function build(box, spec, images, group) {
   return { u, show: (min, max) => show("x", { min, max }), home };
 }
 
-/** One finger says what lies there, two zoom along x, a double tap shows all again. */
+/** One finger shows the value under it, two zoom along x, a double tap shows all again. */
 function fingers(u, view, show, group, home) {
   let before = null;
   let tapped = 0;
@@ -417,22 +417,22 @@ function scaleStrip(scale, parent) {
 const turns = new WeakMap();
 
 async function draw(holder) {
-  const said = JSON.parse(holder.querySelector("script").textContent);
+  const given = JSON.parse(holder.querySelector("script").textContent);
   // Pictures take a while to load; a window that is dragged wider asks for the next drawing before.
   const turn = (turns.get(holder) ?? 0) + 1;
   turns.set(holder, turn);
   for (const old of [...holder.children]) if (old.tagName !== "SCRIPT") old.remove();
-  if (said.title) element("p", "title", holder).textContent = said.title;
+  if (given.title) element("p", "title", holder).textContent = given.title;
   const grid = element("div", "grid", holder);
   // As many side by side as the figure has, and as stay legible.
-  const least = said.axes.some((spec) => spec.equal) ? 165 : 290;
-  const fit = Math.max(1, Math.min(said.columns, Math.floor(grid.clientWidth / least)));
-  const whole = fit === said.columns && said.axes.every((spec) => spec.place);
+  const least = given.axes.some((spec) => spec.equal) ? 165 : 290;
+  const fit = Math.max(1, Math.min(given.columns, Math.floor(grid.clientWidth / least)));
+  const whole = fit === given.columns && given.axes.every((spec) => spec.place);
   // Where fewer fit, rows are filled evenly.
-  const columns = whole ? fit : Math.ceil(said.axes.length / Math.ceil(said.axes.length / fit));
+  const columns = whole ? fit : Math.ceil(given.axes.length / Math.ceil(given.axes.length / fit));
   grid.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
   const built = [];
-  for (const spec of said.axes) {
+  for (const spec of given.axes) {
     const cell = element("div", "cell", grid);
     if (whole) {
       const [top, bottom, left, right] = spec.place;
@@ -441,7 +441,7 @@ async function draw(holder) {
     if (spec.title) element("p", "title", cell).textContent = spec.title;
     const box = element("div", "plot", cell);
     box.setAttribute("role", "img");
-    box.setAttribute("aria-label", [spec.title || said.title, [spec.y.label, spec.x.label].filter(Boolean).join(" by ")].filter(Boolean).join(": "));
+    box.setAttribute("aria-label", [spec.title || given.title, [spec.y.label, spec.x.label].filter(Boolean).join(" by ")].filter(Boolean).join(": "));
     legend(spec.legend, spec.legend_title, cell);
     const images = await Promise.all(
       (spec.images ?? []).map(async (image) => {
@@ -461,7 +461,7 @@ async function draw(holder) {
     };
     built.push({ ...build(box, spec, images, group), group: spec.group });
   }
-  for (const scale of said.scales) scaleStrip(scale, holder);
+  for (const scale of given.scales) scaleStrip(scale, holder);
   holder.dataset.drawn = built.length;
 }
 

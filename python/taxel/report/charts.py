@@ -1,4 +1,4 @@
-"""A figure as a chart that can be zoomed and hovered: what matplotlib was told to draw, handed to uPlot in the page.
+"""A figure as a chart that can be zoomed and hovered: what matplotlib draws, as data for uPlot in the page.
 
 Figures are written once, with matplotlib, for reports, notebooks and files alike. A page takes the lines, points,
 bars, bands, marks and pictures out of their axes; what it does not know (three dimensions, twin axes, arrows) it shows
@@ -63,11 +63,11 @@ def chart(figure: Figure | Sequence[Figure]) -> Markup:
 
 def _one(figure: Figure) -> Markup:
     try:
-        said = chart_data(figure)
+        data = chart_data(figure)
     except _NotKnownError:
         return Markup('<div class="picture">') + Markup(_svg(figure)) + Markup("</div>")
     # Within a page nothing may look like the end of the script.
-    text = json.dumps(said, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     return Markup('<div class="charts"><script type="application/json">') + Markup(text) + Markup("</script></div>")
 
 
@@ -91,12 +91,12 @@ def chart_data(figure: Figure) -> dict[str, Any]:
     groups: dict[Any, int] = {}
     every = [_axes(axes, figure, groups) for axes in shown]
     for part in parts.values():
-        first = next(said for axes, said in zip(shown, every, strict=True) if axes.figure is part)
+        first = next(data for axes, data in zip(shown, every, strict=True) if axes.figure is part)
         if part is not figure and part.get_suptitle():
             first["title"] = f"{part.get_suptitle()}\n{first['title']}".strip()
     if len(parts) > 1:
-        for said in every:
-            said["place"] = None
+        for data in every:
+            data["place"] = None
     return {
         "title": figure.get_suptitle(),
         "columns": max(_columns(axes) for axes in shown),
@@ -152,7 +152,7 @@ def _axes(axes: Axes, figure: Figure, groups: dict[Any, int]) -> dict[str, Any]:
         "equal": axes.get_aspect() != "auto",
         "group": group,
         **_legend(axes),
-        **drawn.said,
+        **drawn.held,
     }
 
 
@@ -172,18 +172,18 @@ def _artists(axes: Axes) -> list[Any]:
 
 def _axis(axis: Axis, limits: tuple[float, float]) -> dict[str, Any]:
     scale = axis.get_scale()
-    said: dict[str, Any] = {"label": axis.get_label_text(), "min": min(limits), "max": max(limits), "scale": scale}
+    data: dict[str, Any] = {"label": axis.get_label_text(), "min": min(limits), "max": max(limits), "scale": scale}
     if limits[0] > limits[1]:
-        said["reversed"] = True
+        data["reversed"] = True
     if scale == "symlog":
         # uPlot's own: straight around 0, logarithmic far from it.
-        said |= {"scale": "asinh", "around": float(axis.get_transform().linthresh)}  # type: ignore[attr-defined]
+        data |= {"scale": "asinh", "around": float(axis.get_transform().linthresh)}  # type: ignore[attr-defined]
     elif scale == "function":
         # The one function that reports use is a root; which, two values tell.
         there = np.asarray(axis.get_transform().transform(np.array([4.0, 9.0])))
         if not np.allclose(there, [2.0, 3.0]):
             raise _NotKnownError
-        said["scale"] = "root"
+        data["scale"] = "root"
     elif scale not in {"linear", "log"}:
         raise _NotKnownError
     from matplotlib.category import StrCategoryLocator  # noqa: PLC0415  heavy together
@@ -193,12 +193,12 @@ def _axis(axis: Axis, limits: tuple[float, float]) -> dict[str, Any]:
     formatter: Any = axis.get_major_formatter()
     if isinstance(locator, FixedLocator | StrCategoryLocator):
         places = [float(place) for place in locator()]
-        said["names"] = [[p, n] for p, n in zip(places, formatter.format_ticks(places), strict=True)]
+        data["names"] = [[p, n] for p, n in zip(places, formatter.format_ticks(places), strict=True)]
     elif isinstance(locator, NullLocator):
-        said["names"] = []
+        data["names"] = []
     if axis.get_gridlines() and axis.get_gridlines()[0].get_visible():
-        said["grid"] = True
-    return said
+        data["grid"] = True
+    return data
 
 
 def _colour(given: Any, alpha: float | None = None) -> str | None:
@@ -216,7 +216,7 @@ def _numbers(values: Any) -> list[float | None]:
     return [float(f"{value:.7g}") if math.isfinite(value) else None for value in flat.tolist()]
 
 
-def _said(label: object) -> str:
+def _label(label: object) -> str:
     text = str(label)
     return "" if text.startswith("_") else text
 
@@ -226,7 +226,7 @@ class _Drawn:
 
     def __init__(self, axes: Axes, named: Mapping[int, object]) -> None:
         self.axes, self.named = axes, named
-        self.said: dict[str, list[dict[str, Any]]] = {}
+        self.held: dict[str, list[dict[str, Any]]] = {}
 
     def add(self, artist: Any) -> None:
         """Take one artist."""
@@ -254,10 +254,10 @@ class _Drawn:
             raise _NotKnownError
 
     def _put(self, kind: str, **what: Any) -> None:
-        self.said.setdefault(kind, []).append({name: value for name, value in what.items() if value not in (None, "")})
+        self.held.setdefault(kind, []).append({name: value for name, value in what.items() if value not in (None, "")})
 
     def _name(self, artist: Any) -> str:
-        return _said(self.named.get(id(artist), "")) or _said(artist.get_label())
+        return _label(self.named.get(id(artist), "")) or _label(artist.get_label())
 
     def _line(self, line: lines.Line2D, in_x: bool, in_y: bool) -> None:
         colour, style, name = _colour(line.get_color(), line.get_alpha()), line.get_linestyle(), self._name(line)
@@ -374,7 +374,7 @@ class _Drawn:
 
 
 def _short(values: Any) -> list[float | None]:
-    """Return the values of a picture with three digits, as its hover says them."""
+    """Return the values of a picture with three digits, as shown under the cursor."""
     flat: Any = np.ma.filled(np.ma.asarray(values, float), np.nan).ravel()
     return [float(f"{value:.3g}") if math.isfinite(value) else None for value in flat.tolist()]
 
@@ -435,8 +435,8 @@ def _svg(figure: Figure) -> str:
     text = io.StringIO()
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "taxel"}):
         figure.savefig(text, format="svg", metadata={"Date": None}, transparent=True)
-    said = text.getvalue()
-    said = said[said.index("<svg") :]
+    svg = text.getvalue()
+    svg = svg[svg.index("<svg") :]
     for colour, ink in ((INK, "--ink"), ("#000000", "--ink"), (_LINE, "--line")):
-        said = said.replace(f": {colour}", f": var({ink})")
-    return said
+        svg = svg.replace(f": {colour}", f": var({ink})")
+    return svg

@@ -100,7 +100,7 @@ def _curves(found: Answer) -> Figure:
     for k, value in enumerate(values):
         axes[2, 1].plot(value.interval, [k, k], color="0.2", lw=1)
     axes[2, 1].axvline(found.zero.level, color=_COLOURS["loses"], lw=1, ls=":")
-    axes[2, 1].set(xlabel="bits", title="beside it: what else tells (dotted: labels shuffled)")
+    axes[2, 1].set(xlabel="bits", title="simpler measurements (dotted: labels shuffled)")
     axes[2, 1].set_xlim(0, most)
     for ax in axes.ravel()[:5]:
         ax.set_ylabel("bits")
@@ -114,7 +114,7 @@ def _curves(found: Answer) -> Figure:
 
 
 def _ticks(ax: Axes, values: Sequence[float]) -> None:
-    """Name on a logarithmic axis what was asked, and nothing else."""
+    """Mark these values alone on a logarithmic axis."""
     ax.set_xticks(values, [f"{value:g}" for value in values])
     ax.set_xticks([], minor=True)
 

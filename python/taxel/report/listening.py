@@ -1,9 +1,9 @@
-"""The page of ``taxel train``, ``detect`` and ``live``: what a readout heard in a recording, and what it made of it."""
+"""The page of ``taxel train``, ``detect`` and ``live``: the detections of a readout in recordings, and their errors."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,19 +20,16 @@ from taxel._base.arguments import instance
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect import Readout, Score
-from taxel.detections import Detections
-from taxel.events import Events
-from taxel.frames import Frames
+from taxel.detect import Outcome, Readout, Score
+from taxel.detect.examples import array_of
 from taxel.report.charts import INK, STYLE, chart
 from taxel.report.page import render
-from taxel.spikes import to_ms, to_us
-from taxel.tare import Tare
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Listened", "write_listening"]
+__all__ = ["write_listening"]
 
 #: How many moments are drawn a label, and how much around each in time constants of the neuron.
 _MOMENTS, _AROUND = 4, 6.0
@@ -40,18 +37,7 @@ _MOMENTS, _AROUND = 4, 6.0
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
-_SAID, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
-
-
-class Listened(NamedTuple):
-    """One recording, what was said of it, and what really happened where that is known."""
-
-    name: str
-    source: Events | Frames
-    found: Detections
-    tare: Tare | None = None
-    truth: Mapping[str, NDArray[np.int64]] | None = None
-    score: Score | None = None
+_FOUND, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
 
 
 class _Moment(NamedTuple):
@@ -67,20 +53,20 @@ class _Moment(NamedTuple):
 def write_listening(
     folder: str | os.PathLike[str],
     readout: Readout,
-    listened: list[Listened],
+    listened: Sequence[Outcome],
     *,
     title: str,
     judged: str = "",
     held_out: Sequence[Score] = (),
 ) -> Path:
-    """Write what a readout heard in recordings as a page with pictures, ``report.html`` in a new folder.
+    """Write the detections of a readout in recordings as a page with pictures, ``report.html`` in a new folder.
 
     Parameters
     ----------
     folder : path
         New, or empty.
     readout : Readout
-    listened : list of Listened, one or more
+    listened : sequence of Outcome, one or more
     title : str
     judged : str
         On what the scores of `listened` are: held-out data, or the readout's own training data.
@@ -134,29 +120,29 @@ def write_listening(
 def _drawn(figure: Figure | None) -> Markup | None:
     if figure is None:
         return None
-    said = chart(figure)
+    drawn = chart(figure)
     plt.close(figure)
-    return said
+    return drawn
 
 
-def _row(one: Listened, label: str, score: Score | None) -> dict[str, Any]:
+def _row(one: Outcome, label: str, score: Score | None) -> dict[str, Any]:
     own = None if score is None else score[label]
-    said = len(one.found[label]) if own is None else own.found + own.false
-    return {"recording": one.name, "label": label, "said": said, "score": own}
+    count = len(one.found[label]) if own is None else own.found + own.false
+    return {"recording": one.name, "label": label, "detections": count, "score": own}
 
 
-def _moments(listened: list[Listened], label: str) -> list[_Moment]:
+def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
     """Return the worst of a label's events and detections, the worst first; without truth its first detections."""
     moments = []
     for k, one in enumerate(listened):
-        if one.score is None or one.truth is None:
-            moments += [_Moment(k, label, float(t), "said", 0.0) for t in one.found[label].t]
+        if one.score is None:
+            moments += [_Moment(k, label, float(t), "detected", 0.0) for t in one.found[label].t]
             continue
-        own, said = one.score[label], one.found.t
-        happened = said[own.pairs[:, 0]] - np.rint(to_us(own.errors_ms)).astype(np.int64)
-        true = np.asarray(one.truth.get(label, ()), np.int64)
+        own, times = one.score[label], one.found.t
+        happened = times[own.pairs[:, 0]] - np.rint(to_us(own.errors_ms)).astype(np.int64)
+        true = np.asarray(one.example.labels.get(label, ()), np.int64)
         moments += [_Moment(k, label, float(t), "missed", np.inf) for t in np.setdiff1d(true, happened)]
-        moments += [_Moment(k, label, float(t), "false", np.inf) for t in said[own.false_detections]]
+        moments += [_Moment(k, label, float(t), "false", np.inf) for t in times[own.false_detections]]
         moments += [
             _Moment(k, label, float(t), f"{error:+.2f} ms", abs(float(error)))
             for t, error in zip(happened, own.errors_ms, strict=True)
@@ -164,8 +150,8 @@ def _moments(listened: list[Listened], label: str) -> list[_Moment]:
     return sorted(moments, key=lambda moment: -moment.badness)[:_MOMENTS]
 
 
-def _potential(readout: Readout, listened: list[Listened], label: str, moments: list[_Moment]) -> Figure | None:
-    """Draw potential and threshold around moments, with what was said and what is true."""
+def _potential(readout: Readout, listened: Sequence[Outcome], label: str, moments: list[_Moment]) -> Figure | None:
+    """Draw potential and threshold around moments, with detections and labels."""
     if not moments:
         return None
     one = readout.neurons[label]
@@ -174,9 +160,9 @@ def _potential(readout: Readout, listened: list[Listened], label: str, moments: 
     )
     reach = _AROUND * one.neuron.tau + one.delay_ms
     for axis, moment in zip(axes[0], moments, strict=True):
-        heard = listened[moment.recording]
-        trains = _trains(readout, heard)
-        found = to_ms(heard.found[label].t)
+        outcome = listened[moment.recording]
+        trains = _trains(readout, outcome)
+        found = to_ms(outcome.found[label].t)
         at = to_ms(moment.t)
         times = np.linspace(at - reach, at + reach, 600)
         crossings = found + readout.encoder.latency_ms + one.delay_ms
@@ -185,8 +171,8 @@ def _potential(readout: Readout, listened: list[Listened], label: str, moments: 
         threshold = readout.run_threshold * one.neuron.theta_0
         axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
         for k, t in enumerate(found[np.abs(found - at) < reach]):
-            axis.axvline(t - at, color=_SAID, linewidth=1.2, label="said" * (k == 0))
-        true = to_ms(np.asarray((heard.truth or {}).get(label, ()), np.float64))
+            axis.axvline(t - at, color=_FOUND, linewidth=1.2, label="detected" * (k == 0))
+        true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
         for k, t in enumerate(true[np.abs(true - at) < reach]):
             axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--", label="true" * (k == 0))
         axis.set_title(f"{moment.what}, {at / 1000.0:.3f} s", fontsize=9)
@@ -196,18 +182,21 @@ def _potential(readout: Readout, listened: list[Listened], label: str, moments: 
     return figure
 
 
-def _trains(readout: Readout, heard: Listened) -> Any:
-    encoder = readout.encoder if heard.tare is None else readout.encoder.with_tare(heard.tare)
-    trains = encoder.encode(heard.source)
+def _trains(readout: Readout, outcome: Outcome) -> Any:
+    encoder = readout.encoder if outcome.example.tare is None else readout.encoder.with_tare(outcome.example.tare)
+    source = outcome.example.source
+    trains = source if isinstance(source, SpikeTrains) else encoder.encode(source)
     trains = trains.split_by_sign() if trains.signed else trains
     delays = readout.delays_ms
     return trains if len(delays) == 1 and not delays[0] else trains.delayed(delays)
 
 
-def _weights(readout: Readout, heard: Listened, label: str) -> Figure:
+def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
     """Draw weights over the array where trains are taxels', else as bars."""
     weights = np.asarray(readout.neurons[label].weights)
-    array = heard.source.array
+    array = array_of([outcome.example])
+    if array is None:
+        raise ProblemError(f"{outcome.name}: spike trains do not state their array")
     largest = float(np.abs(weights).max()) or 1.0
     named = _planes(weights, readout, array.rows * array.columns)
     if not named or array.rows * array.columns < 4:
@@ -266,7 +255,7 @@ def _nth(what: str, count: int, n: int) -> str:
     return f"{what} {n + 1}" if count > 1 else ""
 
 
-def _errors(listened: list[Listened], label: str) -> Figure | None:
+def _errors(listened: Sequence[Outcome], label: str) -> Figure | None:
     """Draw how far detections lay from their events."""
     errors = [one.score[label].errors_ms for one in listened if one.score is not None]
     if not errors or not sum(map(len, errors)):
@@ -274,6 +263,6 @@ def _errors(listened: list[Listened], label: str) -> Figure | None:
     figure, axis = plt.subplots(figsize=(4.2, 2.2), layout="constrained")
     axis.hist(np.concatenate(errors), bins=30, color=_TRUE)
     axis.axvline(0, color="#999999", linewidth=0.8)
-    axis.set_xlabel("said minus true, ms")
+    axis.set_xlabel("time minus true, ms")
     axis.set_ylabel("events")
     return figure

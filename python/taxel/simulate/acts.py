@@ -20,38 +20,62 @@ __all__ = ["Act", "Contact", "Motion", "Pictures", "Scene", "Silence", "Track"]
 
 
 class Contact(NamedTuple):
-    """One touch, as it really was: from the moment when force leaves zero to that when it returns there."""
+    """One touch, as it really was: from the moment when force leaves zero to that when it returns there.
+
+    Attributes
+    ----------
+    kind : str
+        "first", "bounce", "hand", "rest" (stayed until it was lifted), "roll", "slide" or "pictures".
+    start_us : float, us
+    stop_us : float, us
+    speed_m_s : float, m/s, 0 or more
+        How fast it began.
+    peak_n : float, N
+        The largest force; 0 where it is not known.
+    """
 
     kind: str
-    """"first", "bounce", "hand", "rest" (stayed until it was lifted), "roll", "slide" or "pictures"."""
     start_us: float
     stop_us: float
     speed_m_s: float
-    """How fast it began."""
     peak_n: float
-    """The largest force; 0 where it is not known."""
 
 
 class Track(NamedTuple):
-    """A body's way, at even steps."""
+    """A body's way, at even steps.
+
+    Attributes
+    ----------
+    x_mm : float32, shape (n,), mm
+        Where its middle is, right of the first taxel.
+    y_mm : float32, shape (n,), mm
+    depth_mm : float32, shape (n,), mm
+        Of its lowest point below the foam's face; negative above it.
+    force_n : float32, shape (n,), N
+        On the foam.
+    """
 
     x_mm: NDArray[np.float32]
-    """Where its middle is, right of the first taxel."""
     y_mm: NDArray[np.float32]
     depth_mm: NDArray[np.float32]
-    """Of its lowest point below the foam's face; negative above it."""
     force_n: NDArray[np.float32]
-    """On the foam."""
 
 
 class Motion(NamedTuple):
-    """A scene, worked out at even steps."""
+    """A scene, worked out at even steps.
+
+    Attributes
+    ----------
+    step_us : float, us
+    tracks : list of Track
+        One a body.
+    contacts : list of Contact
+        Of all bodies, by time.
+    """
 
     step_us: float
     tracks: list[Track]
-    """One a body."""
     contacts: list[Contact]
-    """Of all bodies, by time."""
 
     @property
     def force_n(self) -> NDArray[np.float32]:
@@ -62,7 +86,21 @@ class Motion(NamedTuple):
 
 @dataclass(frozen=True)
 class Silence:
-    """Nothing touches the array for `ms`."""
+    """Let nothing touch the array.
+
+    Parameters
+    ----------
+    ms : float, ms, above 0
+
+    Raises
+    ------
+    SceneError : a time that makes no sense, when it is played
+
+    Examples
+    --------
+    >>> Silence(10.0)
+    Silence(ms=10.0)
+    """
 
     ms: float
 
@@ -288,12 +326,17 @@ class Pictures:
     ----------
     values : float32, shape (n, rows, columns), 0 to 1
         The share of the way from a taxel's rest to the ramp's end.
-    period_us : float
+    period_us : float, us
         From one picture to the next; a frame or more.
 
     Raises
     ------
     ProblemError : values that are no pictures, or outside 0 to 1
+
+    Examples
+    --------
+    >>> Pictures([[[0.0]], [[0.5]]], period_us=192.0).period_us
+    192.0
     """
 
     def __init__(self, values: ArrayLike, period_us: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, numbers, text, whole
+from taxel._base.options import option
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit
@@ -46,18 +47,24 @@ class Version2:
     Raises
     ------
     ProblemError : out of these ranges
+
+    Examples
+    --------
+    >>> Version2(board=3).heartbeat_us
+    10000
     """
 
-    board: int = 0
-    seed: int = 1
-    hold_us: int = 0
-    heartbeat_us: int = 10_000
-    states_us: int = 1_000_000
+    board: int = option(0, "Wire 2: the board's number.", least=0, most=65_535)
+    seed: int = option(1, "Wire 2: the number of the first session.", least=0, most=65_535)
+    hold_us: int = option(0, "Wire 2: how long events wait to share a datagram, ms.", least=0, most=30_000)
+    heartbeat_us: int = option(10_000, "Wire 2: interval of heartbeats while nothing happens, ms.", least=0, most=10**9)
+    states_us: int = option(
+        1_000_000, "Wire 2: interval at which each taxel's value is repeated, ms; 0: never.", least=0, most=10**9
+    )
 
     def __post_init__(self) -> None:
-        for name, most in (("board", 65_535), ("seed", 65_535), ("hold_us", 30_000), ("heartbeat_us", 10**9)):
-            whole(name, getattr(self, name), 0, most)
-        whole("states_us", self.states_us, 0, 10**9)
+        for one in fields(self):
+            whole(one.name, getattr(self, one.name), one.metadata["min"], one.metadata["max"])
 
 
 def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
@@ -125,6 +132,12 @@ class Board:
     ------
     ProblemError, DeviceError : arguments or registers that make no sense
 
+    Notes
+    -----
+    +
+
+    What a new value is compared with (`previous`) is open in thesis 4.3; the board's own rule stands in `docs/wire.md`.
+
     Examples
     --------
     >>> board = Board()
@@ -164,10 +177,10 @@ class Board:
 
         Parameters
         ----------
-        ticks : uint16, shape (rows * columns,) or (rows, columns)
+        ticks : uint16, shape (rows * columns,) or (rows, columns), ticks
             Trip times of the comparators by taxel, in 1/300 us from the ramp's start. At or above the ramp's length
             one reads as that length; `NOT_RETURNED` is a fault.
-        most : int, optional
+        most : int, 0 or more, optional
             How many datagrams the network takes during this frame; the rest waits in the queue.
 
         Returns
@@ -177,6 +190,11 @@ class Board:
         Raises
         ------
         ProblemError : not one trip time a taxel
+
+        Examples
+        --------
+        >>> [len(datagram) for datagram in Board().frame(np.full((64, 64), 100, np.uint16))][:1]
+        [1400]
         """
         at_most = 2**32 if most is None else whole("most", most, 0, 2**32)
         return self._core.frame(numbers("ticks", ticks, np.uint16).reshape(-1), at_most)
@@ -186,11 +204,35 @@ class Board:
         self._core.reset()
 
     def command(self, data: Any) -> str:
-        """Take command bytes as they come; return the status lines that answer them."""
+        """Take command bytes as they come; return the status lines that answer them.
+
+        Parameters
+        ----------
+        data : bytes
+            Five bytes a command; what is not whole yet waits for the rest.
+
+        Raises
+        ------
+        ProblemError : no bytes
+
+        Examples
+        --------
+        >>> len(Board().command(bytes.fromhex("e000000000"))) > 0
+        True
+        """
         return self._core.command(given_bytes(data))
 
     def record(self, start: bool) -> None:
-        """Start or stop a recording: a marker goes out where that changes anything."""
+        """Start or stop a recording: a marker goes out where that changes anything.
+
+        Parameters
+        ----------
+        start : bool
+
+        Raises
+        ------
+        ProblemError : neither true nor false
+        """
         self._core.record(flag("start", start))
 
     def faults(self) -> str:

@@ -68,9 +68,22 @@ class Fabric(Value):
     def conductance(self, force_n: ArrayLike) -> Values:
         """Return conductances in uS of forces in N, of the same shape; a force below 0 is none.
 
+        Parameters
+        ----------
+        force_n : float64, N, any shape
+
+        Returns
+        -------
+        float64, uS, of the same shape
+
         Raises
         ------
         ProblemError : forces that are not finite
+
+        Examples
+        --------
+        >>> Fabric().conductance([0.0]) == Fabric().rest_us
+        array([ True])
         """
         given = _finite("force_n", force_n, "N")
         return _core.fabric(self._json(), given.ravel(), False).reshape(given.shape)
@@ -78,9 +91,23 @@ class Fabric(Value):
     def force(self, conductance_us: ArrayLike) -> Values:
         """Return forces in N of conductances in uS, of the same shape: the inverse; 0 at rest and below.
 
+        Parameters
+        ----------
+        conductance_us : float64, uS, any shape
+
+        Returns
+        -------
+        float64, N, of the same shape
+
         Raises
         ------
         ProblemError : conductances that are not finite
+
+        Examples
+        --------
+        >>> fabric = Fabric()
+        >>> fabric.force(fabric.conductance([0.0, 2.0])).round(6)
+        array([0., 2.])
         """
         given = _finite("conductance_us", conductance_us, "uS")
         return _core.fabric(self._json(), given.ravel(), True).reshape(given.shape)
@@ -224,17 +251,26 @@ class Divider(_Lines):
 
 
 class Trace(NamedTuple):
-    """Hold the signals of one comparator, as an oscilloscope would show them: arrays of one length."""
+    """Hold the signals of one comparator, as an oscilloscope would show them: arrays of one length.
+
+    Attributes
+    ----------
+    t_us : float64, shape (n,), us
+    line_v : float64, shape (n,), V
+        The sense line that the multiplexer has chosen, V.
+    input_v : float64, shape (n,), V
+        The comparator's input, which settles towards it, V.
+    ramp_v : float64, shape (n,), V
+        V.
+    high : bool, shape (n,)
+        The comparator's output: whether the ramp has passed.
+    """
 
     t_us: Values
     line_v: Values
-    """The sense line that the multiplexer has chosen, V."""
     input_v: Values
-    """The comparator's input, which settles towards it, V."""
     ramp_v: Values
-    """V."""
     high: NDArray[np.bool_]
-    """The comparator's output: whether the ramp has passed."""
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -333,6 +369,12 @@ class Converter(Value):
         Raises
         ------
         ProblemError : ticks that are not finite
+
+        Examples
+        --------
+        >>> converter = Converter()
+        >>> converter.ramp_ticks(converter.ramp_volts([50.0])).round(6)
+        array([50.])
         """
         given = _finite("ticks", ticks)
         return _core.converter_ramp(self._json(), given.ravel(), False).reshape(given.shape)
@@ -387,16 +429,24 @@ class Converter(Value):
 
 
 class Converted(NamedTuple):
-    """Hold frames that were converted one after the other, each with a ramp of its own."""
+    """Hold frames that were converted one after the other, each with a ramp of its own.
+
+    Attributes
+    ----------
+    t_us : float64, shape (frames,), us
+        When each began, us, shape (frames,); a column is read as it is when its turn comes.
+    ramp : uint32, shape (frames,), ticks
+        How long its ramp took, ticks, shape (frames,).
+    ticks : float64, shape (frames, rows, columns), ticks
+        When the comparators tripped, shape (frames, rows, columns), as `Converter.ticks`.
+    volts : float64, shape (frames, rows, columns), V
+        The voltages of the whole ticks that a counter shows, V: halfway to the next tick, 3 V at the end.
+    """
 
     t_us: Values
-    """When each began, us, shape (frames,); a column is read as it is when its turn comes."""
     ramp: NDArray[np.uint32]
-    """How long its ramp took, ticks, shape (frames,)."""
     ticks: Values
-    """When the comparators tripped, shape (frames, rows, columns), as `Converter.ticks`."""
     volts: Values
-    """The voltages of the whole ticks that a counter shows, V: halfway to the next tick, 3 V at the end."""
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -497,6 +547,14 @@ class Circuit(Value):
 
     def ticks(self, conductance_us: ArrayLike) -> Values:
         """Return ticks of conductances in uS: `VirtualGround.volts`, then `Converter.ticks`.
+
+        Parameters
+        ----------
+        conductance_us : float64, shape (rows, columns) or (n, rows, columns), uS
+
+        Returns
+        -------
+        float64, ticks, of the same shape
 
         Raises
         ------

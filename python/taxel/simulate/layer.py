@@ -20,14 +20,21 @@ _KPA = 1000.0
 
 
 class Pressed(NamedTuple):
-    """The pressures of a layer on a body that has sunk into it."""
+    """The pressures of a layer on a body that has sunk into it.
+
+    Attributes
+    ----------
+    pressure_kpa : float64, shape (rows, columns), kPa
+        On the layer's face, by taxel, shape (rows, columns); nowhere negative.
+    base_kpa : float64, shape (rows, columns), kPa
+        At the layer's base, where the taxels lie; beside the body a bonded base is also pulled, a little.
+    force_n : float, N
+        All of the pressure on the face.
+    """
 
     pressure_kpa: NDArray[np.float64]
-    """On the layer's face, by taxel, shape (rows, columns); nowhere negative."""
     base_kpa: NDArray[np.float64]
-    """At the layer's base, where the taxels lie; beside the body a bonded base is also pulled, a little."""
     force_n: float
-    """All of the pressure on the face."""
 
 
 class Layer:

@@ -56,7 +56,17 @@ class Replay:
         return self.source.array
 
     def registers(self, preset: str | None) -> Registers:
-        """Return what the board holds that plays it: as it was recorded where that is known, else a preset."""
+        """Return what the board holds that plays it: as it was recorded where that is known, else a preset.
+
+        Parameters
+        ----------
+        preset : str or None
+            What the board holds where the recording does not say.
+
+        Raises
+        ------
+        ProblemError : no such preset
+        """
         known = None if self.recording is None else self.recording.registers
         if known is not None and known.array != self.array:
             # A part of a sensor: a board of its own, as fast as the whole one was.

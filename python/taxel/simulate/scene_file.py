@@ -48,6 +48,18 @@ _LONGEST_MS = 60_000.0
 class SceneFile:
     """Hold the contents of a scene file.
 
+    Attributes
+    ----------
+    scene : Scene
+    seed : int, 0 or more
+        Draws the taxels' spread and their noise.
+    preset : str or None
+        The board's registers, as in `play`.
+    tare_ms : float, ms
+    array : Array
+    sensor : mapping of str to float
+        What differs from the usual taxels, as in `play`.
+
     Examples
     --------
     >>> import tempfile
@@ -71,13 +83,10 @@ class SceneFile:
 
     scene: Scene
     seed: int = 0
-    """Draws the taxels' spread and their noise."""
     preset: str | None = None
-    """The board's registers, as in `play`."""
     tare_ms: float = 50.0
     array: Array = field(default_factory=Array.thesis)
     sensor: Mapping[str, float] = field(default_factory=dict)
-    """What differs from the usual taxels, as in `play`."""
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> SceneFile:

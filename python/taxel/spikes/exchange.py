@@ -83,11 +83,11 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
                 watched = 1000.0 * np.concatenate([np.reshape(i, (-1, 2)) for i in units["obs_intervals"][:]])
     except FormatError:
         raise
-    except Exception as error:  # whatever h5py and pynwb say of a foreign or broken file
+    except Exception as error:  # h5py and pynwb raise errors of many kinds for a foreign or broken file
         raise FormatError(f"{place}: no NWB file that can be read: {shown(str(error))}") from None
     every = np.concatenate([*times, [0.0]])
     widest = (watched[:, 0].min(), watched[:, 1].max()) if len(watched) else (every.min(), every.max())
-    first, last = (float(found) if said is None else said for said, found in zip(window_ms, widest, strict=True))
+    first, last = (float(found) if given is None else given for given, found in zip(window_ms, widest, strict=True))
     return times, first, last, values
 
 

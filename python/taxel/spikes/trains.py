@@ -28,18 +28,18 @@ __all__ = ["SpikeTrains"]
 
 
 class SpikeTrains(Columns):
-    """Hold spike times by train, with the window that was listened to.
+    """Hold spike times by train, with the window in which spikes were recorded.
 
     Parameters
     ----------
     times : float64, shape (spikes,), ms
         All times, train after train, ascending in each.
-    offsets : int64, shape (trains + 1,)
-        Where each train begins in `times`, and at last where all end.
+    offsets : int64, shape (trains + 1,), 0 or more
+        Index of each train's first spike in `times`; the last entry is the number of spikes.
     start, stop : float, ms
-        The window: without it an empty train could not say "silent".
-    values : float32, shape (spikes,), optional
-        A signed value a spike (polarity, bits), where the encoder has one.
+        The window: a train without spikes was silent in it.
+    values : float32, shape (spikes,), polarity or bits, optional
+        A signed value a spike, where the encoder has one.
 
     Raises
     ------
@@ -91,8 +91,7 @@ class SpikeTrains(Columns):
         start : float, ms
         stop : float, ms, optional
             The last spike's time where it is left out.
-        values : sequence of float sequences, optional
-            A signed value a spike.
+        values : sequence of float sequences, a polarity or bits a spike, optional
 
         Returns
         -------
@@ -101,6 +100,11 @@ class SpikeTrains(Columns):
         Raises
         ------
         ProblemError : times that make no sense (names train and spike)
+
+        Examples
+        --------
+        >>> SpikeTrains.from_lists([[1.0, 5.0], []], stop=10.0)
+        SpikeTrains(2 trains, 2 spikes, 0 to 10 ms)
         """
         flat, counts = _by_train("times", bare("times", times, "ms"), np.float64)
         signed = None
@@ -167,7 +171,25 @@ class SpikeTrains(Columns):
         return self._from_parts(_core.split_by_sign(self._parts()))
 
     def between(self, start: float, stop: float) -> SpikeTrains:
-        """Return the spikes of ``start <= t < stop`` (ms), with that window; times stay as they are."""
+        """Return the spikes of ``start <= t < stop``, with that window; times stay as they are.
+
+        Parameters
+        ----------
+        start, stop : float, ms
+
+        Returns
+        -------
+        SpikeTrains
+
+        Raises
+        ------
+        ProblemError : a window that makes no sense
+
+        Examples
+        --------
+        >>> SpikeTrains.from_lists([[1.0, 5.0], [3.0]], stop=10.0).between(2.0, 5.0)
+        SpikeTrains(2 trains, 1 spikes, 2 to 5 ms)
+        """
         start, stop = window("ms", start, stop)
         return self._where((self.times >= start) & (self.times < stop), start, stop)
 
@@ -176,12 +198,21 @@ class SpikeTrains(Columns):
 
         Parameters
         ----------
-        trains : int or bool array
+        trains : int of shape (n,), 0 or more, or bool of shape (trains,)
             Numbers of trains, or a mask over all of them.
+
+        Returns
+        -------
+        SpikeTrains
 
         Raises
         ------
         ProblemError : a number outside the trains
+
+        Examples
+        --------
+        >>> list(SpikeTrains.from_lists([[1.0], [2.0], [3.0]], stop=10.0).select([2, 0]))
+        [array([3.]), array([1.])]
         """
         try:
             chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
@@ -266,7 +297,18 @@ class SpikeTrains(Columns):
     def from_neo(cls, trains: Sequence[Any]) -> SpikeTrains:
         """Build spike trains from ``neo.SpikeTrain`` objects of any time unit.
 
-        The window is the widest of theirs.
+        Parameters
+        ----------
+        trains : sequence of neo.SpikeTrain
+
+        Returns
+        -------
+        SpikeTrains
+            Their window is the widest of those of `trains`.
+
+        Raises
+        ------
+        ProblemError : something else than ``neo.SpikeTrain`` objects
         """
         try:
             foreign = next(([train] for train in trains if not hasattr(train, "rescale")), [])
@@ -363,8 +405,18 @@ class SpikeTrains(Columns):
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the trains to a .npz (``times offsets start stop``, and ``values`` of signed ones); return its path.
 
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+
+        Returns
+        -------
+        pathlib.Path
+
         Raises
         ------
+        ProblemError : a path that is none
         FileExistsError : the file is there already and `overwrite` is false
         """
         columns: dict[str, Any] = {"times": self.times, "offsets": self.offsets, "start": self.start, "stop": self.stop}
@@ -376,10 +428,25 @@ class SpikeTrains(Columns):
     def load(cls, path: str | os.PathLike[str]) -> SpikeTrains:
         """Read the trains from the file that `save` wrote.
 
+        Parameters
+        ----------
+        path : path
+
+        Returns
+        -------
+        SpikeTrains
+
         Raises
         ------
         FormatError : another file (names it)
         FileNotFoundError : no such file
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> place = SpikeTrains.from_lists([[1.0, 5.0]]).save(Path(tempfile.mkdtemp()) / "trains.npz")
+        >>> SpikeTrains.load(place).times
+        array([1., 5.])
         """
         place = checked_path("path", path)
         try:

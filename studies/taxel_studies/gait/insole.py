@@ -31,7 +31,7 @@ TOES = np.arange(_FIRST[11], TAXELS)
 
 @dataclass(frozen=True)
 class Footprint:
-    """What one footfall tells of its foot.
+    """Properties of the foot in one footfall.
 
     Attributes
     ----------

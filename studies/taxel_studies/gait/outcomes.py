@@ -17,7 +17,7 @@ from taxel_studies.gait.realise import TEST
 from taxel_studies.gait.recipes import FULL, NOTES, SEARCH
 from taxel_studies.gait.sources import SOURCES
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said
+from taxel_studies.study import Parameters, Row, Summary
 
 __all__ = ["EVENTS", "GOALS", "Outcome", "Unit", "figures", "summarise"]
 
@@ -144,7 +144,7 @@ def _spread(values: np.ndarray[Any, Any]) -> dict[str, float] | None:
     return {name: round(float(value), 2) for name, value in spread.items()}
 
 
-def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
     """Put all outcomes into plain values, with the folds, so that other learners can be judged on the same."""
     known, listed = Known(rows), plans(p, data)
     there = {plan.source for plan in listed}
@@ -175,10 +175,10 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
 
 def _source(name: str, listed: Sequence[Plan], known: Known) -> dict[str, Any]:
     source = SOURCES[name]
-    said = []
+    judged = []
     for plan in listed:
         rows = [_row(outcome, plan.protocol, plan.testing) for outcome in _outcomes(plan, known)]
-        said.append(
+        judged.append(
             {
                 "protocol": plan.protocol.name,
                 "title": "trained on one folder, judged on the other" if plan.testing else plan.protocol.title,
@@ -194,12 +194,12 @@ def _source(name: str, listed: Sequence[Plan], known: Known) -> dict[str, Any]:
         "truth": source.truth,
         "shows": source.shows,
         "by_minute": source.by_minute,
-        "protocols": said,
+        "protocols": judged,
     }
 
 
 def _conversion(data: Path) -> dict[str, Any]:
-    """Return one footfall of the plate as the insole feels and tells it: what figures 6.12 and 6.13 draw."""
+    """Return pressure and spikes of one footfall of the plate: what figures 6.12 and 6.13 draw."""
     folder, encoder = data / SOURCES["plate"].folder, NOTES["plate"]["contact"]["encoder"]
     cut = sources.cuts(folder, "plate", "own")[0]
     piece = sources.encoded(folder, "plate", encoder).pieces[cut.name]
@@ -304,7 +304,7 @@ def _row(outcome: Outcome, protocol: Protocol, test: bool) -> dict[str, Any]:
     goal = GOALS.get(outcome.source, {}).get(outcome.event)
     if goal and outcome.row == "chosen" and (protocol.split == "people" or test):
         row["goal"] = goal
-        row["goal_met"] = _met(all_feet, goal)
+        row["goal_met"] = _reaches(all_feet, goal)
     return row
 
 
@@ -312,14 +312,14 @@ def _counted(points: Sequence[Any]) -> list[dict[str, Any]]:
     """Return each different point once, with the number of folds that chose it, the most frequent first."""
     times: dict[str, int] = {}
     for point in points:
-        said = json.dumps(point, sort_keys=True)
-        times[said] = times.get(said, 0) + 1
-    return [{"folds": n, "point": json.loads(said)} for said, n in sorted(times.items(), key=lambda item: -item[1])]
+        text = json.dumps(point, sort_keys=True)
+        times[text] = times.get(text, 0) + 1
+    return [{"folds": n, "point": json.loads(text)} for text, n in sorted(times.items(), key=lambda item: -item[1])]
 
 
 def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Say, event by event, how the neuron stands beside the plain rules: by missed + false, then by % within 10 ms."""
-    said = []
+    lines = []
     for event in dict.fromkeys(row["event"] for row in rows):
         here = {row["row"]: row["figures"] for row in rows if row["event"] == event}
         neuron = here.get("chosen", here.get("notes"))
@@ -329,19 +329,19 @@ def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
         wrong = neuron["missed"] + neuron["false"]
         ahead = [f"{n} ({f['missed'] + f['false']})" for n, f in rules.items() if f["missed"] + f["false"] < wrong]
         behind = [f"{n} ({f['missed'] + f['false']})" for n, f in rules.items() if f["missed"] + f["false"] >= wrong]
-        said.append(
+        lines.append(
             f"{EVENTS[event]}: the neuron has {wrong} missed and false; "
             + (f"better than it: {', '.join(ahead)}" if ahead else "no plain rule is better")
             + (f"; not better: {', '.join(behind)}." if behind else ".")
         )
-    return said
+    return lines
 
 
 def _names(units: Sequence[Unit]) -> list[str]:
     return list(dict.fromkeys(u.name for u in units))
 
 
-def _met(found: dict[str, Any], goal: dict[str, float]) -> bool:
+def _reaches(found: dict[str, Any], goal: dict[str, float]) -> bool:
     at_least = {"found_percent", "within_10_ms_percent"}
     for name, value in goal.items():
         is_ = found["error_ms"] and found["error_ms"]["sd"] if name == "sd_ms" else found[name]

@@ -1,4 +1,4 @@
-"""Figures 6.12 to 6.14: what the insole feels and tells of a footfall, and what was found."""
+"""Figures 6.12 to 6.14: pressure and spikes of the insole during a footfall, and what was found."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from taxel_studies.gait import insole
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.statements import STAND, stand_for
-from taxel_studies.study import Parameters, Said
+from taxel_studies.study import Parameters, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 __all__ = ["draw"]
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 6.12 and 6.13, where there are footfalls of the plate, and 6.14, where what stands for 6.5 was run."""
     del p
-    conversion, rows = said["conversion"], stand_for(said)
+    conversion, rows = summary["conversion"], stand_for(summary)
     return [*([_conversion(conversion)] if conversion else []), *([_bars(rows)] if rows else [])]
 
 
@@ -51,7 +51,7 @@ def _bars(rows: Sequence[Mapping[str, Any]]) -> Figure:
     return figure
 
 
-def _conversion(said: Mapping[str, Any]) -> Figure:
+def _conversion(summary: Mapping[str, Any]) -> Figure:
     """Draw 6.12 and 6.13: the insole, what three taxels feel, and the spikes of all inputs over one footfall."""
     from matplotlib.colors import Normalize  # noqa: PLC0415  loads slowly
     from matplotlib.figure import Figure  # noqa: PLC0415
@@ -59,23 +59,23 @@ def _conversion(said: Mapping[str, Any]) -> Figure:
     figure = Figure(figsize=(13, 4.6), layout="constrained")
     foot, analog, raster = figure.subplots(1, 3, width_ratios=[1, 2, 3])
     at = [(c - (n - 1) / 2, r) for r, n in enumerate(insole.CELLS) for c in range(n)]
-    foot.scatter(*zip(*at, strict=True), c=said["peak"], norm=Normalize(0), cmap="viridis", marker="s", s=90)
+    foot.scatter(*zip(*at, strict=True), c=summary["peak"], norm=Normalize(0), cmap="viridis", marker="s", s=90)
     foot.set(
         title=f"{insole.TAXELS} taxels, heel at the foot\n(colour: peak load)", xticks=[], yticks=[], aspect="equal"
     )
     frames = 0
-    for name, values in said["felt"].items():
+    for name, values in summary["felt"].items():
         frames = len(values)
-        analog.plot([said["frame_ms"] * k for k in range(frames)], values, label=name)
-    analog.axhline(said["threshold"], color="k", ls="--", lw=0.9, label="threshold")
+        analog.plot([summary["frame_ms"] * k for k in range(frames)], values, label=name)
+    analog.axhline(summary["threshold"], color="k", ls="--", lw=0.9, label="threshold")
     analog.set(xlabel="ms since contact", ylabel="counts", title="what three taxels feel")
     analog.legend(fontsize="small")
-    raster.eventplot(said["spikes_ms"], colors="k", linewidths=1.4, linelengths=2.0)
-    for event, times in said["truth_ms"].items():
+    raster.eventplot(summary["spikes_ms"], colors="k", linewidths=1.4, linelengths=2.0)
+    for event, times in summary["truth_ms"].items():
         for time in times:
             raster.axvline(time, color={"contact": "C3", "heel_off": "C2", "foot_off": "C0"}[event], lw=1.1)
-    raster.set(xlabel="ms since contact", ylabel="input neuron", xlim=(-40, said["frame_ms"] * (frames - 1) + 90))
+    raster.set(xlabel="ms since contact", ylabel="input neuron", xlim=(-40, summary["frame_ms"] * (frames - 1) + 90))
     raster.set_title(
-        f"spikes of {len(said['spikes_ms'])} inputs; lines: {', '.join(EVENTS[e] for e in said['truth_ms'])}"
+        f"spikes of {len(summary['spikes_ms'])} inputs; lines: {', '.join(EVENTS[e] for e in summary['truth_ms'])}"
     )
     return figure

@@ -12,13 +12,16 @@ from taxel.spikes import SpikeTrains
 
 __all__ = ["Piece", "joined"]
 
-#: No piece is cut nearer than this to a reference event, ms: the spikes that tell of an event stay with it.
+#: No piece is cut nearer than this to a reference event, ms: the spikes of an event stay with it.
 CLEAR_MS = 100.0
 
 
 @dataclass(frozen=True)
 class Piece:
     """Hold the spikes of one foot for a while, and what happened.
+
+    No `taxel.detect.Example`, which counts labels in whole us of a recording: pieces are put into rows, so their times
+    are ms as float64 from their own start, and the plain rules need sums over the sensors, which spikes do not hold.
 
     Attributes
     ----------

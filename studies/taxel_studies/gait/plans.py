@@ -40,7 +40,7 @@ __all__ = [
 ]
 
 PARAMETERS: dict[str, Any] = {
-    "sources": list(SOURCES),  # those that are absent are skipped and said
+    "sources": list(SOURCES),  # those that are absent are skipped, and listed
     "protocols": [],  # all
     "events": 0,  # all; else so many of the first
     "points": 0,  # to choose from: all; else so many of the first

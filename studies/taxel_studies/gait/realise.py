@@ -25,7 +25,7 @@ __all__ = ["TEST", "realise"]
 
 #: Detections count up to so far from a reference event, ms (thesis 6.5.2).
 WINDOW_MS = 50.0
-#: A plain rule says nothing for so long after an event, ms.
+#: A plain rule detects nothing for so long after an event, ms.
 DEAD_MS = 250.0
 #: The group of the people of the other folder, where one is judged.
 TEST = "test"
@@ -60,37 +60,39 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     if params["kind"] == "neuron":
         return _neuron(params, scope, folder, seed)
     encoder = params["encoder"] if params["kind"] == "rule" else params["point"]["encoder"]
-    told = encoded(folder, source, encoder, params["placed"])
-    training = _training(scope, params["left_out"], params["train"], told, seed)
-    rows = _tested(params, scope, told, encoder)
+    encoding = encoded(folder, source, encoder, params["placed"])
+    training = _training(scope, params["left_out"], params["train"], encoding, seed)
+    rows = _tested(params, scope, encoding, encoder)
     if params["kind"] == "skim":
-        return _skim(params, told, training, rows, seed)
-    return _rule(params, told, training, rows)
+        return _skim(params, encoding, training, rows, seed)
+    return _rule(params, encoding, training, rows)
 
 
 def _tested(
-    params: Mapping[str, Any], scope: Scope, told: Encoded, encoder: Mapping[str, Any]
+    params: Mapping[str, Any], scope: Scope, encoding: Encoded, encoder: Mapping[str, Any]
 ) -> dict[str, list[Piece]]:
     """Return the rows that are tested, by group: those left out, or another folder's."""
     source = params["source"]
     if params["left_out"]:
-        return {str(g): _rows(_pieces(scope.groups[g], told), source) for g in params["left_out"]}
+        return {str(g): _rows(_pieces(scope.groups[g], encoding), source) for g in params["left_out"]}
     other = encoded(Path(params["test"]) / SOURCES[source].folder, source, encoder, params["placed"])
     return {TEST: _rows(list(other.pieces.values()), source)}
 
 
-def _pieces(parts: Sequence[Part], told: Encoded) -> list[Piece]:
+def _pieces(parts: Sequence[Part], encoding: Encoded) -> list[Piece]:
     """Return the pieces, or stretches of them, that parts stand for."""
-    pieces = list(told.pieces.values())
+    pieces = list(encoding.pieces.values())
     return [
         pieces[n] if np.isinf(stop) else pieces[n].between(float(to_ms(start)), float(to_ms(stop)))
         for n, start, stop in parts
     ]
 
 
-def _training(scope: Scope, left_out: Sequence[int], size: Mapping[str, int], told: Encoded, seed: int) -> list[Piece]:
+def _training(
+    scope: Scope, left_out: Sequence[int], size: Mapping[str, int], encoding: Encoded, seed: int
+) -> list[Piece]:
     """Return the training pieces, cut down to so many seconds a piece or footfalls a person."""
-    pieces = _pieces([p for g, group in enumerate(scope.groups) if g not in left_out for p in group], told)
+    pieces = _pieces([p for g, group in enumerate(scope.groups) if g not in left_out for p in group], encoding)
     if "seconds" in size:
         length = 1000.0 * size["seconds"]
         return [
@@ -130,13 +132,13 @@ def _recipe(
 ) -> tuple[tuple[float, float], dict[str, Any]]:
     """Train and test the best of points with one encoder; return the rank that it has inside, and the result."""
     event = params["event"]
-    told = encoded(folder, params["source"], encoder, params["placed"])
-    rows = [(g, row) for g, group in _tested(params, scope, told, encoder).items() for row in group]
+    encoding = encoded(folder, params["source"], encoder, params["placed"])
+    rows = [(g, row) for g, group in _tested(params, scope, encoding, encoder).items() for row in group]
     pieces = [row for _, row in rows]
 
     def fold(left_out: Sequence[int], size: str, tested: Sequence[Piece]) -> Fold:
         """Add the pieces of a fold to the examples, and return it."""
-        training = _patterns(params, _training(scope, left_out, params[size], told, seed), seed)
+        training = _patterns(params, _training(scope, left_out, params[size], encoding, seed), seed)
         first, last = len(pieces), len(pieces) + len(training)
         pieces.extend([*training, *tested])
         scored = [to_us(np.array(piece.scored)) for piece in tested]
@@ -147,7 +149,7 @@ def _recipe(
         fold(
             sorted([*params["left_out"], *groups]),
             "search",
-            [row for g in groups for row in _rows(_pieces(scope.groups[g], told), params["source"])],
+            [row for g in groups for row in _rows(_pieces(scope.groups[g], encoding), params["source"])],
         )
         for groups in params.get("inner", [])
     ]
@@ -161,10 +163,12 @@ def _recipe(
     tested: dict[str, dict[str, Any]] = {g: {} for g, _ in rows}
     for (g, row), result in zip(rows, judged.scores, strict=True):
         tested[g][row.unit] = _plain(result, row)
-    told_of = {"missed": inside.missed, "false": inside.false, "rms_ms": _finite(inside.rank[1])} if inside else None
+    inside_figures = (
+        {"missed": inside.missed, "false": inside.false, "rms_ms": _finite(inside.rank[1])} if inside else None
+    )
     point = {"encoder": encoder, "learner": {k: v for k, v in chosen.neurons[event].items() if k != "search"}}
-    found = {"tested": tested, "fit": _told(learners[event], [pieces[n] for n, *_ in outer.train], event)}
-    return inside.rank if inside else (0, 0.0), found | {"point": point, "inside": told_of}
+    found = {"tested": tested, "fit": _fit_figures(learners[event], [pieces[n] for n, *_ in outer.train], event)}
+    return inside.rank if inside else (0, 0.0), found | {"point": point, "inside": inside_figures}
 
 
 def _finite(value: float) -> float | None:
@@ -203,7 +207,7 @@ def _skim(
     return {"by_threshold": tested, "fit": {"rows": skim.rows_, "residual": round(skim.residual_, 3)}}
 
 
-def _told(cone: ConeR, patterns: list[Piece], event: str) -> dict[str, Any]:
+def _fit_figures(cone: ConeR, patterns: list[Piece], event: str) -> dict[str, Any]:
     return {
         "targets": int(sum(len(p.truth[event]) for p in patterns)),
         "seconds_of_walking": round(sum(p.duration for p in patterns) / 1000, 1),
@@ -258,7 +262,7 @@ def _rule(
     best: tuple[tuple[float, float], dict[str, Any], float] | None = None
     learned = _rows(training, source.name)
     for numbers in rules.grid(rule, data.levels, channels, largest):
-        times = [rules.said(rule, numbers, p, event, **options) for p in learned]
+        times = [rules.detection_times(rule, numbers, p, event, **options) for p in learned]
         offset = _offset(times, learned, event)
         found = [_scored(t, p, event, offset) for t, p in zip(times, learned, strict=True)]
         wrong = sum(f["events"] - len(f["errors"]) + f["false"] for f in found)
@@ -269,21 +273,27 @@ def _rule(
     assert best is not None
     _, numbers, offset = best
     tested = {
-        g: {p.unit: _scored(rules.said(rule, numbers, p, event, **options), p, event, offset) for p in pieces}
+        g: {
+            p.unit: _scored(rules.detection_times(rule, numbers, p, event, **options), p, event, offset) for p in pieces
+        }
         for g, pieces in rows.items()
     }
     return {"tested": tested, "fit": numbers | {"offset_ms": round(offset, 2)}}
 
 
 def _offset(times: list[NDArray[np.float64]], pieces: list[Piece], event: str) -> float:
-    """Return the median distance from each reference event to the nearest time said within 0.15 s."""
+    """Return the median distance from each reference event to the nearest detection within 0.15 s."""
     near = []
-    for said, piece in zip(times, pieces, strict=True):
+    for detected, piece in zip(times, pieces, strict=True):
         truth = piece.truth[event]
-        if len(said) and len(truth):
-            k = np.clip(np.searchsorted(said, truth), 1, len(said) - 1) if len(said) > 1 else np.zeros(len(truth), int)
-            left = said[np.maximum(k - 1, 0)] - truth
-            right = said[k] - truth
+        if len(detected) and len(truth):
+            k = (
+                np.clip(np.searchsorted(detected, truth), 1, len(detected) - 1)
+                if len(detected) > 1
+                else np.zeros(len(truth), int)
+            )
+            left = detected[np.maximum(k - 1, 0)] - truth
+            right = detected[k] - truth
             near.append(np.where(np.abs(left) < np.abs(right), left, right))
     distances = np.concatenate([np.empty(0), *near])
     distances = distances[np.abs(distances) <= 150]

@@ -40,13 +40,13 @@ def changed(point: Point, **changes: Any) -> Point:
 
 def _points(recipe: str, **encoders: dict[str, Any]) -> dict[str, Point]:
     """Return a recipe's points by event; an event named here has an encoder of its own."""
-    said = recipes.read(recipe)
+    contents = recipes.read(recipe)
     return {
         event: {
-            "encoder": encoders.get(event, said["encoder"]),
-            "learner": said["learner"] | {name: value for name, value in own.items() if name != "search"},
+            "encoder": encoders.get(event, contents["encoder"]),
+            "learner": contents["learner"] | {name: value for name, value in own.items() if name != "search"},
         }
-        for event, own in said["neurons"].items()
+        for event, own in contents["neurons"].items()
     }
 
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from taxel_studies.gait.pieces import Piece
 
-__all__ = ["RULES", "grid", "said"]
+__all__ = ["RULES", "detection_times", "grid"]
 
-#: Rising events are told by ON spikes and counts that rise, the others by OFF spikes and counts that fall.
+#: Rising events show in ON spikes and counts that rise, the others by OFF spikes and counts that fall.
 RISING = {"contact"}
 
 RULES = {
@@ -56,7 +56,7 @@ def grid(rule: str, levels: int, channels: int, largest: float) -> list[dict[str
     ]
 
 
-def said(
+def detection_times(
     rule: str,
     numbers: dict[str, Any],
     piece: Piece,
@@ -80,7 +80,7 @@ def said(
     sum_name : str
         Which sum "sum" watches.
     dead_ms : float
-        After an event nothing is said for so long.
+        After a detection there is none for so long.
     """
     rising = event in RISING
     if rule == "sum":

@@ -233,7 +233,7 @@ class Encoded:
 
 
 def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "own") -> Encoded:
-    """Return a source's pieces as one encoder tells them; kept in memory, as many fits ask for the same.
+    """Return a source's pieces, encoded; they stay in memory, as many fits need the same.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from typing import Any
 from taxel_studies.gait import insole
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.protocols import ROWS
-from taxel_studies.study import Parameters, Said, Statement, Table
+from taxel_studies.study import Parameters, Statement, Summary, Table
 
 __all__ = ["STAND", "STANDS_FOR", "stand_for", "statements", "tables"]
 
@@ -25,7 +25,7 @@ FALSE_SHARE = 0.05
 STAND = {"chosen": "chosen inside the folds", "printed": "Table 6.2 as printed"}
 
 
-def stand_for(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+def stand_for(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the rows that stand for 6.5.2 and 6.5.3, with the numbers that statements and picture need."""
     return [
         {
@@ -38,14 +38,14 @@ def stand_for(said: Mapping[str, Any]) -> list[dict[str, Any]]:
                 for name in ("events", "missed", "false", "found_percent", "within_10_ms_percent", "error_ms")
             },
         }
-        for s in said["sources"]
+        for s in summary["sources"]
         for p in s["protocols"]
         for row in p["rows"]
         if row["row"] in STAND and p["protocol"] == STANDS_FOR.get(s["source"], ("",))[0]
     ]
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.5.1 to 6.5.3 say, with chosen parameters and with those printed."""
     del p
     found = [
@@ -57,7 +57,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "a plate's footfalls cut to the outline of an insole; other recordings have sensors of their own",
         )
     ]
-    for row in stand_for(said):
+    for row in stand_for(summary):
         source, event = row["source"], EVENTS[row["event"]]
         why = f"{source}, {STANDS_FOR[source][0]}; {STAND[row['row']]}"
         counts = f"{row['missed']} missed and {row['false']} false of {row['events']}"
@@ -107,7 +107,7 @@ _ABOUT = [
     ],
     [
         "FA-1",
-        "hears one long row of footfalls; its threshold takes 1.6 s to come down after a spike, so it is nearly deaf "
+        "receives one long row of footfalls; its threshold takes 1.6 s to come down after a spike, so it hardly fires "
         "to the next one. Each footfall by itself would do better, and would let the cut mark time",
     ],
 ]
@@ -117,31 +117,33 @@ _FLATTERED = (
 )
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
+def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List the goals, every row by event, people and worst feet where they were asked for, the full search."""
     del p
-    found = [Table("What was run", ("", ""), _about(said)), *_goals(said)]
-    for source in said["sources"]:
+    found = [Table("What was run", ("", ""), _about(summary)), *_goals(summary)]
+    for source in summary["sources"]:
         for protocol in source["protocols"]:
             found += _of_protocol(source, protocol)
-    return [*found, *_full_search(said)]
+    return [*found, *_full_search(summary)]
 
 
-def _about(said: Said) -> list[list[str]]:
-    points = "; ".join(f"{s} {', '.join(map(str, events.values()))}" for s, events in said["search_points"].items())
-    there = {row["row"] for source in said["sources"] for protocol in source["protocols"] for row in protocol["rows"]}
+def _about(summary: Summary) -> list[list[str]]:
+    points = "; ".join(f"{s} {', '.join(map(str, events.values()))}" for s, events in summary["search_points"].items())
+    there = {
+        row["row"] for source in summary["sources"] for protocol in source["protocols"] for row in protocol["rows"]
+    }
     rows = [
-        ["judged", said["judged"]],
+        ["judged", summary["judged"]],
         *_ABOUT,
         *([name, about] for name, about in ROWS.items() if name in there),
         ["points to choose from, by event", f"{points}. {_FLATTERED}"],
     ]
-    return [*rows, *([["not here, so skipped", ", ".join(said["skipped"])]] if said["skipped"] else [])]
+    return [*rows, *([["not here, so skipped", ", ".join(summary["skipped"])]] if summary["skipped"] else [])]
 
 
-def _goals(said: Said) -> Iterator[Table]:
+def _goals(summary: Summary) -> Iterator[Table]:
     rows = []
-    for source in said["sources"]:
+    for source in summary["sources"]:
         for row in (r for protocol in source["protocols"] for r in protocol["rows"] if "goal" in r):
             figures = row["figures"]
             goal, reached = [], []
@@ -199,11 +201,11 @@ def _by_person(title: str, row: Mapping[str, Any], by_minute: bool) -> Iterator[
         yield Table(f"{title}, what was chosen", ("folds", "point"), points, folded=True)
 
 
-def _full_search(said: Said) -> Iterator[Table]:
-    if not said["full_search"]:
+def _full_search(summary: Summary) -> Iterator[Table]:
+    if not summary["full_search"]:
         return
     rows = []
-    for one in said["full_search"]:
+    for one in summary["full_search"]:
         inside = f"{one['inside']['missed']}, {one['inside']['false']}, {_some(one['inside']['rms_ms'])}"
         ratio = f"{one['lambda_1']} : {one['lambda_2']}"
         about = [EVENTS[one["event"]], one["all_else"], one["left_out"], f"{one['tau']:.0f}", str(one["kappa"]), ratio]

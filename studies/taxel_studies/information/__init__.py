@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from taxel_studies.information import footfalls, grasps, postures
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,33 +53,33 @@ def realise(params: dict[str, Any], seed: int, data: Path) -> dict[str, Any]:
     return found
 
 
-def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Summary:
     """Keep every answer, by folder and question."""
     del p, data
-    said: Said = {}
+    summary: Summary = {}
     for row in rows:
-        said.setdefault(row.params["folder"], {})[row.params["ask"]] = row.result
-    return said
+        summary.setdefault(row.params["folder"], {})[row.params["ask"]] = row.result
+    return summary
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Hold the answers against what was tried beforehand, with other code."""
-    return [one for folder, found in said.items() for one in ASKED[folder].statements(p, found)]
+    return [one for folder, found in summary.items() for one in ASKED[folder].statements(p, found)]
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
-    """Tell each set of recordings in a table."""
-    return [one for folder, found in said.items() for one in ASKED[folder].tables(p, found)]
+def tables(p: Parameters, summary: Summary) -> list[Table]:
+    """Return a table for each set of recordings."""
+    return [one for folder, found in summary.items() for one in ASKED[folder].tables(p, found)]
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw each set of recordings."""
-    return [one for folder, found in said.items() for one in ASKED[folder].draw(p, found)]
+    return [one for folder, found in summary.items() for one in ASKED[folder].draw(p, found)]
 
 
 STUDY = Study(
     name="information",
-    title="how many bits real touches hold, and what else tells as much",
+    title="how many bits real touches hold, and which simpler measurements hold as many",
     where="beside thesis 5.5 and 5.6",
     protocol=(
         "Bits of a classifier's answers, corrected by Panzeri and Treves; linear discriminants, smoothing and ridge "

@@ -13,7 +13,7 @@ from taxel.formats import plate
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 from taxel.information import LabelledTrial, answer
-from taxel_studies.study import Parameters, Said, Statement, Table
+from taxel_studies.study import Parameters, Statement, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -94,16 +94,16 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
     ).to_dict()
 
 
-def _bits(said: dict[str, Any], period: float, window: float) -> float | None:
-    return next((p["bits"] for p in said["points"] if (p["period_ms"], p["window_ms"]) == (period, window)), None)
+def _bits(summary: dict[str, Any], period: float, window: float) -> float | None:
+    return next((p["bits"] for p in summary["points"] if (p["period_ms"], p["window_ms"]) == (period, window)), None)
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Hold bits by period and time against what was tried beforehand."""
     found = []
     whole = p["most_trials"] == 0
-    if "person" in said:
-        person = said["person"]
+    if "person" in summary:
+        person = summary["person"]
         before = {(2.0, 50.0): 2.40, (10.0, 50.0): 2.10, (20.0, 50.0): 1.56, (50.0, 50.0): 0.60}
         before |= {(2.0, 10.0): 1.47, (2.0, 20.0): 1.90, (2.0, 400.0): 2.53, (50.0, 400.0): 2.49}
         ours = {key: _bits(person, *key) for key in before}
@@ -122,20 +122,20 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             late = [q["bits"] for q in person["points"] if q["window_ms"] == p["window_ms"]]
             found.append(
                 Statement(
-                    "A fast period tells more early, and none tells more in the end (5.8, 5.13).",
+                    "A fast period has more bits early, and none has more in the end (5.8, 5.13).",
                     "figures 5.8 and 5.13",
                     f"to 50 ms {fast:.2f} against {slow:.2f} bits; to {p['window_ms']:g} ms {min(late):.2f} to "
                     f"{max(late):.2f}",
                     (fast > slow + 0.2 and max(late) - min(late) < 0.2) if whole else None,
                 )
             )
-    if "condition" in said:
-        condition = said["condition"]
+    if "condition" in summary:
+        condition = summary["condition"]
         length = next((c["bits"] for c in condition["controls"] if c["name"] == "length"), None)
         full = condition["full"]["bits"]
         found.append(
             Statement(
-                "How fast a person not trained on walked: the length of the stance alone tells more than the events.",
+                "How fast a person not trained on walked: the length of the stance has more bits than the events.",
                 "length .89; events to 400 ms .47",
                 f"length {length:.2f}; events {full:.2f}" if length is not None else "no length",
                 length > full if whole and length is not None else None,
@@ -145,10 +145,10 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
-    """Tell bits by period and time, and what else tells."""
+def tables(p: Parameters, summary: Summary) -> list[Table]:
+    """Return bits by period and time, and those of simpler measurements."""
     found = []
-    for ask, one in said.items():
+    for ask, one in summary.items():
         windows = sorted({q["window_ms"] for q in one["points"]})
         rows = []
         for period in p["periods_ms"]:
@@ -170,13 +170,13 @@ def tables(p: Parameters, said: Said) -> list[Table]:
     return found
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over time, a line a period, and the confusion of the full setting."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     figure = Figure(figsize=(11, 4.2), layout="constrained")
-    axes = figure.subplots(1, len(said), squeeze=False)[0]
-    for ax, (ask, one) in zip(axes, said.items(), strict=True):
+    axes = figure.subplots(1, len(summary), squeeze=False)[0]
+    for ax, (ask, one) in zip(axes, summary.items(), strict=True):
         for period in p["periods_ms"]:
             line = [q for q in one["points"] if q["period_ms"] == period]
             ax.plot([q["window_ms"] for q in line], [q["bits"] for q in line], marker="o", ms=3, label=f"{period:g} ms")

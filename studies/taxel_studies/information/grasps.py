@@ -12,7 +12,7 @@ from taxel.encode import ChangeEvents
 from taxel.formats import icub
 from taxel.frames import Frames
 from taxel.information import GramLDA, estimate, nested_predictions, zero_test
-from taxel_studies.study import Parameters, Said, Statement, Table
+from taxel_studies.study import Parameters, Statement, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,11 +51,11 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
         flat = x.reshape(len(x), -1).astype(np.float64)
         gram, features = flat @ flat.T, max(1, int(flat.any(0).sum()))
         folds = min(10, int(np.unique(y, return_counts=True)[1].min()))
-        said = [
+        answers = [
             nested_predictions([gram], [features], y, count=folds, seed=seed + k).responses
             for k in range(params["draws"])
         ]
-        return estimate(y, np.array(said), seed=seed).to_dict()
+        return estimate(y, np.array(answers), seed=seed).to_dict()
 
     found["first"] = bits(held[:, 0] - held[:, 0].mean(0))
     found["length"] = bits((lengths - lengths.mean())[:, None])
@@ -110,9 +110,9 @@ def _early_and_late(x: NDArray[Any], y: NDArray[Any], order: NDArray[np.int64], 
     return {"late by early": right(order < half), "halves": float(np.mean(shares)), "halves_sd": float(np.std(shares))}
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Hold bits by slice against what was tried beforehand."""
-    one, whole = said["object"], p["most_trials"] == 0
+    one, whole = summary["object"], p["most_trials"] == 0
     first = one["first"]
     found = [
         Statement(
@@ -140,10 +140,10 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
-    """Tell bits by slice."""
+def tables(p: Parameters, summary: Summary) -> list[Table]:
+    """Return bits by slice, as a table."""
     del p
-    one = said["object"]
+    one = summary["object"]
     rows = [
         [f"to slice {s}", f"{a['bits']:.2f}", f"{b['bits']:.2f}", f"[{b['interval'][0]:.2f} {b['interval'][1]:.2f}]"]
         for s, a, b in zip(one["slices"], one["pictures"], one["events"], strict=True)
@@ -157,12 +157,12 @@ def tables(p: Parameters, said: Said) -> list[Table]:
     return [Table("hand, object: bits", ["changes since the first slice", "pictures", "events", "95 %"], rows, note)]
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over slices."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     del p
-    one = said["object"]
+    one = summary["object"]
     figure = Figure(figsize=(6, 4), layout="constrained")
     ax = figure.subplots()
     for name in ("pictures", "events"):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taxel.formats import popu
 from taxel.information import estimate, nested_predictions, zero_test
-from taxel_studies.study import Parameters, Said, Statement, Table
+from taxel_studies.study import Parameters, Statement, Summary, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,8 +40,8 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
         return nested_predictions([centred @ centred.T], [features], labels, groups=poses, seed=seed + draw).responses
 
     def bits(xs: list[NDArray[Any]]) -> dict[str, Any]:
-        said = np.array([named(one, k) for k, one in enumerate(xs)])
-        return estimate(y, said, groups=poses, seed=seed).to_dict()
+        answers = np.array([named(one, k) for k, one in enumerate(xs)])
+        return estimate(y, answers, groups=poses, seed=seed).to_dict()
 
     random = np.random.default_rng(seed)
     found: dict[str, Any] = {
@@ -63,29 +63,29 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
     return found
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Hold bits by number of taxels against what was tried beforehand."""
-    one = said["posture"]
+    one = summary["posture"]
     before = {16: 1.1, 64: 1.87}
     ours = {n: b["bits"] for n, b in zip(one["taxels"], one["random"], strict=True) if n in before}
     whole = p["most_trials"] == 0
-    told = ", ".join(f"{n} at random {bits:.2f}" for n, bits in ours.items())
+    listed = ", ".join(f"{n} at random {bits:.2f}" for n, bits in ours.items())
     same = all(abs(bits - before[n]) <= 0.35 for n, bits in ours.items()) and one["all"]["bits"] > 1.8
     return [
         Statement(
             "Which of four postures somebody lies in, by number of taxels; new poses.",
             "all 2.00 of 2 bits, " + ", ".join(f"{n} at random {before[n]:.2f}" for n in ours) + ", loaded or not 1.63",
-            f"all {one['all']['bits']:.2f} of 2 bits, {told}, loaded or not {one['on_off']['bits']:.2f}",
+            f"all {one['all']['bits']:.2f} of 2 bits, {listed}, loaded or not {one['on_off']['bits']:.2f}",
             same if whole else None,
             "tried beforehand with other code; 28 poses of one person, interval over poses; within .35 bit",
         )
     ]
 
 
-def tables(p: Parameters, said: Said) -> list[Table]:
-    """Tell bits by number of taxels."""
+def tables(p: Parameters, summary: Summary) -> list[Table]:
+    """Return bits by number of taxels, as a table."""
     del p
-    one = said["posture"]
+    one = summary["posture"]
 
     def row(name: str, b: dict[str, Any]) -> list[str]:
         return [name, f"{b['bits']:.2f}", f"[{b['interval'][0]:.2f} {b['interval'][1]:.2f}]"]
@@ -96,12 +96,12 @@ def tables(p: Parameters, said: Said) -> list[Table]:
     return [Table("mat, posture: bits of 2", ["taxels", "bits", "95 %, by poses"], rows, note)]
 
 
-def draw(p: Parameters, said: Said) -> list[Figure]:
+def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over the number of taxels."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     del p
-    one = said["posture"]
+    one = summary["posture"]
     figure = Figure(figsize=(6, 4), layout="constrained")
     ax = figure.subplots()
     bits = np.array([b["bits"] for b in one["random"]])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from taxel_studies.rivals.protocols import realise
 from taxel_studies.rivals.rules import CHOSEN_ON, PUBLISHED, RULES
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Row, Statement, Study, Summary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,7 +56,7 @@ def tasks(p: Parameters) -> list[Task]:
     ]
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """List patterns and loads by protocol and rule, with what is ours in each, and every load that was looked at."""
     lines = []
     for protocol in p["protocols"]:
@@ -72,7 +72,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
                     "protocol": protocol,
                     "rule": rule,
                     "updates": RULES[rule].updates,
-                    "ours": RULES[rule].said,
+                    "ours": RULES[rule].ours,
                     "published": PUBLISHED.get(rule),
                     "inputs": inputs,
                     "p": [here[n]["p"] for n in inputs],
@@ -92,10 +92,10 @@ def _at_90(tried: Sequence[Sequence[float]], inputs: int) -> float | None:
     return None
 
 
-def statements(p: Parameters, said: Said) -> list[Statement]:
+def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Hold Gardner and Grüning's figures, and the loads that the thesis names, beside ours."""
     found = []
-    a = {line["rule"]: line for line in said["lines"] if line["protocol"] == "a"}
+    a = {line["rule"]: line for line in summary["lines"] if line["protocol"] == "a"}
     full = (p["runs_a"], p["epochs_a"]) == (PARAMETERS["runs_a"], PARAMETERS["epochs_a"])
     if "INST" in a:
         ours = dict(zip(a["INST"]["inputs"], a["INST"]["p"], strict=True))
@@ -124,7 +124,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
                 )
             )
     for protocol in p["protocols"]:
-        lines = [line for line in said["lines"] if line["protocol"] == protocol and line["load"]]
+        lines = [line for line in summary["lines"] if line["protocol"] == protocol and line["load"]]
         best = max((line for line in lines if line["rule"] != "ConeX"), key=lambda line: line["load"][-1], default=None)
         cone = next((line for line in lines if line["rule"] == "ConeX"), None)
         if best is not None and cone is not None:
@@ -144,7 +144,7 @@ def _loads(line: dict[str, Any]) -> str:
     return ", ".join(f"{v:.3f} at {n}" for n, v in zip(line["inputs"], line["load"], strict=True))
 
 
-def draw(p: Parameters, said: Said) -> Figure:
+def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw load by inputs, a line a rule, a panel a protocol; published loads as dotted lines."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
@@ -156,7 +156,7 @@ def draw(p: Parameters, said: Said) -> Figure:
     }
     for ax, protocol in zip(axes, p["protocols"], strict=True):
         for k, name in enumerate(p["rules"]):
-            line = next(x for x in said["lines"] if (x["protocol"], x["rule"]) == (protocol, name))
+            line = next(x for x in summary["lines"] if (x["protocol"], x["rule"]) == (protocol, name))
             ax.plot(line["inputs"], line["load"], ".-", color=f"C{k}", lw=1.2, label=f"{name} ({line['updates']})")
             if line["published"] is not None:
                 ax.axhline(line["published"], color=f"C{k}", lw=0.8, ls=":")
@@ -181,7 +181,7 @@ STUDY = Study(
         "whole ms, targets at 200 c / 6 ms, each rule's own neuron; all of 100 runs have every pattern right within 1"
         " ms after at most 2000 epochs, and a load is left at the first run that fails. No bounds; 67 thresholds for "
         "ConeX, whose silence holds at every instant, and which in (a) loses all inputs up to a spike where the SRM0 "
-        "takes its threshold off. Whether weights change once an epoch (batch) or after each pattern is said with "
+        "takes its threshold off. Whether weights change once an epoch (batch) or after each pattern is stated with "
         "each rule. What was not published was chosen at 200 inputs on seeds of its own. The Tempotron and SKIM learn"
         " no times."
     ),

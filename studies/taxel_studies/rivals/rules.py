@@ -39,7 +39,7 @@ class Rule:
         Times threshold / (inputs * patterns) in batch, threshold / inputs after each pattern.
     begin : float
         The load that the search begins at.
-    said : str
+    ours : str
         Which of its constants are ours.
     """
 
@@ -47,7 +47,7 @@ class Rule:
     updates: str
     rate: float
     begin: float
-    said: str
+    ours: str
 
 
 #: 40 thresholds over inputs and patterns is the published 600 / (N n_s p), at a threshold of 15 mV and one target.

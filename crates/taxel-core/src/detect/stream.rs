@@ -16,7 +16,7 @@ mod tests;
 use named_neuron::NamedNeuron;
 use repairs::Repairs;
 
-/// How many events go through the stream between two looks at [`Stop`].
+/// How many events go through the stream between two checks of [`Stop`].
 const PIECE: usize = 65_536;
 
 /// Times farther from 0 than this lose their whole us in a neuron's ms, us.
@@ -159,7 +159,7 @@ impl ReadoutStream {
         self.neurons.iter().map(|one| (one.label.as_str(), one.stream.as_ref().map_or(0.0, NeuronStream::potential)))
     }
 
-    /// Processes many events, and asks `stop` between pieces of them.
+    /// Processes many events, and checks `stop` between pieces of them.
     ///
     /// # Errors
     ///
@@ -174,7 +174,7 @@ impl ReadoutStream {
         Ok(out)
     }
 
-    /// Processes many pictures, and asks `stop` between them.
+    /// Processes many pictures, and checks `stop` between them.
     ///
     /// # Errors
     ///

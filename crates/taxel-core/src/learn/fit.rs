@@ -1,4 +1,4 @@
-//! What a fit says, and what is known on the way, whichever the learner.
+//! The result of a fit, and its progress, for all learners.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,10 +8,11 @@ use super::statement::Parts;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// The objective is proven to lie within `tolerance` of its least value; what must be met is met, in continuous time by the
-    /// neuron itself, run on the patterns.
+    /// CONE-X: the weights meet all rows, and in continuous time the neuron, run on the patterns, fires at its targets alone;
+    /// `gap` bounds the objective. CONE-R, which has no rows that must be met: the objective is proven to lie within
+    /// `tolerance` of its least value.
     Solved,
-    /// No weights meet what must be met; a certificate proves it. (In 6.14 nothing must be.)
+    /// No weights meet all rows of CONE-X; a certificate proves it.
     Infeasible,
     /// Neither is known: the weights are the best so far.
     Stopped,
@@ -29,7 +30,7 @@ impl Status {
     }
 }
 
-/// Who found the least objective.
+/// The engine that found the least objective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Engine {
     /// taxel's own; where its result cannot be proven, the cone solver goes on from it.
@@ -52,23 +53,23 @@ impl Engine {
     }
 }
 
-/// What is known after a round of row generation.
+/// Progress after a round of row generation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Round {
     /// Counted from 1.
     pub round: usize,
-    /// Rows that are looked at.
+    /// Rows of the working problem.
     pub rows: usize,
-    /// The objective: where silence must be kept that of this round, else the best so far.
+    /// The objective: of CONE-X that of this round, of CONE-R the best so far.
     pub objective: f64,
-    /// What is left to do.
+    /// The distance to the end.
     pub left: Left,
 }
 
-/// What is left to do after a round.
+/// The distance to the end after a round.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Left {
-    /// Silence must be kept, and is broken in so many stretches of time.
+    /// CONE-X: silence is violated in so many stretches of time.
     Broken(usize),
     /// The best objective's relative distance to the best bound so far.
     Gap(f64),
@@ -81,7 +82,7 @@ pub struct Fit {
     pub status: Status,
     /// mV, one a train; NaN where there are none.
     pub weights: Vec<f64>,
-    /// 6.14 (6.11 where targets and silence must be met) at these weights; infinite where there are none.
+    /// 6.14 (6.11 of CONE-X) at these weights; infinite where there are none.
     pub objective: f64,
     /// Its terms.
     pub parts: Parts,
@@ -89,6 +90,6 @@ pub struct Fit {
     pub gap: f64,
     /// Rounds of row generation.
     pub rounds: usize,
-    /// Who found it.
+    /// The engine that found it.
     pub engine: Engine,
 }

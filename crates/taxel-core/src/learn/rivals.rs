@@ -109,7 +109,7 @@ macro_rules! rules {
         $(mod $module;)*
         $(pub use $module::{$($law),+};)*
 
-        /// What the sources of all rules by epochs say.
+        /// The published defaults of all rules by epochs.
         const SOURCES: &[Source] = &[$($module::SOURCE),*];
 
         /// Which rule, with its own constants.

@@ -1,4 +1,4 @@
-//! The stated problem, equations 6.9 to 6.14, once for all learners: what is asked at which time, and what it counts.
+//! The stated problem, equations 6.9 to 6.14, once for all learners: its rows, their times, and its objective.
 //!
 //! `rows` names and states any row (6.9, 6.10), `targets` writes out those at the targets, `silence` sweeps over all others,
 //! `objective` is 6.14 (6.11 is a part of it), `relaxed` its value, `certificate` the proof that nothing meets the rows.
@@ -18,7 +18,9 @@ mod targets;
 pub use bounds::{Bound, Bounds};
 pub(crate) use bounds::{bounds_of, check_bounds};
 pub use certificate::Certificate;
-pub(crate) use examples::{check_example, check_examples, check_heard, check_pattern, check_some_target, check_trains};
+pub(crate) use examples::{
+    check_example, check_examples, check_pattern, check_some_target, check_trains, check_untargeted,
+};
 pub(crate) use objective::{Choice, NOTHING, Objective, relative_gap};
 pub use objective::{Divisor, Norm, Parts};
 pub(crate) use peak::{Peak, exceeds, largest};

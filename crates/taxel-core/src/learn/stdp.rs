@@ -1,4 +1,4 @@
-//! Spike-timing-dependent plasticity: a neuron that finds a pattern which repeats in its inputs, without being told.
+//! Spike-timing-dependent plasticity: a neuron that finds a pattern which repeats in its inputs, without labels.
 //!
 //! After Masquelier, Guyonneau and Thorpe (2008), PLoS ONE 3:e1377. Since its last spike the neuron's potential is
 //!
@@ -102,7 +102,7 @@ impl Stdp {
     }
 }
 
-/// The neuron at work, in one stream of time.
+/// The state of the neuron in one stream of time.
 #[derive(Debug, Clone)]
 pub struct StdpNeuron {
     parameters: Stdp,
@@ -163,19 +163,19 @@ impl StdpNeuron {
         Ok(())
     }
 
-    /// Forgets the inputs and spikes that came so far, and keeps the weights.
+    /// Resets the state of the neuron; the weights stay.
     pub fn rest(&mut self) {
         self.last.fill(f64::NEG_INFINITY);
         (self.fired, self.now) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         (self.slow, self.fast, self.armed) = (0.0, 0.0, true);
     }
 
-    /// Takes the next piece of the stream; gives the neuron's spikes in it, ms. Where not to `learn`, weights stay.
+    /// Runs the neuron on the next piece of the stream; returns its spikes, ms. Without `learn` the weights stay.
     ///
     /// # Errors
     ///
-    /// `Problem` for another number of trains or a piece that begins before the last one's end (nothing is taken then),
-    /// `Interrupted` where asked to stop (what came before stays taken).
+    /// `Problem` for another number of trains or a piece that begins before the last one's end (nothing changes then),
+    /// `Interrupted` where the caller stops it (weights stay as they are then).
     pub fn push(&mut self, piece: &SpikeTrains, learn: bool, stop: Stop<'_>) -> Result<Vec<f64>> {
         if piece.len() != self.weights.len() {
             return Err(problem!("piece of {} trains: must be {}, as before", piece.len(), self.weights.len()));
@@ -189,15 +189,15 @@ impl StdpNeuron {
             if k % 4096 == 0 {
                 stop.check()?;
             }
-            self.pass(spike.t, learn, &mut out);
-            self.hear(spike.t, spike.train as usize, learn);
+            self.advance(spike.t, learn, &mut out);
+            self.add_input(spike.t, spike.train as usize, learn);
         }
-        self.pass(piece.stop, learn, &mut out);
+        self.advance(piece.stop, learn, &mut out);
         Ok(out)
     }
 
-    /// Lets time go on until `t`, firing where the potential rises to the threshold.
-    fn pass(&mut self, t: f64, learn: bool, out: &mut Vec<f64>) {
+    /// Advances to `t`, firing where the potential rises to the threshold.
+    fn advance(&mut self, t: f64, learn: bool, out: &mut Vec<f64>) {
         let Stdp { threshold, tau_m, tau_s, .. } = self.parameters;
         loop {
             let since = if self.now.is_finite() { t - self.now } else { 0.0 };
@@ -262,7 +262,7 @@ impl StdpNeuron {
     }
 
     #[inline]
-    fn hear(&mut self, t: f64, train: usize, learn: bool) {
+    fn add_input(&mut self, t: f64, train: usize, learn: bool) {
         let Stdp { a_minus, tau_minus, .. } = self.parameters;
         let weight = &mut self.weights[train];
         self.slow += *weight * self.scale;

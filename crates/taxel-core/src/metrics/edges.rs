@@ -1,4 +1,4 @@
-//! The window of ISI and SPIKE distances, and what lies outside the first and the last spike.
+//! The window of ISI and SPIKE distances, and the intervals before the first and after the last spike.
 
 use super::patterns::Patterns;
 use crate::{Result, problem};
@@ -10,7 +10,7 @@ pub(super) struct Window {
     pub(super) stop: f64,
 }
 
-/// The window that was asked for, or the widest of the patterns' own; every spike must lie in it.
+/// The given window, or the widest of the patterns' own; every spike must lie in it.
 pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Window> {
     let sides = || std::iter::once(a).chain(b);
     let widest = || {

@@ -1,4 +1,4 @@
-//! What every metric of the registry says of itself.
+//! The interface of the metrics of the registry.
 
 use serde::Deserialize;
 
@@ -7,7 +7,7 @@ use super::patterns::Patterns;
 use crate::parameters::Described;
 use crate::{Result, Stop};
 
-/// What a metric's file says of it.
+/// The properties of a metric.
 pub(super) trait Law {
     /// Its parameters, with their defaults and ranges.
     fn described() -> Described

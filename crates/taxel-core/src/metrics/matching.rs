@@ -56,7 +56,7 @@ fn nanoseconds(what: &str, times: &[f64]) -> Result<Vec<i64>> {
 ///
 /// # Errors
 ///
-/// `Problem` where so many lie within the windows that matching them would not end; `Interrupted` where `stop` says so.
+/// `Problem` where so many lie within the windows that matching them would not end; `Interrupted` where the caller stops it.
 pub fn in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<'_>) -> Result<Vec<(usize, usize)>> {
     // Row i of the table stands for the first i + 1 reference events, its column j for the first j detections. Only the
     // band of columns that some window reaches is kept; both its edges ascend from row to row.

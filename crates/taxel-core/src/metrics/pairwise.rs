@@ -8,12 +8,12 @@ use std::time::Duration;
 use crate::vectors::Instructions;
 use crate::{Error, Result, Stop};
 
-/// How often the caller's thread asks whether to stop while only others still work.
+/// How often the caller's thread checks whether to stop while only others still work.
 const ASK_EVERY: Duration = Duration::from_millis(20);
 
 /// How a matrix is worked on.
 pub struct Work<'a> {
-    /// Threads; the caller's is one of them, and the only one that asks `stop` and calls `progress`.
+    /// Threads; the caller's is one of them, and the only one that checks `stop` and calls `progress`.
     pub threads: usize,
     /// What a matrix of Victor-Purpura distances uses; the machine must have it.
     pub instructions: Instructions,
@@ -78,7 +78,7 @@ impl<'a> Work<'a> {
             };
             let handles: Vec<_> = (0..helpers).map(|_| scope.spawn(help)).collect();
             let mut outcome = run(Stop::when(&asked), &mut tell);
-            // Whoever presses Ctrl-C while only others still work is heard, too.
+            // Ctrl-C also works while only other threads still work.
             while working.load(Relaxed) > 0 && handles.iter().any(|h| !h.is_finished()) {
                 if stop.asked() {
                     halt.store(true, Relaxed);
@@ -89,7 +89,7 @@ impl<'a> Work<'a> {
             for handle in handles {
                 match handle.join() {
                     Ok(Ok(())) => {}
-                    // Others are interrupted where one found an error: that one is told.
+                    // The other threads are interrupted where one found an error, which is returned.
                     Ok(Err(error)) if outcome == Ok(()) || outcome == Err(Error::Interrupted) => outcome = Err(error),
                     Ok(Err(_)) => {}
                     Err(panic) => std::panic::resume_unwind(panic),

@@ -25,7 +25,7 @@ pub(super) struct Frame {
     cells_a_ms: f64,
 }
 
-/// A spike, ready to be looked up.
+/// A spike with its cell of time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Query {
     t: f64,
@@ -67,7 +67,7 @@ impl Frame {
         (((t - self.start) * self.cells_a_ms) as usize).min(self.cells - 1)
     }
 
-    /// A spike as it is looked up.
+    /// A spike with its cell of time.
     pub(super) fn query(&self, t: f64) -> Query {
         let mut stretch = ((t - self.start) / (STRETCH * self.tau)) as usize;
         // The edges decide, not how this division rounds.

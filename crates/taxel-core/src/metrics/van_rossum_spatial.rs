@@ -180,7 +180,7 @@ pub(super) enum Gauge {
     Absolutes,
 }
 
-/// Heights are kept in units that time raises; past this power they are brought down.
+/// Heights are stored in units that grow with time, and rescaled beyond this power.
 const HIGHEST: f64 = 200.0;
 
 impl Kernel {
@@ -209,7 +209,7 @@ impl Kernel {
         &self.by_offset[start..start + self.columns]
     }
 
-    /// Walks through the steps of both patterns; says for each stretch of time, from step to step and on for ever, what
+    /// Walks through the steps of both patterns; returns for each stretch of time, from step to step and on for ever, what
     /// the squares or absolutes of the taxels' differences add up to at its beginning.
     pub(super) fn walk(
         &self,

@@ -5,10 +5,10 @@ use super::kernel::{KernelSum, Shape};
 use super::model::{AT_EDGE, AfterSpike, Neuron};
 use super::threshold::{OutputSpike, Threshold};
 
-/// So many times as far below the threshold as counts as reaching it a potential may be that was trained to reach it there.
+/// A potential that was trained to reach the threshold may be below it by so many times `touch`.
 const ROUNDED: f64 = 4.0;
 
-/// The neuron of continuous time at work.
+/// The state of a neuron in continuous time.
 #[derive(Debug, Clone)]
 pub(super) struct ContinuousStream {
     neuron: Neuron,
@@ -17,7 +17,7 @@ pub(super) struct ContinuousStream {
     /// The potential at `at`.
     state: KernelSum,
     at: f64,
-    /// The end of the refractory time (or the start of the printed first rise), while it lies ahead.
+    /// The end of the refractory time (or the start of the printed first rise), while it is still to come.
     edge: Option<f64>,
     next: Next,
 }
@@ -38,7 +38,7 @@ impl ContinuousStream {
         Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: Next::Never }
     }
 
-    /// Goes from a state that somebody else kept at `at` to `until`, where an input comes or the end; gives the state there.
+    /// Continues from a state at `at`, which the caller computed, to an input or the end at `until`; returns the state there.
     pub(super) fn resume(
         &mut self,
         state: KernelSum,
@@ -61,12 +61,12 @@ impl ContinuousStream {
         self.shape.after(self.state, (t - self.at).max(0.0)).b
     }
 
-    /// The end of the refractory time, or where the printed first rise sets in, while it lies ahead.
+    /// The end of the refractory time, or the start of the printed first rise, while it is still to come.
     pub(super) fn edge(&self) -> Option<f64> {
         self.edge
     }
 
-    /// What is left of the threshold's rise at `t`, mV.
+    /// The rest of the threshold's rise at `t`, mV.
     pub(super) fn rise(&self, t: f64) -> f64 {
         self.threshold.rise(t)
     }
@@ -80,7 +80,7 @@ impl ContinuousStream {
         self.shape.add(&mut self.state, weight, self.at - t);
     }
 
-    /// Fires whatever crosses up to an input at `t`, included.
+    /// Fires at every crossing up to an input at `t`, included.
     fn settle_at_input(&mut self, t: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
         self.settle(t, horizon, out);
         // The potential of a trained neuron reaches the threshold to rounding. An input there comes too late to turn it down.
@@ -108,7 +108,7 @@ impl ContinuousStream {
         self.next = Next::Unknown;
     }
 
-    /// Fires whatever crosses up to `until`, included; what crosses after `horizon` is not asked for.
+    /// Fires at every crossing up to `until`, included; crossings after `horizon` need not be found.
     pub(super) fn settle(&mut self, until: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
         loop {
             let waiting = self.edge.is_some() && self.threshold.fired.is_some();
@@ -121,7 +121,7 @@ impl ContinuousStream {
                 (_, Some(edge)) if edge <= until => {
                     self.move_to(edge);
                     self.edge = None;
-                    // The neuron is free again: it fires at once where the potential is above the threshold already.
+                    // After the refractory time the neuron fires at once where the potential is above the threshold already.
                     self.next = self.crossing(horizon);
                 }
                 _ => return,

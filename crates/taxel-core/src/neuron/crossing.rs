@@ -1,4 +1,4 @@
-//! Where the potential meets the threshold, exactly, between two inputs.
+//! The exact time at which the potential reaches the threshold between two inputs.
 //!
 //! Between input spikes potential less threshold, `g(s) = U(s) - theta - c e^{-s/tau_rec}`, is a sum of few exponentials, and
 //! ends at `-theta`. Its derivative changes sign twice at most, so that `g` has one inner maximum at most, with a rise
@@ -17,7 +17,7 @@ pub(crate) struct Peak {
 
 /// Where the potential first reaches the threshold, ms from now, if no input comes; `rise` decays with `tau_rec`.
 ///
-/// A maximum `touch` mV below the threshold reaches it. Asked for up to `within` ms from now; may be left out beyond.
+/// A maximum `touch` mV below the threshold reaches it. Crossings later than `within` ms from now need not be found.
 pub(super) fn next_crossing(
     shape: &Shape,
     state: KernelSum,
@@ -55,7 +55,7 @@ pub(super) fn next_crossing(
         }
         (low, high) = (peak.from, peak.at);
     }
-    // In there is one root. Newton from the left, where the curve bends down it stays left of the root; kept inside.
+    // There is one root between `low` and `high`. Newton's method from the left stays left of it where the curve is concave.
     let mut s = low;
     for _ in 0..100 {
         let (value, slope) = above(s);
@@ -145,7 +145,7 @@ fn double_exponential_peak(shape: &Shape, state: KernelSum, rise: f64, tau_rec: 
     };
     let high = match turn {
         Some(turn) if turn > low && f(turn) < 0.0 => turn,
-        // Behind its turn f keeps its direction: look ahead until it is below 0, or sure never to be.
+        // After its turn f is monotone: search forward until it is below 0, or can no longer become so.
         _ => {
             let mut reach = turn.unwrap_or(0.0).max(low) + tau_s;
             while f(reach) >= 0.0 {

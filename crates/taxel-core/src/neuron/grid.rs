@@ -5,7 +5,7 @@ use super::model::{AfterSpike, Neuron};
 use super::points::{Grid, Place};
 use super::threshold::{OutputSpike, Threshold};
 
-/// The grid neuron at work.
+/// The state of a neuron on a grid.
 #[derive(Debug, Clone)]
 pub(super) struct GridStream {
     neuron: Neuron,
@@ -58,7 +58,7 @@ impl GridStream {
         }
     }
 
-    /// Fires at whatever point up to `until`, included, finds the potential at or above the threshold.
+    /// Fires at every point up to `until`, included, at which the potential has reached the threshold.
     pub(super) fn settle(&mut self, until: f64, out: &mut Vec<OutputSpike>) {
         if self.grid.time(self.point) <= until {
             self.compare(out);
@@ -72,10 +72,10 @@ impl GridStream {
         if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
     }
 
-    /// Goes on point by point as long as the potential could reach the threshold without a further input.
+    /// Steps point by point as long as the potential could reach the threshold without a further input.
     ///
-    /// Where it could not, the state stays behind and catches up in one jump at the next input. What is done depends on
-    /// the state alone, so that a stream cut elsewhere gives the same bits.
+    /// Where it could not, the state stays and is advanced in one jump at the next input. The steps depend on the state
+    /// alone, so that a stream cut elsewhere gives the same bits.
     fn step_through(&mut self, last: f64, out: &mut Vec<OutputSpike>) {
         while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - self.slack() {
             self.jump(self.point + 1.0);
@@ -83,7 +83,7 @@ impl GridStream {
         }
     }
 
-    /// How far below the threshold a potential may end and still be looked at, mV.
+    /// The distance below the threshold from which on a potential is compared with it, mV.
     fn slack(&self) -> f64 {
         self.threshold.slack(self.grid.rounding_ms(self.grid.time(self.point)))
     }

@@ -1,8 +1,8 @@
-//! The kernels, and the two numbers that carry a weighted sum of them through time.
+//! The kernels, and the state of two numbers from which a weighted sum of them is computed at any later time.
 
 use serde::{Deserialize, Serialize};
 
-/// What an input spike does to the potential.
+/// The effect of an input spike on the potential.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kernel {
@@ -27,7 +27,7 @@ pub struct Shape {
     pub(crate) rate: f64,
 }
 
-/// A weighted sum of kernels, as it goes on without further input.
+/// The state of a weighted sum of kernels without further input.
 ///
 /// This stepwise form neither overflows nor loses digits after a long time, as `e^{-t/tau} (A t/tau - B)` does.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -38,7 +38,7 @@ pub struct KernelSum {
     pub b: f64,
 }
 
-/// What a stretch of time without input does to a [`KernelSum`]: `a' = aa a`, `b' = ba a + bb b`.
+/// The effect of a stretch of time without input on a [`KernelSum`]: `a' = aa a`, `b' = ba a + bb b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// From `a` to `a`.
@@ -68,7 +68,7 @@ impl Shape {
         Self { kernel, tau, tau_s, scale, rate }
     }
 
-    /// What one input of weight 1 makes of a state of 0, just after it.
+    /// The state just after one input of weight 1, from a state of 0.
     #[must_use]
     #[inline]
     pub fn input(&self) -> KernelSum {
@@ -78,7 +78,7 @@ impl Shape {
         }
     }
 
-    /// What `dt` ms without input do.
+    /// The effect of `dt` ms without input.
     #[must_use]
     #[inline]
     pub fn step(&self, dt: f64) -> Step {

@@ -86,9 +86,9 @@ pub(crate) const AT_EDGE: f64 = 1e-6;
 /// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
 const TOUCH: f64 = 1e-12;
 
-/// What is left at `t` of a rise of `plus` mV that set in `recovering` ms ago, mV (6.8).
+/// The rest at `t` of a rise of `plus` mV that began `recovering` ms ago, mV (6.8).
 ///
-/// One that rounding puts a hair before its time must still be there: an input can lie just on the edge.
+/// A rise that begins later than `t` by rounding alone counts, as an input can be exactly at the edge.
 pub(super) fn left_of_rise(plus: f64, recovering: f64, tau_rec: f64, t: f64) -> f64 {
     if plus == 0.0 || recovering < -rounding_ms(t) { 0.0 } else { plus * (-recovering / tau_rec).exp() }
 }
@@ -152,7 +152,7 @@ impl Neuron {
         Ok(())
     }
 
-    /// In units of how many mV the threshold is near its default: so what counts as met need not depend on the scale.
+    /// The unit of potential, mV, in which the threshold is near its default, so that tolerances do not depend on the scale.
     ///
     /// A power of 2, so that nothing is rounded on the way there and back.
     pub(crate) fn unit(&self) -> f64 {
@@ -197,12 +197,12 @@ impl Neuron {
         self.theta_0 + since.map_or(0.0, |t| self.rise(Some(0.0), t))
     }
 
-    /// What is left at `t` of the threshold's rise by the last spike, mV.
+    /// The rest at `t` of the threshold's rise by the last spike, mV.
     pub(crate) fn rise(&self, spike: Option<f64>, t: f64) -> f64 {
         spike.map_or(0.0, |spike| left_of_rise(self.theta_plus, t - spike - self.refractory, self.tau_rec(), t))
     }
 
-    /// How long before `t` other times are, ms: on a grid that begins at `start` reckoned from the numbers of its points.
+    /// The time from other times to `t`, ms: on a grid that begins at `start` computed from the numbers of its points.
     pub(crate) fn ages(&self, start: f64, t: f64) -> impl Fn(f64) -> f64 + use<> {
         let grid = (self.time == Time::Grid).then(|| Grid::new(start, self.step_ms));
         let here = grid.map(|grid| grid.place(t));
@@ -217,7 +217,7 @@ impl Neuron {
         points_between(start, end, self.step_ms)
     }
 
-    /// Refuses more grid points than can be laid out, before memory is asked for.
+    /// Refuses more grid points than can be stored, before memory is allocated.
     pub(crate) fn check_rows(&self, points: f64) -> Result<()> {
         check_points(points, MOST_LAID_OUT, self.step_ms)
     }

@@ -1,13 +1,13 @@
 //! The points of a grid in time: their times, their numbers, and how many are too many.
 //!
-//! Far from time 0 neighbouring times lie so far apart that `start + k step_ms` is rounded by more than a trained potential may
-//! be off. So the state of a neuron and the ages of its inputs are both reckoned from the number of a step, never from the
+//! Far from time 0 neighbouring times are so far apart that `start + k step_ms` is rounded by more than a trained potential may
+//! be off. So the state of a neuron and the ages of its inputs are both computed from the number of a step, never from the
 //! difference of two rounded times.
 
 use super::rounding::rounding_ms;
 use crate::{Result, problem};
 
-/// So many points are laid out at most (some GB), and so many stepped through (some ten seconds).
+/// The most points that are stored (some GB), and that are stepped through (some ten seconds).
 pub(crate) const MOST_LAID_OUT: f64 = 2e7;
 pub(super) const MOST_STEPPED: f64 = 1e9;
 
@@ -18,12 +18,12 @@ pub(crate) struct Grid {
     pub(crate) step_ms: f64,
 }
 
-/// A time by the grid.
+/// A time relative to the nearest point of a grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Place {
     /// The number of the nearest point.
     point: f64,
-    /// How long behind that point, ms; 0 at the point itself, below 0 before it.
+    /// How long after that point, ms; 0 at the point itself, negative before it.
     rest: f64,
 }
 
@@ -43,12 +43,12 @@ impl Place {
         if self.rest > 0.0 { self.point + 1.0 } else { self.point }
     }
 
-    /// The first point behind the time.
+    /// The first point after the time.
     pub(crate) fn behind(self) -> f64 {
         if self.rest >= 0.0 { self.point + 1.0 } else { self.point }
     }
 
-    /// The last point not behind the time.
+    /// The last point not after the time.
     pub(crate) fn until(self) -> f64 {
         if self.rest < 0.0 { self.point - 1.0 } else { self.point }
     }
@@ -59,24 +59,36 @@ impl Grid {
         Self { start, step_ms }
     }
 
-    /// When a point is, ms.
+    /// The time of a point, ms.
     pub(crate) fn time(&self, point: f64) -> f64 {
         self.start + point * self.step_ms
     }
 
-    /// Where a time lies. Which side of a point is decided by the point's time as it is told, the distance without rounding.
+    /// The place of a time. Its side of the nearest point is decided by the point's rounded time, its distance is exact.
     pub(crate) fn place(&self, t: f64) -> Place {
         let since = t - self.start;
         let point = (since / self.step_ms).round();
-        let told = self.time(point);
-        if t == told {
+        let rounded = self.time(point);
+        if t == rounded {
             return Place::at(point);
         }
-        // What the difference of the two times lost by rounding.
+        // The rounding error of `t - start`.
         let back = since + self.start;
         let lost = (t - back) + ((back - since) - self.start);
         let rest = (-point).mul_add(self.step_ms, since) + lost;
-        Place { point, rest: if t > told { rest.max(f64::MIN_POSITIVE) } else { rest.min(-f64::MIN_POSITIVE) } }
+        Place { point, rest: if t > rounded { rest.max(f64::MIN_POSITIVE) } else { rest.min(-f64::MIN_POSITIVE) } }
+    }
+
+    /// Whether a time is at or before a point, to rounding.
+    pub(crate) fn has_come(&self, t: f64, point: f64) -> bool {
+        let now = self.time(point);
+        t <= now + rounding_ms(now)
+    }
+
+    /// The first point that is not before a time, to rounding.
+    pub(crate) fn first_from(&self, t: f64) -> f64 {
+        let nearest = self.place(t).point;
+        if self.has_come(t, nearest) { nearest } else { nearest + 1.0 }
     }
 
     /// How long after one time another is, ms.
@@ -84,14 +96,14 @@ impl Grid {
         (to.point - from.point) * self.step_ms + (to.rest - from.rest)
     }
 
-    /// How many points there are up to `end`, one that rounding puts a hair behind it included.
+    /// How many points there are up to `end`, a point that rounding alone puts after it included.
     pub(crate) fn points_until(&self, end: f64) -> f64 {
         let place = self.place(end);
         let last = if self.time(place.point) <= end + rounding_ms(end) { place.point } else { place.until() };
         (last + 1.0).max(0.0)
     }
 
-    /// How far the time of a point may be rounded, ms.
+    /// The largest rounding error of the time of a point, ms.
     pub(super) fn rounding_ms(&self, t: f64) -> f64 {
         4.0 * f64::EPSILON * self.start.abs().max(t.abs())
     }
@@ -102,7 +114,7 @@ pub(crate) fn points_between(start: f64, end: f64, step_ms: f64) -> f64 {
     Grid::new(start, step_ms).points_until(end)
 }
 
-/// Refuses more points than can be had, before memory is asked for.
+/// Refuses more points than `most`, before memory is allocated.
 pub(crate) fn check_points(points: f64, most: f64, step_ms: f64) -> Result<()> {
     if points <= most {
         return Ok(());

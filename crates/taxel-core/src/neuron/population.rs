@@ -1,8 +1,8 @@
 //! Many neurons on the same inputs at once.
 //!
 //! Neurons go in blocks: while all of time runs through a block, its weights stay in the cache. States of a block lie side
-//! by side and move in step. What can happen at all is told from a bound that costs a few operations a neuron; only where
-//! it says "perhaps" a neuron is looked at by itself, by the code of the single neuron, so both say the same.
+//! by side and move in step. A bound that costs a few operations a neuron excludes most crossings; where
+//! it does not, the code of the single neuron runs, so that both give the same spikes.
 
 mod continuous;
 mod grid;

@@ -8,7 +8,7 @@ use super::threshold::OutputSpike;
 use crate::allowed::one_weight_a_train;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// Grid points between two looks for Ctrl-C.
+/// Grid points between two checks for Ctrl-C.
 const POINTS_A_LOOK: f64 = 65_536.0;
 
 impl Neuron {
@@ -51,7 +51,7 @@ impl Neuron {
         Ok(out)
     }
 
-    /// Moves a stream towards `to`, so far on a grid that what is left takes no time worth a look for Ctrl-C.
+    /// Advances a stream on a grid towards `to`, checking for Ctrl-C; the caller advances the rest.
     fn advance(
         &self,
         stream: &mut NeuronStream,
@@ -76,7 +76,7 @@ impl Neuron {
     /// The potential at `times` (ms, ascending), given that the neuron fired at `spikes` (ms, ascending); mV.
     ///
     /// Without spikes this is the linear sum 6.4. With them it is 6.7: 0 in the refractory time, then what `after_spike`
-    /// leaves. At a spike itself it is what the potential came up to.
+    /// leaves. At a spike itself it is the potential before the spike.
     ///
     /// # Errors
     ///

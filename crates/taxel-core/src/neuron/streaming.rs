@@ -1,4 +1,4 @@
-//! The neuron at work: input spikes in, output spikes out, the same wherever the stream is cut.
+//! A neuron on a stream: input spikes in, output spikes out, the same wherever the stream is cut.
 
 use super::continuous::ContinuousStream;
 use super::grid::GridStream;
@@ -9,8 +9,8 @@ use crate::{Result, problem};
 
 /// A neuron that runs while its inputs arrive.
 ///
-/// Output depends on the inputs alone, not on when [`NeuronStream::advance`] is called: what a crossing needs is reckoned
-/// from the last input, never from the last call.
+/// Output depends on the inputs alone, not on when [`NeuronStream::advance`] is called: a crossing is computed from the last
+/// input, never from the last call.
 #[derive(Debug, Clone)]
 pub struct NeuronStream {
     weights: Vec<f64>,
@@ -39,7 +39,7 @@ impl NeuronStream {
         Ok(Self { weights: weights.to_vec(), now: start, clock })
     }
 
-    /// Takes the next input spike, at `t` ms on train `train`; gives what the neuron fired up to there.
+    /// Adds the next input spike, at `t` ms on train `train`; appends the output spikes up to there to `out`.
     ///
     /// # Errors
     ///
@@ -59,7 +59,7 @@ impl NeuronStream {
         Ok(())
     }
 
-    /// Moves time on to `t` ms: no input will come before it any more. An earlier time changes nothing.
+    /// Advances to `t` ms: no later input is before it. An earlier time changes nothing.
     pub fn advance(&mut self, t: f64, out: &mut Vec<OutputSpike>) {
         if t >= self.now {
             self.now = t;
@@ -70,7 +70,7 @@ impl NeuronStream {
         }
     }
 
-    /// What time has come to, ms.
+    /// The present time of the stream, ms.
     pub(super) fn now(&self) -> f64 {
         self.now
     }

@@ -12,10 +12,10 @@ pub struct OutputSpike {
     pub slope: f64,
 }
 
-/// Steeper than by so many thresholds a ms no potential is taken to rise.
+/// The steepest rise of a potential that counts, thresholds a ms.
 const STEEPEST: f64 = 1e4;
 
-/// The threshold with its memory of the last spike.
+/// The threshold and the last spike, from which it recovers.
 #[derive(Debug, Clone)]
 pub(super) struct Threshold {
     /// `theta_0` times the factor, mV.
@@ -25,7 +25,7 @@ pub(super) struct Threshold {
     plus: f64,
     pub(super) tau_rec: f64,
     refractory: f64,
-    /// The last spike, or where the printed reading puts spike number 0.
+    /// The last spike, or spike number 0 of the printed reading.
     since: Option<f64>,
     /// The last spike proper.
     pub(super) fired: Option<f64>,
@@ -49,7 +49,7 @@ impl Threshold {
         self.fired = Some(t);
     }
 
-    /// What is left of the rise at `t`, mV.
+    /// The rest of the rise at `t`, mV.
     pub(super) fn rise(&self, t: f64) -> f64 {
         self.since.map_or(0.0, |since| left_of_rise(self.plus, t - since - self.refractory, self.tau_rec, t))
     }
@@ -72,7 +72,7 @@ impl Threshold {
         self.touch + (STEEPEST * self.base + self.plus / self.tau_rec) * rounding_ms
     }
 
-    /// When the rise sets in and the refractory time ends.
+    /// The time at which the rise begins and the refractory time ends.
     pub(super) fn edge(&self) -> Option<f64> {
         self.since.map(|since| since + self.refractory)
     }

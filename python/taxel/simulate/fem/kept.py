@@ -8,14 +8,10 @@ from pathlib import Path
 
 from taxel._base.arguments import instance
 from taxel._base.arguments import path as checked_path
-from taxel._base.files import source_digest
-from taxel.simulate.fem import contact, indentation, material, mesh, solids, solver
+from taxel._base.provenance import installed_sources
 from taxel.simulate.fem.indentation import Course, Indentation, press
 
 __all__ = ["KeptCourses"]
-
-#: What a course depends on beside its parameters.
-_CODE = (mesh, material, solids, contact, solver, indentation)
 
 
 class KeptCourses:
@@ -29,7 +25,7 @@ class KeptCourses:
     Attributes
     ----------
     code : str
-        A digest of the solver's source: courses of other code count no more.
+        The digest of the solver's sources (`taxel.report.Sources`): courses of other code count no more.
 
     Raises
     ------
@@ -50,7 +46,7 @@ class KeptCourses:
         self.folder = Path(checked_path("folder", folder))
         if not self.folder.is_dir():
             raise FileNotFoundError(2, "No such folder", str(self.folder))
-        self.code = source_digest([Path(str(module.__file__)) for module in _CODE])
+        self.code = installed_sources().digest(press.__module__)
 
     def path(self, asked: Indentation) -> Path:
         """Return the path of a course's file: its name has object and path, and a digest of the rest."""

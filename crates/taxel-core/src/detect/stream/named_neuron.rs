@@ -13,7 +13,7 @@ pub(super) struct NamedNeuron {
     threshold: f64,
     /// By how much its crossings come later than the event: the encoder's latency and the trained delay, ms.
     pub offset_ms: f64,
-    /// Begun with the first spike, so that a grid lies alike wherever the input starts.
+    /// Started at the first spike, so that a grid has the same points wherever the input starts.
     pub stream: Option<NeuronStream>,
     pub crossings: Vec<OutputSpike>,
     /// When the latest input came that may rest on a repaired taxel, ms.

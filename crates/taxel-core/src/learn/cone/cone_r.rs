@@ -1,4 +1,4 @@
-//! CONE-R (6.12 to 6.14): the best weights where targets and silence cannot all be met, solved to a proven gap.
+//! CONE-R (6.12 to 6.14): the best weights where no weights satisfy all targets and all silence, solved to a proven gap.
 
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +42,7 @@ pub struct ConeR {
     pub tolerance: f64,
     /// Who solves.
     pub engine: Engine,
-    /// After how long the caller asks for the best so far, s; this crate looks at no clock.
+    /// The time after which the caller requests the best so far, s; this crate reads no clock.
     pub max_seconds: Option<f64>,
 }
 
@@ -102,7 +102,7 @@ impl ConeR {
         check_bounds(&self.lb, &self.ub)
     }
 
-    /// How far behind a target B looks, ms.
+    /// Delay after a target at which B takes the potential, ms.
     #[must_use]
     pub fn delta_t(&self) -> f64 {
         self.delta_t_ms.unwrap_or(0.1 * self.neuron.tau)
@@ -377,7 +377,7 @@ impl ConeRProblem {
         let neuron = self.base.neuron.in_units(1.0 / self.statement.unit);
         for (p, pattern) in self.patterns.iter().enumerate().filter(|(p, _)| only.is_none_or(|one| one == *p)) {
             let spikes = neuron.run(weights, pattern, 1.0, Stop::never())?;
-            let targets = &self.statement.sheets[p].targets;
+            let targets = &self.statement.examples[p].targets;
             let again = |a: f64, b: f64| b - a <= neuron.tau && !targets.iter().any(|&t| a < t && t <= b);
             refires += spikes.windows(2).filter(|w| again(w[0].t, w[1].t)).count();
         }

@@ -1,7 +1,7 @@
-//! CONE-X (6.9 to 6.11): weights that meet every target and keep every silence exactly, or the proof that there are none.
+//! CONE-X (6.9 to 6.11): weights that satisfy every row of target and silence exactly, or a proof that there are none.
 //!
-//! Of the million silent instants a few hundred matter. A round solves the problem over a working set of rows, prices all
-//! of silence at the weights found, and adds the worst instant of each stretch in which it is broken. The shortest weights
+//! Of a million silent instants a few hundred bind. A round solves the problem over a working set of rows, evaluates all
+//! silence at the weights found, and adds the worst instant of each stretch in which it is violated. The shortest weights
 //! (l2 alone, or no objective) come from a dual active set, whose every state is a lower bound; they also decide whether
 //! there are any. Other objectives go on from there.
 
@@ -31,11 +31,11 @@ const LEAST_SHARE: f64 = 0.99e-3;
 pub struct ConeX {
     /// The neuron; on the grid its step is the step of the silent rows.
     pub neuron: Neuron,
-    /// What the potential shall reach behind a target, in thresholds.
+    /// The potential that B aims at behind a target, in thresholds.
     pub kappa: f64,
     /// How far behind the target, ms; `0.1 tau` where left out, as in Table 6.1.
     pub delta_t_ms: Option<f64>,
-    /// `lambda_1` to `lambda_3`: l1, l2, B; only their ratios matter, all 0 asks for any weights.
+    /// `lambda_1` to `lambda_3`: l1, l2, B; only their ratios matter. All 0: any weights that meet the rows.
     pub lambdas: [f64; 3],
     /// Least weight, mV, one for all or one a synapse.
     pub lb: Bound,
@@ -54,7 +54,7 @@ pub struct ConeX {
     pub horizon: Option<Horizon>,
     /// The relative gap between objective and proven bound at which a fit counts as solved.
     pub tolerance: f64,
-    /// After how long the caller asks for the best so far, s; this crate looks at no clock.
+    /// The time after which the caller requests the best so far, s; this crate reads no clock.
     pub max_seconds: Option<f64>,
 }
 
@@ -157,7 +157,7 @@ impl ConeX {
         Ok(())
     }
 
-    /// How far behind a target B looks, ms.
+    /// Delay after a target at which B takes the potential, ms.
     #[must_use]
     pub fn delta_t(&self) -> f64 {
         self.delta_t_ms.unwrap_or(0.1 * self.neuron.tau)
@@ -193,9 +193,9 @@ pub struct ConeXFit {
     pub violation: f64,
     /// The margin that holds; on the grid the least threshold - potential over the silent points, as `height`.
     pub margin: Margin,
-    /// The margin that was asked for at last: smaller than the first where nobody fixed it and no weights keep that.
+    /// The margin of the last problem: smaller than the first where the caller fixed none and no weights keep that.
     pub asked: Margin,
-    /// Why a fit is stopped.
+    /// Why a fit is stopped, or why the objective of a solved one is not proven to lie within the tolerance.
     pub reason: Option<String>,
     /// The rows that bind, with their multipliers: a start for a similar problem.
     pub held: Vec<(Row, f64)>,
@@ -210,7 +210,7 @@ pub struct ConeXFit {
 pub struct ConeXProblem {
     parameters: ConeX,
     exact: Exact,
-    /// Whether nobody fixed the margin.
+    /// Whether the caller fixed no margin.
     free_margin: bool,
 }
 
@@ -300,7 +300,7 @@ impl ConeXProblem {
         Bounds { lower: times(lower), upper: times(upper) }
     }
 
-    /// What B looks at behind a target: coefficients, and `kappa` thresholds.
+    /// The row of B behind a target: coefficients, and `kappa` thresholds.
     ///
     /// # Errors
     ///
@@ -353,7 +353,7 @@ impl ConeXProblem {
         Ok(found)
     }
 
-    /// A verdict that holds for the least margin only says nothing of smaller ones.
+    /// The result where infeasibility is proven for the least margin alone: smaller ones remain undecided.
     fn undecided(&self, found: &ConeXFit) -> ConeXFit {
         let Margin { height, slope } = found.asked.times(self.unit());
         let proof = found.certificate.as_ref().map_or("", |proof| proof.text.as_str());
@@ -418,7 +418,7 @@ impl Exact {
     fn report(&self, best: Best, cut_short: Option<&str>) -> Result<ConeXFit> {
         let Best { mut weights, least, held, engine, rounds } = best;
         let Bounds { lower, upper } = &self.objective.bounds;
-        // A bound that binds is met to rounding, from either side.
+        // Weights at a bound may lie outside it by rounding.
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {
             *w = w.clamp(l, u);
         }
@@ -429,13 +429,13 @@ impl Exact {
         let nothing = NOTHING * self.objective.b * lifts.sum::<f64>();
         let known = gap <= self.tolerance || objective - least <= nothing;
         let unmet = self.unmet(&weights)?;
+        let status = if unmet.is_none() { Status::Solved } else { Status::Stopped };
         let open = || format!("the objective is only proven to lie within {gap:.1e} of its least value");
         let reason = match (cut_short, unmet.or_else(|| (!known).then(open))) {
             (Some(why), Some(what)) => Some(format!("{why}; {what}")),
             (_, what) => what,
         };
         let violation = largest([self.missed(&weights), self.worst(&weights), 0.0]);
-        let status = if reason.is_none() { Status::Solved } else { Status::Stopped };
         Ok(ConeXFit {
             margin: self.kept_margin(&weights),
             fit: Fit { status, weights, objective, parts, gap, rounds, engine },

@@ -1,4 +1,4 @@
-//! The problem of 6.11 at one margin: what must be met, what is minimised, and how far weights are from meeting it.
+//! The problem of 6.11 at one margin: its rows, its objective, and by how much weights violate the rows.
 
 use std::sync::Arc;
 
@@ -6,23 +6,23 @@ use crate::learn::fit::Engine;
 use crate::learn::statement::{
     Margin, Objective, Parts, Peak, Row, Silence, Stated, Statement, Targets, exceeds, largest,
 };
-use crate::neuron::{AT_EDGE, Time};
+use crate::neuron::{AT_EDGE, Grid, Time};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
 /// How far a target may be missed, mV.
 pub(super) const MET: f64 = 1e-12;
-/// Silence counts as broken from this on, mV, and by this share of the sum of absolute weights: rounding of the sweep.
+/// Silence counts as violated from this on, mV, and from this share of the sum of absolute weights on: rounding of the sweep.
 const BROKEN: f64 = 1e-13;
 const BROKEN_SHARE: f64 = 2e-16;
 /// The share of the margin that weights must keep to count as a solution.
 const KEPT_SHARE: f64 = 0.5;
-/// A spike may lie so many neighbouring times beside its target.
+/// A spike at its target may differ from it by so many distances of neighbouring times.
 const ROUNDINGS: f64 = 4.0;
 /// Rounds end without a verdict after so many.
 pub(super) const MOST_ROUNDS: usize = 1000;
 
-/// A stated problem whose targets and silence must be met.
+/// A stated problem whose rows of targets and silence are hard constraints.
 #[derive(Debug, Clone)]
 pub(super) struct Exact {
     pub(super) statement: Statement,
@@ -82,7 +82,7 @@ impl Exact {
         self.silence.broken(weights, share, tolerance)
     }
 
-    /// By how much silence is broken at worst where it keeps what it must of the margin, mV; below 0 where it is kept.
+    /// The worst violation of silence with the share of the margin that a solution must keep, mV; negative where there is none.
     pub(super) fn worst(&self, weights: &[f64]) -> f64 {
         self.silence.worst(weights, KEPT_SHARE)
     }
@@ -93,10 +93,10 @@ impl Exact {
         least.max(BROKEN_SHARE * weights.iter().map(|w| w.abs()).sum::<f64>())
     }
 
-    /// What these weights do not meet, with its pattern and time: silence with half its margin; in continuous time the spikes
-    /// of the neuron itself, run on the patterns; on the grid the target rows.
+    /// The first condition that these weights violate, with its pattern and time: silence with half its margin; the target
+    /// rows on the grid; the spikes of the neuron itself, run on the patterns.
     ///
-    /// On the grid the neuron is not run: without a margin it may fire where a silent row is met with equality.
+    /// On the grid without a margin the neuron is not run: it fires where a silent row holds with equality.
     pub(super) fn unmet(&self, weights: &[f64]) -> Result<Option<String>> {
         let unit = self.statement.unit;
         let worst = self.silence.broken(weights, KEPT_SHARE, self.rounding(weights)).into_iter();
@@ -104,29 +104,31 @@ impl Exact {
             let excess = excess * unit;
             return Ok(Some(format!("pattern {pattern}: silence is broken by {excess:.1e} mV at {t} ms")));
         }
-        if !self.is_grid() {
-            return self.misfire(weights);
-        }
         let misses = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         let worst = misses.enumerate().filter(|(_, miss)| exceeds(*miss, MET)).max_by(|a, b| a.1.total_cmp(&b.1));
-        Ok(worst.map(|(k, miss)| {
+        if let Some((k, miss)) = worst.filter(|_| self.is_grid()) {
             let ((pattern, target), t, miss) = (self.targets.names[k], self.targets.times[k], miss * unit);
-            format!("pattern {pattern}: target {target} ({t} ms) is missed by {miss:.1e} mV")
-        }))
+            return Ok(Some(format!("pattern {pattern}: target {target} ({t} ms) is missed by {miss:.1e} mV")));
+        }
+        if self.is_grid() && self.statement.margin.height == 0.0 { Ok(None) } else { self.misfire(weights) }
     }
 
-    /// Where the neuron itself, run on the patterns, does not fire at a target, or fires elsewhere.
+    /// The first target at which the neuron itself, run on the patterns, does not fire, or the first spike elsewhere. On the grid
+    /// a neuron fires at a target at the first point that is not before it.
     fn misfire(&self, weights: &[f64]) -> Result<Option<String>> {
-        for (p, sheet) in self.statement.sheets.iter().enumerate() {
-            let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, sheet.start)?);
-            for &(t, train) in sheet.inputs.iter().take_while(|input| input.0 <= sheet.end) {
+        for (p, example) in self.statement.examples.iter().enumerate() {
+            let grid = Grid::new(example.start, self.statement.neuron.step_ms);
+            let due = |&target: &f64| if self.is_grid() { grid.time(grid.first_from(target)) } else { target };
+            let wanted: Vec<f64> = example.targets.iter().map(due).collect();
+            let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, example.start)?);
+            for &(t, train) in example.inputs.iter().take_while(|input| input.0 <= example.end) {
                 stream.push(t, train, &mut fired)?;
             }
-            stream.advance(sheet.end, &mut fired);
-            let asked = sheet.targets.iter().map(Some).chain(std::iter::repeat(None));
+            stream.advance(largest(wanted.last().copied().into_iter().chain([example.end])), &mut fired);
+            let wanted = wanted.into_iter().map(Some).chain(std::iter::repeat(None));
             let fired = fired.iter().map(|spike| Some(spike.t)).chain(std::iter::repeat(None));
-            let most = sheet.targets.len() + 1;
-            for (target, spike) in asked.zip(fired).take(most) {
+            let most = example.targets.len() + 1;
+            for (target, spike) in wanted.zip(fired).take(most) {
                 let reason = match (target, spike) {
                     (Some(target), Some(t))
                         if (t - target).abs() <= AT_EDGE + ROUNDINGS * (target.next_up() - target) =>

@@ -13,8 +13,8 @@ use crate::{Result, Stop};
 
 /// As for the shortest weights, with more room: rows that are nearly the same are harder here.
 const ASKED_SHARE: f64 = 0.9;
-/// First rounds look for rows only, at this tolerance; silence is broken there from this share of `theta_0` on, and rows with
-/// that much room to the other share go.
+/// The first rounds only collect rows, at this tolerance: silence counts as violated from the first share of `theta_0` on, and
+/// rows with more room than the second share are dropped.
 const NEAR: f64 = 1e-3;
 const NEAR_SHARE: f64 = 1e-4;
 const SLACK_SHARE: f64 = 0.05;
@@ -147,8 +147,8 @@ impl Dense {
         if self.there.insert((pattern, t.to_bits())) {
             let row = Row::Silence { pattern, t };
             let Stated { mut coefficients, mut limit } = problem.statement.state(row)?;
-            // Less the target's row, which is met with equality, over the time between, it asks for a slope: a row as long as
-            // the others. As it stands the two are parallel to rounding.
+            // The difference to the target's row, which holds with equality, over the time between is a row for the slope, as
+            // long as the others. The two rows themselves are parallel to rounding.
             let tau = problem.statement.neuron.tau;
             if let Some((target, at)) = self.targets.next(pattern, t).filter(|(target, _)| target - t < BESIDE * tau) {
                 let steep = tau / (target - t);
@@ -173,7 +173,7 @@ impl Dense {
         self.limit.push(limit);
     }
 
-    /// Adds what is broken; says whether anything is new.
+    /// Adds the violated rows; returns whether any row is new.
     fn add(&mut self, problem: &Exact, weights: &[f64], broken: &[Peak]) -> Result<bool> {
         let before = self.names.len();
         for peak in broken {
@@ -185,7 +185,7 @@ impl Dense {
         Ok(self.names.len() > before)
     }
 
-    /// Drops rows without a multiplier that have this much room; says which are kept.
+    /// Drops rows without a multiplier that have this much room; returns which rows remain.
     fn drop_slack(&mut self, weights: &[f64], multipliers: &[f64], room: f64) -> Vec<bool> {
         let n = weights.len();
         let most = multipliers.iter().fold(0.0, |m: f64, z| m.max(*z));

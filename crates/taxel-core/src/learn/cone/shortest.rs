@@ -8,22 +8,24 @@ use crate::learn::fit::{Left, Round};
 use crate::learn::statement::{Certificate, Peak, Row, Statement};
 use crate::{Result, Stop, problem};
 
-/// Cuts have the full margin, but this share of it is asked for: each cut has room around it, so rounds end.
+/// Cuts demand the full margin, but only violations of this share of it are cut: each cut leaves room around it, so that
+/// rounds end.
 const ASKED_SHARE: f64 = 0.999;
-/// Of what is broken this share enters, the worst, and no fewer rows than that: the others are often met with them.
+/// The worst of the violated rows enter, this share of them and no fewer rows than that: weights that satisfy them often
+/// satisfy the others.
 const ENTER_SHARE: f64 = 0.4;
 const ENTER_LEAST: usize = 100;
 /// A proof of so many rows or less is made one in which every row is needed.
 const FEW: usize = 60;
 
-/// Where the rounds of the shortest weights ended.
+/// How the rounds of the shortest weights ended.
 pub(super) enum End {
     Met,
     Infeasible(Certificate),
     Stopped,
 }
 
-/// What the rounds of the shortest weights came to.
+/// The result of the rounds of the shortest weights.
 pub(super) struct Shortest {
     pub(super) weights: Vec<f64>,
     pub(super) held: Vec<(Row, f64)>,
@@ -60,7 +62,7 @@ impl Exact {
                     if !ended && weights != before && working.cut(&self.statement, &broken, &flat)? {
                         continue;
                     }
-                    // What moves no weight is met as well as it can be; the report says whether that is enough.
+                    // Rounds that no longer move a weight end here; `report` checks whether the rows are satisfied.
                     if !ended || (broken.is_empty() && flat.is_empty()) { End::Met } else { End::Stopped }
                 }
             };
@@ -77,7 +79,7 @@ impl Exact {
         if rows.len() > FEW {
             return Ok(Some(proof));
         }
-        // Those that say least in words are tried first.
+        // Rows that explain least to a reader are tried first.
         let worth = |row: &Row| match row {
             Row::Slope { .. } => 0,
             Row::Silence { .. } => 1,
@@ -86,7 +88,7 @@ impl Exact {
         let mut kept: Vec<Row> = rows.iter().map(|r| r.0).collect();
         kept.sort_by_key(worth);
         let (mut fewest, mut needed) = (proof.clone(), 0);
-        // Without a row that is needed the others can be met; all that come before it are needed as well.
+        // All rows before `needed` are needed: without any of them the others can be satisfied.
         while needed < kept.len() && !stop.asked() {
             let others = kept.iter().enumerate().filter(|(k, _)| *k != needed).map(|(_, row)| *row).collect::<Vec<_>>();
             match self.conflict(&others, stop)? {
@@ -101,7 +103,7 @@ impl Exact {
         Ok(Some(fewest))
     }
 
-    /// A proof that these rows cannot be met together.
+    /// A proof that no weights satisfy these rows together.
     fn conflict(&self, rows: &[Row], stop: Stop<'_>) -> Result<Option<Certificate>> {
         let mut engine = DualActiveSet::new(&self.objective.bounds.lower, &self.objective.bounds.upper)?;
         let (mut targets, mut others) = (vec![], vec![]);
@@ -229,7 +231,7 @@ impl Working {
         self.targets.len() + self.there.len()
     }
 
-    /// Drops what does not bind and adds the worst of what is broken; says whether anything is new.
+    /// Drops rows that do not bind and adds the worst of the violated ones; returns whether any row is new.
     fn cut(&mut self, statement: &Statement, broken: &[Peak], flat: &[usize]) -> Result<bool> {
         let mut new: Vec<&Peak> = broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
         new.sort_by(|a, b| b.excess.total_cmp(&a.excess));

@@ -5,15 +5,17 @@
 //! ever written out. All others enter by one sweep over the grid (the potential) and one back (a sum of rows). Then each
 //! multiplier moves to the slope found, `delta` shrinks, and so on, until a bound from below proves the objective.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
-use faer::linalg::cholesky::llt::solve::solve_in_place;
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, MatMut, MatRef, Par};
+mod bound;
+mod line_search;
+mod newton;
+
+use faer::Par;
+use faer::dyn_stack::MemBuffer;
+use faer::linalg::cholesky::llt::factor::cholesky_in_place_scratch;
 
 use super::rounds::Rounds;
 use crate::Stop;
-use crate::learn::statement::{Norm, Objective, Point, Relaxed, Tangents};
+use crate::learn::statement::{Norm, Objective, Point, Relaxed};
 use crate::vectors::{add, dot};
 
 /// At first a target's kink is rounded over so many thresholds (all of them, seen from no weights), one of silence over so many.
@@ -29,11 +31,8 @@ const STEPS: usize = 12;
 const ROUNDS: usize = 60;
 /// Steps of a round beyond its accuracy, where bounds far wider than what targets need ask for more.
 const FINER: usize = 3;
-/// Bounds beyond so many times the weights that targets need say nothing about the scale of the weights.
+/// Bounds wider than so many times the weights that targets need do not set the scale of the weights.
 const FAR: f64 = 30.0;
-/// A step is taken whole where the slope along it has fallen to this share at its end; a search stops at that of `EXACT`.
-const WHOLE: f64 = 0.05;
-const EXACT: f64 = 1e-3;
 
 /// Where to begin: weights of a similar fit, and its multipliers as shares of their range.
 #[derive(Debug, Clone, Default)]
@@ -72,14 +71,6 @@ struct Lagrangian<'a> {
     factors: Vec<f64>,
     hessian: Vec<f64>,
     memory: MemBuffer,
-}
-
-/// A kink that the line search passes: share at the start, its change, and its part of the slope.
-struct Passing {
-    share: f64,
-    change: f64,
-    lean: f64,
-    low: f64,
 }
 
 impl Relaxed {
@@ -310,238 +301,6 @@ impl<'a> Lagrangian<'a> {
     /// The weights where l1 and the bounds hold them: some exactly at 0, none outside.
     fn candidate(&self) -> Vec<f64> {
         (0..self.weights.len()).map(|n| self.hold(n, self.weights[n]).2).collect()
-    }
-
-    /// One Newton step, as long as an exact search along it finds best; false where rounding leaves none.
-    fn step(&mut self) -> bool {
-        let (problem, o) = (self.problem, self.objective);
-        let n = self.weights.len();
-        let silent = problem.silent.len();
-        let kept = self.inside.partition_point(|&k| k < silent);
-        let mut rows = problem.silent.coefficients(&self.inside[..kept]);
-        let root = (o.d / self.delta[0]).sqrt();
-        rows.iter_mut().for_each(|v| *v *= root);
-        let root = (2.0 * o.c / self.delta[1]).sqrt();
-        for &k in &self.inside[kept..] {
-            rows.extend(problem.targets.row(k - silent).at.iter().map(|v| root * v));
-        }
-        let count = self.inside.len();
-        let length = dot(&self.weights, &self.weights).sqrt();
-        loop {
-            self.hessian.iter_mut().zip(problem.gram.iter()).for_each(|(h, g)| *h = 2.0 * o.b * g);
-            let ridge = match o.norm {
-                Norm::Square => 2.0 * o.l2,
-                Norm::Norm if length > 0.0 => {
-                    let f = o.l2 / (length * length * length);
-                    for (column, &w) in self.hessian.chunks_exact_mut(n).zip(&self.weights) {
-                        add(column, -f * w, &self.weights);
-                    }
-                    o.l2 / length
-                }
-                Norm::Norm => 0.0,
-            };
-            let mut steepest = 0.0_f64;
-            for i in 0..n {
-                let holding = if self.hold(i, self.weights[i]).1 { self.sigma } else { 0.0 };
-                self.hessian[i * n + i] += ridge + self.rho + holding;
-                steepest = steepest.max(self.hessian[i * n + i]);
-            }
-            let mut h = MatMut::from_column_major_slice_mut(&mut self.hessian, n, n);
-            if count > 0 {
-                let r = MatRef::from_column_major_slice(&rows, n, count);
-                let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-                matmul(h.as_mut(), lower, Accum::Add, r, full, r.transpose(), full, 1.0, Par::Seq);
-            }
-            let stack = MemStack::new(&mut self.memory);
-            if cholesky_in_place(h.as_mut(), LltRegularization::default(), Par::Seq, stack, faer::Spec::default())
-                .is_ok()
-            {
-                break;
-            }
-            self.rho = (self.rho * 100.0).max(f64::EPSILON * steepest);
-            // A Hessian that is no number never factors.
-            if !self.rho.is_normal() {
-                return false;
-            }
-        }
-        let mut direction: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
-        let h = MatRef::from_column_major_slice(&self.hessian, n, n);
-        let stack = MemStack::new(&mut self.memory);
-        solve_in_place(h, MatMut::from_column_major_slice_mut(&mut direction, n, 1), Par::Seq, stack);
-        self.move_along(&direction)
-    }
-
-    fn move_along(&mut self, direction: &[f64]) -> bool {
-        let (problem, o) = (self.problem, self.objective);
-        let silent = problem.silent.len();
-        let mut rise = Vec::with_capacity(self.excess.len());
-        if o.d > 0.0 {
-            problem.silent.potential(direction, &mut rise);
-        } else {
-            rise.resize(silent, 0.0);
-        }
-        rise.extend(problem.targets.iter().map(|row| dot(row.at, direction)));
-        let lift: Vec<f64> = problem.targets.iter().map(|row| dot(row.behind, direction)).collect();
-        let smooth = {
-            let against: f64 =
-                self.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
-            let square = dot(direction, direction);
-            let (mut from, mut bend) = (self.rho * against, self.rho * square);
-            from += 2.0 * o.b * dot(&self.behind, &lift);
-            bend += 2.0 * o.b * dot(&lift, &lift);
-            if o.norm == Norm::Square {
-                from += 2.0 * o.l2 * dot(&self.weights, direction);
-                bend += 2.0 * o.l2 * square;
-            }
-            (from, bend)
-        };
-        let start = dot(&self.gradient, direction);
-        let mut end = 1.0;
-        let t = loop {
-            let (passing, steady) = self.passing(&rise, end);
-            let slope = |t: f64| self.slope_along(t, direction, smooth, steady, &passing);
-            let (mut low, mut at_low, mut high, mut at_high) = (0.0, start, end, slope(end));
-            if at_high <= WHOLE * start.abs() {
-                if end < 64.0 && at_high < -0.5 * start.abs() {
-                    end *= 4.0;
-                    continue;
-                }
-                break end;
-            }
-            let mut t = high;
-            // Illinois: a secant that never keeps the same end twice at full value.
-            for _ in 0..60 {
-                t = low + (high - low) * (at_low / (at_low - at_high)).clamp(1e-3, 0.999);
-                let here = slope(t);
-                if here.abs() <= EXACT * start.abs() || high - low <= 1e-12 * high {
-                    break;
-                }
-                if here > 0.0 {
-                    (high, at_high) = (t, here);
-                    at_low *= 0.5;
-                } else {
-                    (low, at_low) = (t, here);
-                    at_high *= 0.5;
-                }
-            }
-            break t;
-        };
-        // From an infinite direction not even a step of 0 leads to numbers.
-        if !(t.is_finite() && start.is_finite()) {
-            return false;
-        }
-        add(&mut self.weights, t, direction);
-        self.excess.iter_mut().zip(&rise).for_each(|(x, r)| *x += t * r);
-        add(&mut self.behind, t, &lift);
-        true
-    }
-
-    /// The kinks that a step as long as `end` passes, and the slope of all that lie beyond theirs throughout.
-    fn passing(&self, rise: &[f64], end: f64) -> (Vec<Passing>, f64) {
-        let silent = self.problem.silent.len();
-        let (d, c) = (self.objective.d, 2.0 * self.objective.c);
-        let [one, other] = self.delta.map(|delta| 1.0 / delta);
-        let mut passing = Vec::new();
-        let mut steady = 0.0;
-        let rows = self.excess.iter().zip(rise).zip(&self.shares);
-        for (k, ((&x, &r), &share)) in rows.enumerate() {
-            let (weight, steep, low) = if k < silent { (d, one, 0.0) } else { (c, other, -0.5) };
-            let (from, change) = (share + x * steep, r * steep);
-            let to = from + end * change;
-            if from.max(to) <= low {
-                steady += low * weight * r;
-            } else if from.min(to) >= low + 1.0 {
-                steady += (low + 1.0) * weight * r;
-            } else {
-                passing.push(Passing { share: from, change, lean: weight * r, low });
-            }
-        }
-        (passing, steady)
-    }
-
-    fn slope_along(&self, t: f64, direction: &[f64], smooth: (f64, f64), steady: f64, passing: &[Passing]) -> f64 {
-        let mut sum = smooth.0 + t * smooth.1 + steady;
-        for p in passing {
-            sum += p.lean * (p.share + t * p.change).clamp(p.low, p.low + 1.0);
-        }
-        let (mut along, mut square) = (0.0, 0.0);
-        for (n, (&w, &d)) in self.weights.iter().zip(direction).enumerate() {
-            let here = w + t * d;
-            sum += self.hold(n, here).0 * d;
-            along += here * d;
-            square += here * here;
-        }
-        if self.objective.norm == Norm::Norm && square > 0.0 {
-            sum += self.objective.l2 * along / square.sqrt();
-        }
-        sum
-    }
-
-    /// What the multipliers found prove.
-    fn bound(&mut self) -> f64 {
-        self.multipliers();
-        let pull = self.pull();
-        self.proves(&pull)
-    }
-
-    fn proves(&self, pull: &[f64]) -> f64 {
-        let at = Tangents {
-            weights: &self.weights,
-            excess: &self.excess,
-            behind: &self.behind,
-            multipliers: &self.factors,
-            pull,
-        };
-        self.problem.bound(self.objective, &at, self.most)
-    }
-
-    /// What no weights at all prove: the subgradient of the norm that lies nearest to all other slopes there.
-    fn bound_at_zero(&self, zero: &Point) -> f64 {
-        let (problem, o) = (self.problem, self.objective);
-        let silent = problem.silent.len();
-        let slope = |(k, &x): (usize, &f64)| match k < silent {
-            true => {
-                if x > 0.0 {
-                    o.d
-                } else {
-                    0.0
-                }
-            }
-            false => o.c * x.signum(),
-        };
-        let multipliers: Vec<f64> = zero.excess.iter().enumerate().map(slope).collect();
-        let mut pull = vec![0.0; self.weights.len()];
-        if o.norm == Norm::Norm && o.l2 > 0.0 && zero.weights.iter().all(|&w| w == 0.0) {
-            problem.silent.add_sum(&multipliers[..silent], &mut pull);
-            for ((target, &multiplier), &behind) in problem.targets.iter().zip(&multipliers[silent..]).zip(&zero.behind)
-            {
-                add(&mut pull, multiplier, target.at);
-                add(&mut pull, 2.0 * o.b * behind, target.behind);
-            }
-            for (n, p) in pull.iter_mut().enumerate() {
-                let soft = if *p > o.l1 {
-                    *p - o.l1
-                } else if *p < -o.l1 {
-                    *p + o.l1
-                } else {
-                    0.0
-                };
-                let free = if soft > 0.0 { o.bounds.lower[n] < 0.0 } else { o.bounds.upper[n] > 0.0 };
-                *p = if free { -soft } else { 0.0 };
-            }
-            let length = dot(&pull, &pull).sqrt();
-            if length > o.l2 {
-                pull.iter_mut().for_each(|p| *p *= o.l2 / length);
-            }
-        }
-        let at = Tangents {
-            weights: &zero.weights,
-            excess: &zero.excess,
-            behind: &zero.behind,
-            multipliers: &multipliers,
-            pull: &pull,
-        };
-        problem.bound(o, &at, zero.parts.sum())
     }
 
     /// The multipliers move to the slopes found, kinks get sharper, the proximal term lets go.

@@ -22,7 +22,7 @@ pub(crate) struct Found {
 impl Relaxed {
     /// Finds the least objective; the bound that proves it counts all rows, whichever engine ran.
     ///
-    /// Where `stop` asks for an end, the best so far comes back, with what is proven of it.
+    /// Where `stop` is requested, returns the best so far with its proven bound.
     ///
     /// # Errors
     ///

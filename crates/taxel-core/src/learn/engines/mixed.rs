@@ -2,7 +2,7 @@
 //!
 //! Minimise `l1 |w|_1 + l2 |w|_2 (or |w|_2^2) + lift sum_k (behind_k.w - wanted_k)^2` over `equal.w = equal_to`,
 //! `below.w <= limit` and `lower <= w <= upper`. An interior point comes near, a polish on the rows and bounds that bind
-//! ends exactly, and a bound that holds whatever the solver did says how near the least objective is.
+//! ends exactly, and a bound that holds whatever the solver did limits the distance to the least objective.
 
 mod best;
 mod dense;
@@ -22,14 +22,14 @@ use interior::Interior;
 use program::Program;
 pub(crate) use program::Terms;
 
-/// Looser than this, an interior point is answer enough: rows are to be found by it, not weights.
+/// At looser tolerances an interior point is enough: it is to find violated rows, not weights.
 const LOOSE: f64 = 1e-5;
 /// Gaps at which a polish is tried.
 const TRIES: [f64; 3] = [1e-6, 1e-9, 1e-12];
 
 /// Minimises the objective over these rows and bounds.
 ///
-/// `size` is that of the largest weight in any weights that will do: bounds may be far wider, and say nothing of the scale.
+/// `size` is the largest weight of some feasible weights, as bounds may be far wider than the scale of the weights.
 /// With a `tolerance` of more than 1e-5 the weights are those of an interior point near the optimum: rows are met about as
 /// well, and the rows they break are worth adding. Below that, rows are met to rounding and the gap is `tolerance` where
 /// the bound says so.

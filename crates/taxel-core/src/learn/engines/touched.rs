@@ -10,7 +10,7 @@ use crate::{Result, Stop};
 /// than this share of `theta_0`.
 const WITHIN: f64 = 1e-6;
 const NEARLY_MET: f64 = 1e-3;
-/// Silent rows that the optimum touches are kept so far below their limit, of `theta_0`.
+/// Silent rows that the optimum touches stay below their limit by this share of `theta_0`.
 const BELOW: f64 = 1e-9;
 /// The share of the tolerance that this may take: a later fit that starts here has the rest.
 const SPARED: f64 = 0.3;
@@ -21,7 +21,7 @@ impl Relaxed {
     /// Moves the weights onto what they miss by no more than the solver's rounding: a neuron fires where it is touched.
     ///
     /// At the optimum a target whose multiplier lies within its range is met exactly, and so is a silent row; a silent row
-    /// is kept a hair below its limit. Taken back where the objective would leave the tolerance; says whether they were moved.
+    /// stays just below its limit. Undone where the objective would leave the tolerance; returns whether the weights moved.
     pub(crate) fn meet(
         &self,
         objective: &Objective,

@@ -86,7 +86,7 @@ impl OnlineConeR {
         Ok(())
     }
 
-    /// Fits the weights to the window. Where `stop` asks for an end, the best so far comes back.
+    /// Fits the weights to the window. Where `stop` is requested, returns the best so far.
     ///
     /// # Errors
     ///

@@ -14,7 +14,7 @@ pub struct Learnt {
     pub said: Map<String, Value>,
 }
 
-/// What a learner's file says of it.
+/// The interface of a learner that is fitted to all examples at once.
 pub(super) trait BatchRule {
     /// Its parameters, with their defaults and ranges.
     fn described() -> Described
@@ -24,7 +24,7 @@ pub(super) trait BatchRule {
     /// Checks every parameter.
     fn check(&self) -> Result<()>;
 
-    /// Learns from patterns of the same trains with one list of targets (ms, ascending) a pattern; asks `stop` often.
+    /// Learns from patterns of the same trains with one list of targets (ms, ascending) a pattern; checks `stop` often.
     fn fit(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Learnt>;
 
     /// Output spikes in a pattern, ms.

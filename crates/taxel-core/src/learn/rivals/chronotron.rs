@@ -27,7 +27,7 @@ pub struct ELearning {
 #[serde(deny_unknown_fields)]
 pub struct ILearning {}
 
-/// What its source says, and public code where that could not be read.
+/// The defaults of its source, and of public code where the source could not be read.
 pub(super) const SOURCE: Source = Source {
     name: "chronotron",
     own: &["rule", "tau_q", "gamma_r"],

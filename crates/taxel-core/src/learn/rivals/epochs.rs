@@ -37,7 +37,7 @@ pub struct Training {
     pub until_right: bool,
     /// Of the first weights and the order of patterns.
     pub seed: u64,
-    /// After how long the caller asks for the best so far, s; this crate looks at no clock.
+    /// The time after which the caller requests the best so far, s; this crate reads no clock.
     pub max_seconds: Option<f64>,
 }
 
@@ -48,7 +48,7 @@ pub enum Ended {
     Right,
     /// All epochs were used up.
     Epochs,
-    /// The caller asked to stop.
+    /// The caller requested a stop.
     Stopped,
 }
 
@@ -163,7 +163,7 @@ pub(super) fn change_of(
     Ok((change, fired))
 }
 
-/// Adds corrections up, synapse by synapse. Factors at targets are reckoned once and kept.
+/// Sums corrections, synapse by synapse. Factors at targets are computed once.
 fn add_up(
     rule: &impl Rule,
     of: &Presented<'_>,
@@ -224,7 +224,7 @@ impl Training {
         Ok(())
     }
 
-    /// Trains a rule's neuron. `report` hears how many epochs are done and the share of patterns right.
+    /// Trains a rule's neuron. Calls `report` with the number of epochs done and the share of patterns right.
     pub(super) fn train(
         &self,
         rule: &impl Rule,

@@ -20,7 +20,7 @@ pub struct Filt {
     pub tau_q: f64,
 }
 
-/// What its source says.
+/// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "filt",
     own: &["tau_q"],

@@ -20,7 +20,7 @@ pub struct Fp {
     pub window_ms: f64,
 }
 
-/// What its source says.
+/// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "fp",
     own: &["window_ms"],
@@ -60,7 +60,7 @@ impl Rule for FpRule {
     }
 }
 
-/// When the first error of a trial is made, and whether it asks for more (1) or less (-1).
+/// The time of the first error of a trial, and the sign of its correction.
 fn first_error(targets: &[f64], fired: &[f64], window: f64) -> Option<(f64, f64)> {
     let mut k = 0;
     for &f in fired {

@@ -22,7 +22,7 @@ pub struct Htp {
     pub window_ms: f64,
 }
 
-/// What its source says.
+/// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "htp",
     own: &["window_ms"],

@@ -13,7 +13,7 @@ use crate::Result;
 #[serde(deny_unknown_fields)]
 pub struct Inst {}
 
-/// What its source says.
+/// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "inst",
     own: &[],

@@ -20,7 +20,7 @@ pub struct Psd {
     pub tau_2: f64,
 }
 
-/// What its source says.
+/// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "psd",
     own: &["tau_1", "tau_2"],

@@ -21,7 +21,7 @@ pub struct Resume {
     pub tau_w: Option<f64>,
 }
 
-/// What its source says.
+/// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "resume",
     own: &["a", "amplitude", "tau_w"],

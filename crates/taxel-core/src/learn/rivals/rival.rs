@@ -115,7 +115,7 @@ impl Rival {
 
     /// Trains on patterns of the same trains, with one list of targets (ms, ascending) a pattern.
     ///
-    /// `report` hears how many epochs are done and the share of patterns right. A stop that is asked for ends it with the
+    /// Calls `report` with the number of epochs done and the share of patterns right. A stop that is asked for ends it with the
     /// best weights so far.
     ///
     /// # Errors
@@ -165,7 +165,7 @@ impl SteppedNeuron {
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn run(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::statement::check_heard(pattern)?;
+        crate::learn::statement::check_untargeted(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         let mut fired = Vec::new();
         self.fire(weights, &self.lay_out(pattern, stop)?, &mut fired);

@@ -10,12 +10,12 @@ use serde_json::{Value, json};
 use super::batch::{BatchRule, Learnt};
 use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::metrics::matching::matched;
-use crate::neuron::{Kernel, KernelSum, MOST_LAID_OUT, Shape, check_points, points_between, rounding_ms};
+use crate::neuron::{Grid, Kernel, KernelSum, MOST_LAID_OUT, Shape, check_points};
 use crate::parameters::Described;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// Rows that are laid out at once: few enough for the cache, many enough to be worth a reflection each.
+/// Rows of a block: few enough for the cache, many enough to amortise a reflection.
 const BLOCK: usize = 512;
 
 /// What compresses what comes out of a branch's kernel.
@@ -143,10 +143,10 @@ impl Normal {
         Ok(((0..m).map(|j| weights[(j, 0)]).collect(), rest))
     }
 
-    /// Takes in rows, columns first, the wanted output as the last column; Householder's reflections of each column.
+    /// Adds rows, columns first, the wanted output as the last column, by Householder reflections of each column.
     ///
-    /// Squares of the entries are never formed, so half of the digits that normal equations lose are kept.
-    fn take(&mut self, block: &mut [Vec<f64>]) {
+    /// Squares of the entries are never formed, so that no digits are lost as by normal equations.
+    fn add_rows(&mut self, block: &mut [Vec<f64>]) {
         let width = self.columns + 1;
         self.rows += block[0].len();
         for j in 0..width {
@@ -233,18 +233,19 @@ impl Skim {
             .collect())
     }
 
-    /// Walks a pattern block by block of rows: what each branch puts out, columns first, from row `first` on.
+    /// Calls `each` with the rows of a pattern, block by block: the output of each branch, columns first, from row `first` on.
     fn walk(
         &self,
         pattern: &SpikeTrains,
         stop: Stop<'_>,
-        mut tell: impl FnMut(usize, &mut Vec<Vec<f64>>),
+        mut each: impl FnMut(usize, &mut Vec<Vec<f64>>),
     ) -> Result<()> {
         let shape = Shape::new(self.kernel, self.tau, self.tau_s());
         let step = shape.step(self.step_ms);
         let compress = self.branches.is_some() && self.nonlinearity == Nonlinearity::Tanh;
         let mut branches = self.branches(pattern, stop)?;
-        let points = points_between(pattern.start, pattern.stop, self.step_ms);
+        let grid = Grid::new(pattern.start, self.step_ms);
+        let points = grid.points_until(pattern.stop);
         check_points(points, MOST_LAID_OUT, self.step_ms)?;
         let rows = points as usize;
         let mut block: Vec<Vec<f64>> = vec![Vec::with_capacity(BLOCK); branches.len()];
@@ -254,20 +255,19 @@ impl Skim {
             for (branch, column) in branches.iter_mut().zip(&mut block) {
                 column.clear();
                 for row in first..last {
-                    let t = pattern.start + row as f64 * self.step_ms;
+                    let point = row as f64;
                     if row > 0 {
                         branch.state = step.apply(branch.state);
                     }
-                    while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| i.0 <= t + rounding_ms(t))
-                    {
-                        shape.add(&mut branch.state, weight, (t - at).max(0.0));
+                    while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| grid.has_come(i.0, point)) {
+                        shape.add(&mut branch.state, weight, (grid.time(point) - at).max(0.0));
                         branch.next += 1;
                     }
                     column.push(if compress { branch.state.b.tanh() } else { branch.state.b });
                 }
             }
             block.truncate(branches.len());
-            tell(first, &mut block);
+            each(first, &mut block);
         }
         Ok(())
     }
@@ -278,16 +278,17 @@ impl Skim {
         let mut normal = Normal::new(columns);
         for (pattern, targets) in patterns.iter().zip(targets) {
             let mut wanted = Vec::with_capacity(BLOCK);
+            let grid = Grid::new(pattern.start, self.step_ms);
             self.walk(pattern, stop, |first, block| {
                 wanted.clear();
                 wanted.extend((first..first + block[0].len()).map(|row| {
-                    let t = pattern.start + row as f64 * self.step_ms;
-                    let come = targets.partition_point(|&at| at <= t + rounding_ms(t));
-                    let on = come > 0 && t < targets[come - 1] + self.pulse_ms - rounding_ms(t);
+                    let point = row as f64;
+                    let come = targets.partition_point(|&at| grid.has_come(at, point));
+                    let on = come > 0 && !grid.has_come(targets[come - 1] + self.pulse_ms, point);
                     if on { 1.0 } else { 0.0 }
                 }));
                 block.push(std::mem::take(&mut wanted));
-                normal.take(block);
+                normal.add_rows(block);
                 wanted = block.pop().unwrap_or_default();
             })?;
         }
@@ -296,20 +297,20 @@ impl Skim {
             let root = self.ridge.sqrt();
             let mut block: Vec<Vec<f64>> =
                 (0..=columns).map(|j| (0..columns).map(|k| if j == k { root } else { 0.0 }).collect()).collect();
-            normal.take(&mut block);
+            normal.add_rows(&mut block);
             normal.rows = rows;
         }
         Ok(normal)
     }
 
-    /// The rows of one pattern as they stand in the problem, row after row: for tests and for looking at.
+    /// The rows of one pattern as they stand in the problem, row after row.
     ///
     /// # Errors
     ///
     /// `Problem` for parameters or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn rows(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::statement::check_heard(pattern)?;
+        crate::learn::statement::check_untargeted(pattern)?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {
             for row in 0..block[0].len() {
@@ -326,7 +327,7 @@ impl Skim {
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn output(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::statement::check_heard(pattern)?;
+        crate::learn::statement::check_untargeted(pattern)?;
         one_weight_a_train(weights, self.columns(pattern.len()))?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {
@@ -342,10 +343,10 @@ impl Skim {
     }
 }
 
-/// When the output comes up to a threshold, ms.
-fn crossings(output: &[f64], threshold: f64, start: f64, step_ms: f64) -> Vec<f64> {
+/// The times at which the output reaches a threshold from below, ms.
+fn crossings(output: &[f64], threshold: f64, grid: Grid) -> Vec<f64> {
     let rises = |&row: &usize| output[row] >= threshold && (row == 0 || output[row - 1] < threshold);
-    (0..output.len()).filter(rises).map(|row| start + row as f64 * step_ms).collect()
+    (0..output.len()).filter(rises).map(|row| grid.time(row as f64)).collect()
 }
 
 impl BatchRule for Skim {
@@ -378,7 +379,7 @@ impl BatchRule for Skim {
             let output = self.output(&weights, pattern, stop)?;
             let (what, wanted) = (format!("output of pattern {p}"), format!("targets[{p}]"));
             for (&threshold, (found, missed, too_many)) in self.thresholds.iter().zip(&mut counts) {
-                let fired = crossings(&output, threshold, pattern.start, self.step_ms);
+                let fired = crossings(&output, threshold, Grid::new(pattern.start, self.step_ms));
                 let pairs = matched((&what, &fired), (&wanted, targets), self.within_ms, stop)?.len();
                 *found += pairs;
                 *missed += targets.len() - pairs;
@@ -401,6 +402,7 @@ impl BatchRule for Skim {
         let Some(threshold) = learnt.said.get("threshold").and_then(Value::as_f64) else {
             return Err(problem!("threshold is missing"));
         };
-        Ok(crossings(&self.output(&learnt.weights, pattern, stop)?, threshold, pattern.start, self.step_ms))
+        let output = self.output(&learnt.weights, pattern, stop)?;
+        Ok(crossings(&output, threshold, Grid::new(pattern.start, self.step_ms)))
     }
 }

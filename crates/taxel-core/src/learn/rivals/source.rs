@@ -1,11 +1,11 @@
-//! What the source of a rule says.
+//! The parameters that the source of a rule publishes.
 
 use serde_json::{Map, Value};
 
 use crate::Result;
 use crate::allowed::Parameter;
 
-/// What the source of a rule says of its parameters, and how they are put together.
+/// The parameters that the source of a rule publishes, and how they are combined.
 pub struct Source {
     /// By which the rule is called.
     pub(super) name: &'static str,

@@ -19,7 +19,7 @@ pub struct Span {
     pub tau_a: f64,
 }
 
-/// What its source says.
+/// The defaults of its source.
 pub(super) const SOURCE: Source = Source {
     name: "span",
     own: &["tau_a"],

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::{Parameter, Range, ranges};
-use crate::neuron::{MOST_LAID_OUT, check_points, points_between};
+use crate::neuron::{Grid, MOST_LAID_OUT, check_points, points_between};
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// What drives the membrane after an input.
@@ -25,7 +25,7 @@ pub enum Current {
     },
 }
 
-/// What an output spike does to the potential. Three names, three neurons.
+/// The effect of an output spike on the potential.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reset {
@@ -37,7 +37,7 @@ pub enum Reset {
     Reset,
 }
 
-/// A leaky membrane that is looked at every `step_ms`; inputs keep their true times.
+/// A leaky membrane, compared with its threshold every `step_ms`; inputs keep their true times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SteppedNeuron {
@@ -80,7 +80,7 @@ struct Input {
 #[derive(Debug)]
 pub(super) struct Laid {
     inputs: Vec<Input>,
-    start: f64,
+    grid: Grid,
     steps: usize,
 }
 
@@ -200,25 +200,25 @@ impl SteppedNeuron {
         Kernels { tau, slow, fast, peak: peak_factor(slow, fast), twice }
     }
 
-    /// Lays a pattern out: inputs by time, each with what it brings at its first grid point.
+    /// Sorts the inputs of a pattern by time, each with its contribution at its first grid point.
     ///
     /// # Errors
     ///
     /// `Problem` where its grid has too many points; `Interrupted` where the caller stops it.
     pub(super) fn lay_out(&self, trains: &SpikeTrains, stop: Stop<'_>) -> Result<Laid> {
         let kernels = self.kernels();
-        let points = points_between(trains.start, trains.stop, self.step_ms);
+        let grid = Grid::new(trains.start, self.step_ms);
+        let points = grid.points_until(trains.stop);
         check_points(points, MOST_LAID_OUT, self.step_ms)?;
         let steps = points as usize - 1;
         let inputs = trains
             .by_time(stop)?
             .into_iter()
             .map(|spike| {
-                let step = ((spike.t - trains.start) / self.step_ms - 1e-9).ceil().max(0.0) as usize;
-                let age = (trains.start + step as f64 * self.step_ms - spike.t).max(0.0);
-                let pass = kernels.pass(age);
+                let point = grid.first_from(spike.t);
+                let pass = kernels.pass((grid.time(point) - spike.t).max(0.0));
                 Input {
-                    step,
+                    step: point as usize,
                     train: spike.train as usize,
                     t: spike.t,
                     a: pass.a,
@@ -227,22 +227,22 @@ impl SteppedNeuron {
                 }
             })
             .collect();
-        Ok(Laid { inputs, start: trains.start, steps })
+        Ok(Laid { inputs, grid, steps })
     }
 
     /// The output spikes (ms, on the grid) that these weights make.
     pub(super) fn fire(&self, weights: &[f64], laid: &Laid, spikes: &mut Vec<f64>) {
         spikes.clear();
-        let held_steps = (self.refractory / self.step_ms + 1e-9).floor() as usize;
+        let held_steps = points_between(0.0, self.refractory, self.step_ms) as usize - 1;
         let mut walk = Walk::new(self, weights, laid);
         let mut held_until = 0;
         for step in 0..=laid.steps {
             walk.to(step);
-            walk.take(step, f64::NEG_INFINITY);
+            walk.add_inputs(step, f64::NEG_INFINITY);
             if step < held_until {
                 walk.v = 0.0;
             } else if walk.v >= self.theta_0 {
-                spikes.push(laid.time(self, step));
+                spikes.push(laid.grid.time(step as f64));
                 match self.after_spike {
                     Reset::Subtract => walk.v -= self.theta_0,
                     Reset::Membrane => {
@@ -255,13 +255,13 @@ impl SteppedNeuron {
         }
     }
 
-    /// The potential at every grid point, told as (t, potential), with output spikes at `forced` (ms, ascending) and
-    /// nowhere else; for resets that leave the potential linear in the weights, [`Reset::Subtract`] and [`Reset::Reset`].
-    pub(super) fn forced(&self, weights: &[f64], laid: &Laid, forced: &[f64], mut tell: impl FnMut(f64, f64)) {
+    /// Calls `each` with time and potential of every grid point, the neuron firing at `forced` (ms, ascending) and nowhere
+    /// else; for resets that leave the potential linear in the weights, [`Reset::Subtract`] and [`Reset::Reset`].
+    pub(super) fn forced(&self, weights: &[f64], laid: &Laid, forced: &[f64], mut each: impl FnMut(f64, f64)) {
         let mut walk = Walk::new(self, weights, laid);
         let mut forced = forced.iter().copied().peekable();
         for step in 0..=laid.steps {
-            let t = laid.time(self, step);
+            let t = laid.grid.time(step as f64);
             walk.to(step);
             let mut lost_up_to = f64::NEG_INFINITY;
             while let Some(at) = forced.next_if(|&at| at < t) {
@@ -273,15 +273,9 @@ impl SteppedNeuron {
                     _ => walk.v -= self.theta_0 * (-(t - at) / self.tau).exp(),
                 }
             }
-            walk.take(step, lost_up_to);
-            tell(t, walk.v);
+            walk.add_inputs(step, lost_up_to);
+            each(t, walk.v);
         }
-    }
-}
-
-impl Laid {
-    fn time(&self, neuron: &SteppedNeuron, step: usize) -> f64 {
-        self.start + step as f64 * neuron.step_ms
     }
 }
 
@@ -301,7 +295,7 @@ impl<'a> Walk<'a> {
         Self { weights, inputs, pass: neuron.kernels().pass(neuron.step_ms), a: 0.0, b: 0.0, v: 0.0 }
     }
 
-    /// One step on, but for the first.
+    /// Moves currents and potential one step on, except at the first.
     #[inline]
     fn to(&mut self, step: usize) {
         if step > 0 {
@@ -311,9 +305,9 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Takes in the inputs of this step, but those up to `lost_up_to`.
+    /// Adds the inputs of this step that come after `lost_up_to`.
     #[inline]
-    fn take(&mut self, step: usize, lost_up_to: f64) {
+    fn add_inputs(&mut self, step: usize, lost_up_to: f64) {
         while let Some(input) = self.inputs.next_if(|input| input.step == step) {
             if input.t > lost_up_to {
                 let w = self.weights[input.train];

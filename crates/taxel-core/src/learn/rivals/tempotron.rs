@@ -32,7 +32,7 @@ pub struct Tempotron {
     pub epochs: usize,
     /// Of the first weights and the order of patterns.
     pub seed: u64,
-    /// After how long the caller asks for the best so far, s; this crate looks at no clock.
+    /// The time after which the caller requests the best so far, s; this crate reads no clock.
     pub max_seconds: Option<f64>,
 }
 
@@ -176,7 +176,7 @@ impl Tempotron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn peak(&self, weights: &[f64], pattern: &SpikeTrains) -> Result<Peak> {
         self.check()?;
-        crate::learn::statement::check_heard(pattern)?;
+        crate::learn::statement::check_untargeted(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         Ok(self.reach(&self.shape(), weights, &self.lay_out(pattern, Stop::never())?).peak)
     }
@@ -189,7 +189,7 @@ impl Tempotron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn change(&self, weights: &[f64], pattern: &SpikeTrains, label: bool) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::statement::check_heard(pattern)?;
+        crate::learn::statement::check_untargeted(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         let (shape, events) = (self.shape(), self.lay_out(pattern, Stop::never())?);
         let mut change = vec![0.0; weights.len()];

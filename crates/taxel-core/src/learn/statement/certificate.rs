@@ -12,7 +12,7 @@ use crate::Result;
 use crate::neuron::Time;
 use crate::vectors::dot;
 
-/// Multipliers that prove a problem infeasible, and what they say in words.
+/// Multipliers that prove a problem infeasible, and their explanation in words.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
     /// Rows with their multipliers.
@@ -25,7 +25,7 @@ pub struct Certificate {
     pub text: String,
 }
 
-/// Rows named in a reading, those of most weight first.
+/// Rows that an explanation names, those with the largest terms first.
 const NAMED: usize = 12;
 
 impl Certificate {
@@ -33,7 +33,7 @@ impl Certificate {
     pub(crate) fn check(statement: &Statement, bounds: &Bounds, rows: Vec<(Row, f64)>) -> Result<Option<Self>> {
         let Some(proven) = gap(statement, bounds, &rows, false)? else { return Ok(None) };
         let at_all = gap(statement, bounds, &rows, true)?.is_some();
-        let text = read(statement, bounds, &rows, at_all)?;
+        let text = explained(statement, bounds, &rows, at_all)?;
         Ok(Some(Self { rows, gap: proven, at_all, text }))
     }
 
@@ -41,9 +41,9 @@ impl Certificate {
     /// for any margin.
     pub(crate) fn of_same_inputs(statement: &Statement, bounds: &Bounds) -> Result<Option<Self>> {
         for (pattern, target) in statement.targets() {
-            let t = statement.sheets[pattern].targets[target];
+            let t = statement.examples[pattern].targets[target];
             let same = |&q: &usize| statement.is_asked(q, t) && statement.is_same_before(t, pattern, q);
-            if let Some(silent) = (0..statement.sheets.len()).find(same) {
+            if let Some(silent) = (0..statement.examples.len()).find(same) {
                 let rows = vec![(Row::Target { pattern, target }, -1.0), (Row::Silence { pattern: silent, t }, 1.0)];
                 return Self::check(statement, bounds, rows);
             }
@@ -97,7 +97,7 @@ fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) 
     Ok((gap > rounding || cancels && rows.iter().any(asks)).then_some(gap))
 }
 
-fn read(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: bool) -> Result<String> {
+fn explained(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: bool) -> Result<String> {
     let mv = |potential: f64| short(potential * statement.unit);
     let mut text = match rows {
         [(row @ Row::Target { pattern, target }, _)] => {
@@ -137,7 +137,7 @@ fn read(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: boo
     Ok(text)
 }
 
-/// The rows that weigh most, by pattern.
+/// The rows with the largest terms, by pattern.
 fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
     let mut weighed = Vec::with_capacity(rows.len());
     for &(row, multiplier) in rows {
@@ -147,24 +147,25 @@ fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
     }
     weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
     // By pattern: targets that must be hit or neared, and times of silence.
-    let mut told: BTreeMap<usize, (Vec<String>, Vec<f64>)> = BTreeMap::new();
+    let mut by_pattern: BTreeMap<usize, (Vec<String>, Vec<f64>)> = BTreeMap::new();
     for &(_, row) in weighed.iter().take(NAMED) {
         let t = statement.time(row);
         match row {
             Row::Target { pattern, target } => {
-                told.entry(pattern).or_default().0.push(format!("fire at target {target} ({} ms)", short(t)));
+                by_pattern.entry(pattern).or_default().0.push(format!("fire at target {target} ({} ms)", short(t)));
             }
             Row::Slope { pattern, target } => {
-                told.entry(pattern)
+                by_pattern
+                    .entry(pattern)
                     .or_default()
                     .0
                     .push(format!("come up to target {target} ({} ms) from below", short(t)));
             }
-            Row::Silence { pattern, t } => told.entry(pattern).or_default().1.push(t),
+            Row::Silence { pattern, t } => by_pattern.entry(pattern).or_default().1.push(t),
         }
     }
     let mut parts = Vec::new();
-    for (pattern, (mut asked, mut silent)) in told {
+    for (pattern, (mut asked, mut silent)) in by_pattern {
         silent.sort_by(f64::total_cmp);
         if !silent.is_empty() {
             let times: Vec<String> = silent.iter().map(|&t| short(t)).collect();

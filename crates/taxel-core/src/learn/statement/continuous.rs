@@ -1,22 +1,22 @@
-//! Silence in continuous time: where do these weights break it? One sweep over all patterns, two numbers a pattern, no row
-//! written out.
+//! Silence in continuous time: finds where given weights violate it, in one sweep over all patterns with a state of two
+//! numbers, without writing rows out.
 //!
 //! Between two input spikes potential and tapered margin are one state of the kernel's family, so their maximum above the
 //! recovering threshold is found exactly; intervals are split at inputs, targets, edges of refractory times and where a taper
 //! begins. A bound that costs no exponential passes over nearly all of them.
 
 use super::peak::{Peak, exceeds};
-use super::rows::{Sheet, Statement, lost, until};
+use super::rows::{Example, Statement, lost, until};
 use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak, rounding_ms};
 
-/// A time at which something happens, with what the sweep needs at each.
+/// A time at which the state or the limit changes.
 #[derive(Debug, Clone, Copy)]
 struct Node {
     /// From the node before to here.
     step: Step,
     /// The largest that an input of weight 1 at this node comes to before the next one.
     reach: f64,
-    /// The least limit up to the next node, mV; infinite where nothing is asked.
+    /// The least limit up to the next node, mV; infinite where no silence is required.
     least: f64,
     /// Where the inputs at this node end.
     inputs: u32,
@@ -24,7 +24,7 @@ struct Node {
     reset: bool,
 }
 
-/// What silence asks from a node to the next.
+/// The limit of silence from a node to the next.
 #[derive(Debug, Clone, Copy)]
 struct Asked {
     t: f64,
@@ -56,7 +56,7 @@ pub(crate) struct SilentTimes {
 
 impl SilentTimes {
     pub(crate) fn new(statement: &Statement) -> Self {
-        let strips = statement.sheets.iter().map(|sheet| strip(statement, sheet)).collect();
+        let strips = statement.examples.iter().map(|example| strip(statement, example)).collect();
         Self { shape: statement.shape, tau_rec: statement.neuron.tau_rec(), strips }
     }
 
@@ -117,28 +117,28 @@ impl SilentTimes {
     }
 }
 
-/// What lies above 0, and what is no number.
+/// Values above 0, and NaN, unchanged; 0 for all others.
 fn positive(x: f64) -> f64 {
     if x <= 0.0 { 0.0 } else { x }
 }
 
-fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
+fn strip(statement: &Statement, example: &Example) -> Strip {
     let Statement { neuron, shape, taper, .. } = statement;
-    // Inputs that are lost just behind themselves never count: no spike but a target is between.
-    let counts = |&(t, _): &(f64, u32)| t <= sheet.end && !lost(neuron, &sheet.targets, t, t.next_up());
-    let heard: Vec<(f64, u32)> = sheet.inputs.iter().copied().filter(counts).collect();
+    // Inputs that are lost just after their own time never count: no spike but a target is between.
+    let counts = |&(t, _): &(f64, u32)| t <= example.end && !lost(neuron, &example.targets, t, t.next_up());
+    let heard: Vec<(f64, u32)> = example.inputs.iter().copied().filter(counts).collect();
 
-    let mut times = vec![sheet.start, sheet.end];
+    let mut times = vec![example.start, example.end];
     times.extend(heard.iter().map(|i| i.0));
-    for &target in &sheet.targets {
+    for &target in &example.targets {
         times.extend([target, target - taper.length, until(target), target + neuron.refractory]);
     }
     if neuron.first_threshold == FirstThreshold::Printed {
-        let rise = sheet.start + neuron.refractory;
-        // Silence is asked for at the lower threshold up to there: the neuron's edge has some width.
+        let rise = example.start + neuron.refractory;
+        // Silence is required at the lower threshold up to there, as the neuron's edge is rounded.
         times.extend([rise - 2.0 * rounding_ms(rise), rise]);
     }
-    times.retain(|&t| sheet.start <= t && t <= sheet.end);
+    times.retain(|&t| example.start <= t && t <= example.end);
     times.sort_unstable_by(f64::total_cmp);
     times.dedup();
 
@@ -150,15 +150,15 @@ fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
             step = shape.step(length);
         }
         next += heard[next..].iter().take_while(|i| i.0 <= t).count();
-        let reset = neuron.after_spike == AfterSpike::Reset && sheet.next(t) == Some(t);
+        let reset = neuron.after_spike == AfterSpike::Reset && example.next(t) == Some(t);
         let mut here = Asked { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
         let (mut reach, mut least) = (0.0, f64::INFINITY);
-        if let Some(to) = times.get(k + 1).copied().filter(|&to| asks(statement, sheet, t, to)) {
+        if let Some(to) = times.get(k + 1).copied().filter(|&to| asks(statement, example, t, to)) {
             here.to = to;
             // Just behind the node: a target at the node itself has fired.
-            here.rise = statement.rise(sheet, sheet.fired(to), t);
+            here.rise = statement.rise(example, example.fired(to), t);
             reach = shape.value((to - t).min(shape.peak()));
-            match sheet.next(to).filter(|target| target - f64::midpoint(t, to) < taper.length) {
+            match example.next(to).filter(|target| target - f64::midpoint(t, to) < taper.length) {
                 Some(target) => here.taper = taper.before(target - t),
                 None => here.height = statement.margin.height,
             }
@@ -170,13 +170,13 @@ fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
     Strip { nodes, asked, trains: heard.iter().map(|i| i.1).collect() }
 }
 
-/// Whether silence is asked for from `t` to `to`, neighbouring nodes.
-fn asks(statement: &Statement, sheet: &Sheet, t: f64, to: f64) -> bool {
+/// Whether silence is required from `t` to `to`, neighbouring nodes.
+fn asks(statement: &Statement, example: &Example, t: f64, to: f64) -> bool {
     let neuron = &statement.neuron;
-    let fired = sheet.fired(to);
+    let fired = example.fired(to);
     let rises =
-        neuron.first_threshold == FirstThreshold::Printed && fired.is_none() && to == sheet.start + neuron.refractory;
+        neuron.first_threshold == FirstThreshold::Printed && fired.is_none() && to == example.start + neuron.refractory;
     !rises
         && fired.is_none_or(|target| target + neuron.refractory <= t)
-        && sheet.next(to).is_none_or(|target| to <= until(target))
+        && example.next(to).is_none_or(|target| to <= until(target))
 }

@@ -1,4 +1,4 @@
-//! Checks of what learners are given.
+//! Checks of the arguments of learners.
 
 use crate::neuron::Neuron;
 use crate::{Result, SpikeTrains, problem};
@@ -84,8 +84,8 @@ pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
     Ok(())
 }
 
-/// Checks a pattern that is only heard.
-pub(crate) fn check_heard(pattern: &SpikeTrains) -> Result<()> {
+/// Checks a pattern without targets.
+pub(crate) fn check_untargeted(pattern: &SpikeTrains) -> Result<()> {
     pattern.check()?;
     if pattern.values.is_some() {
         return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));

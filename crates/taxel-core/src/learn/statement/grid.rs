@@ -1,16 +1,16 @@
 //! Silence on the grid (6.9b): what the potential is on every grid point, and what the threshold leaves it there.
 //!
 //! Silent rows are never stored: one sweep over the grid gives the potential on all of them (the kernel needs two numbers
-//! a pattern), one sweep backwards gives a weighted sum of all of them. CONE-X looks for points at which silence is broken,
-//! CONE-R sums up by how much.
+//! a pattern), one sweep backwards gives a weighted sum of all of them. CONE-X finds the points at which silence is
+//! violated, CONE-R sums the violations.
 
 use super::peak::{Peak, exceeds};
-use super::rows::{Sheet, Statement, lost};
+use super::rows::{Example, Statement, lost};
 use crate::neuron::{AfterSpike, Grid, KernelSum, Place, Shape, Step};
 use crate::vectors::{add, dot};
 use crate::{Result, Stop};
 
-/// An input as the grid sees it: what it adds to the state at the first grid point not before it.
+/// The contribution of an input to the state at the first grid point not before it.
 #[derive(Debug, Clone, Copy)]
 struct GridInput {
     point: u32,
@@ -19,13 +19,13 @@ struct GridInput {
     b: f64,
 }
 
-/// A grid point at which the state of the kernels jumps, and what makes it jump.
+/// A grid point at which the state of the kernels jumps: inputs, or a reset.
 #[derive(Debug, Clone, Copy)]
-struct Station {
+struct Jump {
     point: u32,
     /// Everything before is lost here (`Reset`), ahead of the inputs.
     reset: bool,
-    /// Where the inputs that come here end among all of the pattern; they begin where those of the station before end.
+    /// Where the inputs that come here end among all of the pattern; they begin where those of the jump before end.
     inputs: u32,
 }
 
@@ -34,7 +34,7 @@ struct Station {
 struct Lane {
     inputs: Vec<GridInput>,
     /// Ascending by point.
-    stations: Vec<Station>,
+    jumps: Vec<Jump>,
     /// The number of its first row among all.
     first: usize,
     points: usize,
@@ -48,11 +48,11 @@ pub(crate) struct SilentRows {
     trains: usize,
     shape: Shape,
     pub(crate) step_ms: f64,
-    /// What 0, 1, 2 ... grid steps do: so a run of points without an input needs no recursion.
+    /// The effect of 0, 1, 2 ... grid steps, so that a run of points without an input needs no recursion.
     steps: Steps,
     /// Some rows of a grid written out, one after the other, in place of lanes.
     written: Option<Vec<f64>>,
-    /// What the potential must not exceed, mV; infinite where nothing is asked.
+    /// The limit of the potential, mV; infinite where no silence is required.
     pub(crate) limit: Vec<f64>,
 }
 
@@ -95,7 +95,7 @@ impl SilentRows {
             written: None,
             limit: vec![],
         };
-        for pattern in 0..statement.sheets.len() {
+        for pattern in 0..statement.examples.len() {
             stop.check()?;
             rows.push(statement, pattern, stop)?;
         }
@@ -104,8 +104,8 @@ impl SilentRows {
 
     /// Adds the rows of one more pattern; where the caller stops it, they are as before.
     pub(crate) fn push(&mut self, statement: &Statement, pattern: usize, stop: Stop<'_>) -> Result<()> {
-        let (neuron, sheet) = (&statement.neuron, &statement.sheets[pattern]);
-        let Sheet { start, end, targets, .. } = sheet;
+        let (neuron, example) = (&statement.neuron, &statement.examples[pattern]);
+        let Example { start, end, targets, .. } = example;
         let grid = Grid::new(*start, self.step_ms);
         let points = neuron.points(*start, *end) as usize;
         let (mut next, mut limit) = (0, Vec::with_capacity(points));
@@ -119,23 +119,23 @@ impl SilentRows {
             }
             let fired = next.checked_sub(1).map(|k| targets[k]);
             limit.push(if statement.is_silent_between(fired, t, targets.get(next).copied()) {
-                neuron.theta_0 + statement.rise(sheet, fired, t) - statement.margin.height
+                neuron.theta_0 + statement.rise(example, fired, t) - statement.margin.height
             } else {
                 f64::INFINITY
             });
         }
-        let mut inputs = Vec::with_capacity(sheet.inputs.len());
-        for (k, &(t, train)) in sheet.inputs.iter().enumerate() {
+        let mut inputs = Vec::with_capacity(example.inputs.len());
+        for (k, &(t, train)) in example.inputs.iter().enumerate() {
             if k % 4096 == 0 {
                 stop.check()?;
             }
             let place = grid.place(t);
-            // An input on a point itself is felt behind it; where its kernel begins above 0, from the next point on.
-            let felt = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
-            if felt < points as f64 && !lost(neuron, targets, t, grid.time(felt)) {
-                let age = grid.between(place, Place::at(felt)).max(0.0);
+            // An input on a point itself acts after it; where its kernel begins above 0, from the next point on.
+            let acts_at = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
+            if acts_at < points as f64 && !lost(neuron, targets, t, grid.time(acts_at)) {
+                let age = grid.between(place, Place::at(acts_at)).max(0.0);
                 let KernelSum { a, b } = self.shape.after(self.shape.input(), age);
-                inputs.push(GridInput { point: felt as u32, train, a, b });
+                inputs.push(GridInput { point: acts_at as u32, train, a, b });
             }
         }
         inputs.sort_by_key(|i| i.point);
@@ -146,8 +146,8 @@ impl SilentRows {
             }
             AfterSpike::Keep | AfterSpike::Ignore => vec![],
         };
-        let stations = stations(&inputs, &resets);
-        self.lanes.push(Lane { inputs, stations, first: self.limit.len(), points, grid });
+        let jumps = jumps(&inputs, &resets);
+        self.lanes.push(Lane { inputs, jumps, first: self.limit.len(), points, grid });
         self.limit.append(&mut limit);
         Ok(())
     }
@@ -160,7 +160,7 @@ impl SilentRows {
         first + after.saturating_sub(near + 1)..first + after
     }
 
-    /// How many rows the first pattern has, those at which nothing is asked included.
+    /// The number of rows of the first pattern, those without a requirement included.
     pub(crate) fn of_first(&self) -> usize {
         self.lanes.first().map_or(0, |lane| lane.points)
     }
@@ -183,7 +183,7 @@ impl SilentRows {
         }
     }
 
-    /// How many rows, those at which nothing is asked included.
+    /// The number of rows, those without a requirement included.
     pub(crate) fn len(&self) -> usize {
         self.limit.len()
     }
@@ -217,16 +217,16 @@ impl SilentRows {
     fn potential_of(&self, lane: &Lane, weights: &[f64], rows: &mut [f64]) {
         let mut state = KernelSum::default();
         let (mut input, mut at) = (0, 0);
-        for (k, station) in lane.stations.iter().enumerate() {
-            state = if station.reset { KernelSum::default() } else { self.step(station.point - at).apply(state) };
-            at = station.point;
-            for i in &lane.inputs[input..station.inputs as usize] {
+        for (k, jump) in lane.jumps.iter().enumerate() {
+            state = if jump.reset { KernelSum::default() } else { self.step(jump.point - at).apply(state) };
+            at = jump.point;
+            for i in &lane.inputs[input..jump.inputs as usize] {
                 let w = weights[i.train as usize];
                 state.a += w * i.a;
                 state.b += w * i.b;
             }
-            input = station.inputs as usize;
-            let end = lane.stations.get(k + 1).map_or(lane.points, |next| next.point as usize);
+            input = jump.inputs as usize;
+            let end = lane.jumps.get(k + 1).map_or(lane.points, |next| next.point as usize);
             match &mut rows[at as usize..end] {
                 [row] => *row = state.b,
                 rows => self.run(state, rows),
@@ -273,17 +273,17 @@ impl SilentRows {
         }
         for lane in &self.lanes {
             let factors = &factors[lane.first..lane.first + lane.points];
-            // How much the rows from here on hear of the state here.
+            // The sensitivity of the rows from here on to the state here.
             let mut heard = KernelSum::default();
             let mut end = lane.points;
-            for (k, station) in lane.stations.iter().enumerate().rev() {
-                let at = station.point as usize;
+            for (k, jump) in lane.jumps.iter().enumerate().rev() {
+                let at = jump.point as usize;
                 heard = self.run_back(heard, &factors[at..end]);
-                let from = if k == 0 { 0 } else { lane.stations[k - 1].inputs as usize };
-                for i in &lane.inputs[from..station.inputs as usize] {
+                let from = if k == 0 { 0 } else { lane.jumps[k - 1].inputs as usize };
+                for i in &lane.inputs[from..jump.inputs as usize] {
                     sum[i.train as usize] += heard.a * i.a + heard.b * i.b;
                 }
-                if station.reset {
+                if jump.reset {
                     heard = KernelSum::default();
                 }
                 end = at;
@@ -291,7 +291,7 @@ impl SilentRows {
         }
     }
 
-    /// How much a run of rows, and what comes behind it, hear of the state at the first of them.
+    /// The sensitivity of a run of rows, and of all after it, to the state at the first of them.
     fn run_back(&self, mut heard: KernelSum, factors: &[f64]) -> KernelSum {
         for factors in factors.rchunks(RUN) {
             let step = self.steps.of(factors.len());
@@ -318,16 +318,16 @@ impl SilentRows {
                 continue;
             }
             let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
-            let (mut station, mut input, mut at) = (0, 0, 0_u32);
+            let (mut jump, mut input, mut at) = (0, 0, 0_u32);
             while place < rows.len() && rows[place] < lane.first + lane.points {
                 let point = (rows[place] - lane.first) as u32;
-                let next = station + lane.stations[station..].partition_point(|s| s.point <= point);
-                let passed = &lane.stations[station..next];
+                let next = jump + lane.jumps[jump..].partition_point(|s| s.point <= point);
+                let passed = &lane.jumps[jump..next];
                 if let Some(reset) = passed.iter().rposition(|s| s.reset) {
                     a.fill(0.0);
                     b.fill(0.0);
-                    let before = station + reset;
-                    input = if before == 0 { 0 } else { lane.stations[before - 1].inputs as usize };
+                    let before = jump + reset;
+                    input = if before == 0 { 0 } else { lane.jumps[before - 1].inputs as usize };
                 } else if point > at {
                     let step = self.step(point - at);
                     for (a, b) in a.iter_mut().zip(&mut b) {
@@ -341,7 +341,7 @@ impl SilentRows {
                     a[i.train as usize] += now.a;
                     b[i.train as usize] += now.b;
                 }
-                (station, input, at) = (next, end, point);
+                (jump, input, at) = (next, end, point);
                 out[place * n..(place + 1) * n].copy_from_slice(&b);
                 place += 1;
             }
@@ -351,7 +351,7 @@ impl SilentRows {
 }
 
 /// Where the state jumps, by inputs and resets, both ascending.
-fn stations(inputs: &[GridInput], resets: &[u32]) -> Vec<Station> {
+fn jumps(inputs: &[GridInput], resets: &[u32]) -> Vec<Jump> {
     let mut found = Vec::new();
     let (mut input, mut reset) = (0, 0);
     while input < inputs.len() || reset < resets.len() {
@@ -364,7 +364,7 @@ fn stations(inputs: &[GridInput], resets: &[u32]) -> Vec<Station> {
         while input < inputs.len() && inputs[input].point == point {
             input += 1;
         }
-        found.push(Station { point, reset: here, inputs: input as u32 });
+        found.push(Jump { point, reset: here, inputs: input as u32 });
     }
     found
 }

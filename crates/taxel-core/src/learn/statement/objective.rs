@@ -158,7 +158,7 @@ impl Objective {
             Norm::Norm => most / (self.l1 + self.l2),
             Norm::Square => (most / self.l1).min((most / self.l2).sqrt()),
         };
-        // Nothing is lost by rounding; where there is neither, nothing is said.
+        // Widened against rounding; without l1 and l2 there is no limit.
         if reach.is_nan() { f64::INFINITY } else { reach * (1.0 + 1e-9) }
     }
 

@@ -1,8 +1,8 @@
-//! Where silence is broken.
+//! The instants at which weights violate silence.
 
 use super::rows::Row;
 
-/// The worst instant of a stretch in which silence is broken.
+/// The worst instant of a stretch in which silence is violated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Peak {
     pub(crate) pattern: usize,
@@ -18,12 +18,12 @@ impl Peak {
     }
 }
 
-/// Whether `x` lies above, or is no number: that is never fine.
+/// Whether `x` is above the limit, or NaN.
 pub(crate) fn exceeds(x: f64, limit: f64) -> bool {
     x > limit || x.is_nan()
 }
 
-/// The largest value, or no number where one is none.
+/// The largest value; NaN where one is NaN.
 pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(f64::NEG_INFINITY, |most, x| if x <= most || most.is_nan() { most } else { x })
 }

@@ -1,4 +1,4 @@
-//! The relaxed problem (6.12 to 6.14): all that is asked may be missed, at a price. Its value at given weights, and a bound from
+//! The relaxed problem (6.12 to 6.14): violations of rows are penalised. Its value at given weights, and a bound from
 //! below on the least it can be.
 
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub(crate) struct Relaxed {
 }
 
 impl Relaxed {
-    /// Lays out the rows of a statement; B looks `delta_t` ms behind the targets.
+    /// Lays out the rows of a statement; B takes the potential `delta_t` ms after the targets.
     pub(crate) fn new(statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<Self> {
         let (neuron, trains) = (&statement.neuron, statement.trains);
         let mut rows = Self {
@@ -54,7 +54,7 @@ impl Relaxed {
 
     /// Adds the rows of the statement's last pattern; where the caller stops it, they are as before.
     pub(crate) fn push(&mut self, statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<()> {
-        let (pattern, before) = (statement.sheets.len() - 1, self.targets.len());
+        let (pattern, before) = (statement.examples.len() - 1, self.targets.len());
         let mut targets = Targets::clone(&self.targets);
         targets.push(statement, pattern, delta_t, stop)?;
         self.silent.push(statement, pattern, stop)?;
@@ -84,7 +84,7 @@ impl Relaxed {
         }
     }
 
-    /// How large weights must be for targets to be met, mV.
+    /// The size of weights that reach the threshold at the targets, mV.
     pub(crate) fn needed(&self) -> f64 {
         let (thresholds, lengths) = self
             .targets
@@ -175,7 +175,7 @@ impl Relaxed {
 }
 
 impl Point {
-    /// The share of the objective that a bound leaves open; none where everything is met.
+    /// The relative gap to a bound; 0 where the objective is 0.
     pub(crate) fn gap(&self, bound: f64) -> f64 {
         match self.parts.sum() {
             least if least <= NOTHING => 0.0,

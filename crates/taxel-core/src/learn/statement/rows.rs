@@ -1,4 +1,4 @@
-//! The rows of the stated problem (6.9, 6.10): what each asks of the weights, named by pattern and time, written out when asked.
+//! The rows of the stated problem (6.9, 6.10), named by pattern and time, written out on demand.
 //!
 //! A *row* holds the coefficients of the weights in one linear function of them (the potential at a time, or its slope), and
 //! what it must equal or not exceed. After a spike some inputs are lost (`after_spike`); as the spikes of a learning problem
@@ -44,7 +44,7 @@ pub enum Row {
     },
 }
 
-/// What a row says: `coefficients.w = limit` at a target, `<= limit` else.
+/// A row written out: `coefficients.w = limit` at a target, `<= limit` else.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
     /// One a train: at a target and in silence those of the potential, in a slope row those of its slope, negated.
@@ -71,7 +71,7 @@ impl Margin {
     }
 }
 
-/// When the silence before a target ends: far from time 0 two neighbouring times are farther apart than what counts as at it.
+/// The end of the silence before a target: far from time 0 neighbouring times are farther apart than `AT_TARGET`.
 pub(crate) fn until(target: f64) -> f64 {
     (target - AT_TARGET).min(target.next_down())
 }
@@ -116,9 +116,9 @@ impl Taper {
 
 /// One pattern with its targets.
 #[derive(Debug, Clone)]
-pub(crate) struct Sheet {
+pub(crate) struct Example {
     pub(crate) start: f64,
-    /// Where silence is asked for to.
+    /// The end of the time in which silence is required, ms.
     pub(crate) end: f64,
     pub(crate) targets: Vec<f64>,
     /// Time (ms) and train, by time.
@@ -148,7 +148,7 @@ pub(crate) fn end_of(
     Ok(end)
 }
 
-impl Sheet {
+impl Example {
     /// The inputs before `t`, by time.
     fn before(&self, t: f64) -> &[(f64, u32)] {
         &self.inputs[..self.inputs.partition_point(|i| i.0 < t)]
@@ -189,7 +189,7 @@ pub struct Statement {
     pub(crate) unit: f64,
     pub(crate) taper: Taper,
     pub(crate) trains: usize,
-    pub(crate) sheets: Vec<Sheet>,
+    pub(crate) examples: Vec<Example>,
 }
 
 impl Statement {
@@ -197,13 +197,13 @@ impl Statement {
     pub(crate) fn new(neuron: &Neuron, margin: Margin, unit: f64, trains: usize) -> Self {
         let shape = neuron.shape();
         let (neuron, taper) = (neuron.clone(), Taper::new(shape, margin));
-        Self { neuron, shape, margin, unit, taper, trains, sheets: vec![] }
+        Self { neuron, shape, margin, unit, taper, trains, examples: vec![] }
     }
 
     /// Adds one more pattern, which has been checked, and where silence ends in it, ms; where the caller stops it, all is as before.
     pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64, stop: Stop<'_>) -> Result<()> {
         let spikes = pattern.by_time(stop)?;
-        self.sheets.push(Sheet {
+        self.examples.push(Example {
             start: pattern.start,
             end,
             targets: targets.to_vec(),
@@ -212,14 +212,14 @@ impl Statement {
         Ok(())
     }
 
-    /// Takes the first pattern away; the others are numbered anew from 0.
+    /// Removes the first pattern; the others are numbered anew from 0.
     pub(crate) fn drop_first(&mut self) {
-        self.sheets.remove(0);
+        self.examples.remove(0);
     }
 
-    /// Takes the last pattern away.
+    /// Removes the last pattern.
     pub(crate) fn drop_last(&mut self) {
-        self.sheets.pop();
+        self.examples.pop();
     }
 
     /// The same with another margin.
@@ -233,13 +233,13 @@ impl Statement {
         match row {
             Row::Target { .. } => 0.0,
             Row::Slope { .. } => self.margin.slope,
-            Row::Silence { pattern, t } => self.sheets.get(pattern).map_or(0.0, |sheet| self.margin_at(sheet, t)),
+            Row::Silence { pattern, t } => self.examples.get(pattern).map_or(0.0, |example| self.margin_at(example, t)),
         }
     }
 
     /// All targets, as (pattern, target).
     pub fn targets(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        self.sheets.iter().enumerate().flat_map(|(p, sheet)| (0..sheet.targets.len()).map(move |k| (p, k)))
+        self.examples.iter().enumerate().flat_map(|(p, example)| (0..example.targets.len()).map(move |k| (p, k)))
     }
 
     /// When a row's time is, ms.
@@ -247,7 +247,7 @@ impl Statement {
     pub fn time(&self, row: Row) -> f64 {
         match row {
             Row::Silence { t, .. } => t,
-            Row::Target { pattern, target } | Row::Slope { pattern, target } => self.sheets[pattern].targets[target],
+            Row::Target { pattern, target } | Row::Slope { pattern, target } => self.examples[pattern].targets[target],
         }
     }
 
@@ -266,9 +266,9 @@ impl Statement {
     pub(crate) fn state_into(&self, row: Row, coefficients: &mut [f64]) -> Result<f64> {
         match row {
             Row::Target { pattern, target } => {
-                let (sheet, t) = self.target(pattern, target)?;
-                self.sum(sheet, t, &sheet.targets[..target], |state| state.b, coefficients);
-                Ok(self.threshold(sheet, t))
+                let (example, t) = self.target(pattern, target)?;
+                self.sum(example, t, &example.targets[..target], |state| state.b, coefficients);
+                Ok(self.threshold(example, t))
             }
             Row::Slope { pattern, target } => {
                 if self.neuron.time == Time::Grid {
@@ -276,25 +276,25 @@ impl Statement {
                         "pattern {pattern}, target {target}: a slope is asked for in continuous time only"
                     ));
                 }
-                let (sheet, t) = self.target(pattern, target)?;
+                let (example, t) = self.target(pattern, target)?;
                 let slope = |state| -self.shape.slope(state);
-                self.sum(sheet, t, &sheet.targets[..target], slope, coefficients);
-                let falls = (self.threshold(sheet, t) - self.neuron.theta_0) / self.neuron.tau_rec();
+                self.sum(example, t, &example.targets[..target], slope, coefficients);
+                let falls = (self.threshold(example, t) - self.neuron.theta_0) / self.neuron.tau_rec();
                 Ok(falls - self.margin.slope)
             }
             Row::Silence { pattern, t } => {
-                let sheet = self.sheet(pattern)?;
+                let example = self.example(pattern)?;
                 self.check_silent(pattern, t)?;
-                let fired = sheet.targets.partition_point(|&target| target < t);
-                self.sum(sheet, t, &sheet.targets[..fired], |state| state.b, coefficients);
-                Ok(self.threshold(sheet, t) - self.margin_at(sheet, t))
+                let fired = example.targets.partition_point(|&target| target < t);
+                self.sum(example, t, &example.targets[..fired], |state| state.b, coefficients);
+                Ok(self.threshold(example, t) - self.margin_at(example, t))
             }
         }
     }
 
-    /// What B(w) looks at (6.10): the coefficients `delta_t` ms behind a target, and the threshold at the target, mV.
+    /// The row of B(w) (6.10): the coefficients `delta_t` ms after a target, and the threshold at the target, mV.
     ///
-    /// Inputs behind the target count: B asks where the potential would have come to, had the neuron not fired there.
+    /// Inputs after the target count: B takes the potential as it would be, had the neuron not fired there.
     ///
     /// # Errors
     ///
@@ -313,42 +313,42 @@ impl Statement {
         delta_t: f64,
         coefficients: &mut [f64],
     ) -> Result<f64> {
-        let (sheet, t) = self.target(pattern, target)?;
+        let (example, t) = self.target(pattern, target)?;
         let t_behind = t + delta_t;
-        let earlier = &sheet.targets[..target];
-        self.sum(sheet, t_behind, earlier, |state| state.b, coefficients);
-        Ok(self.threshold(sheet, t))
+        let earlier = &example.targets[..target];
+        self.sum(example, t_behind, earlier, |state| state.b, coefficients);
+        Ok(self.threshold(example, t))
     }
 
-    fn sheet(&self, pattern: usize) -> Result<&Sheet> {
-        let there = self.sheets.len();
-        self.sheets.get(pattern).ok_or_else(|| problem!("pattern {pattern}: there are {there}"))
+    fn example(&self, pattern: usize) -> Result<&Example> {
+        let there = self.examples.len();
+        self.examples.get(pattern).ok_or_else(|| problem!("pattern {pattern}: there are {there}"))
     }
 
-    fn target(&self, pattern: usize, target: usize) -> Result<(&Sheet, f64)> {
-        let sheet = self.sheet(pattern)?;
-        let there = sheet.targets.len();
-        match sheet.targets.get(target) {
-            Some(&t) => Ok((sheet, t)),
+    fn target(&self, pattern: usize, target: usize) -> Result<(&Example, f64)> {
+        let example = self.example(pattern)?;
+        let there = example.targets.len();
+        match example.targets.get(target) {
+            Some(&t) => Ok((example, t)),
             None => Err(problem!("pattern {pattern}, target {target}: the pattern has {there} targets")),
         }
     }
 
-    /// Checks that silence is asked for at this time.
+    /// Checks that silence is required at this time.
     fn check_silent(&self, pattern: usize, t: f64) -> Result<()> {
-        let sheet = self.sheet(pattern)?;
-        let Sheet { start, end, .. } = sheet;
+        let example = self.example(pattern)?;
+        let Example { start, end, .. } = example;
         let last = if self.neuron.time == Time::Grid { end + rounding_ms(*end) } else { *end };
         if !(*start <= t && t <= last) {
             return Err(problem!("pattern {pattern}: {t} ms lies outside of what is asked for, {start} to {end} ms"));
         }
-        if self.neuron.time == Time::Grid && !self.is_point(sheet, t) {
+        if self.neuron.time == Time::Grid && !self.is_point(example, t) {
             return Err(problem!(
                 "pattern {pattern}: {t} ms is no point of the grid, {start} + k {} ms",
                 self.neuron.step_ms
             ));
         }
-        if !self.is_silent(sheet, t) {
+        if !self.is_silent(example, t) {
             return Err(problem!(
                 "pattern {pattern}: {t} ms lies at a target or in its refractory time, nothing is asked there"
             ));
@@ -358,25 +358,25 @@ impl Statement {
 
     /// Whether two patterns hold the same up to `t`: inputs, and targets that the neuron fires at.
     pub(crate) fn is_same_before(&self, t: f64, pattern: usize, other: usize) -> bool {
-        let [a, b] = [pattern, other].map(|p| &self.sheets[p]);
-        let fired = |sheet: &'_ Sheet| sheet.targets.partition_point(|&target| target < t);
+        let [a, b] = [pattern, other].map(|p| &self.examples[p]);
+        let fired = |example: &'_ Example| example.targets.partition_point(|&target| target < t);
         let raised = self.neuron.first_threshold == FirstThreshold::Base || a.start == b.start;
         raised && a.before(t) == b.before(t) && a.targets[..fired(a)] == b.targets[..fired(b)]
     }
 
-    /// Whether silence is asked for at this time.
+    /// Whether silence is required at this time.
     pub(crate) fn is_asked(&self, pattern: usize, t: f64) -> bool {
         self.check_silent(pattern, t).is_ok()
     }
 
     /// Whether `t` is a point of the grid.
-    pub(crate) fn is_point(&self, sheet: &Sheet, t: f64) -> bool {
-        Grid::new(sheet.start, self.neuron.step_ms).place(t).is_point()
+    pub(crate) fn is_point(&self, example: &Example, t: f64) -> bool {
+        Grid::new(example.start, self.neuron.step_ms).place(t).is_point()
     }
 
     /// Whether `t` lies neither at a target nor in the refractory time behind it.
-    pub(crate) fn is_silent(&self, sheet: &Sheet, t: f64) -> bool {
-        self.is_silent_between(sheet.fired(t), t, sheet.next(t))
+    pub(crate) fn is_silent(&self, example: &Example, t: f64) -> bool {
+        self.is_silent_between(example.fired(t), t, example.next(t))
     }
 
     /// The same of a time between the last target before it and the first one not before it.
@@ -389,29 +389,29 @@ impl Statement {
     }
 
     /// The threshold at `t`, the neuron having fired at the targets before, mV.
-    pub(crate) fn threshold(&self, sheet: &Sheet, t: f64) -> f64 {
-        self.neuron.theta_0 + self.rise(sheet, sheet.fired(t), t)
+    pub(crate) fn threshold(&self, example: &Example, t: f64) -> f64 {
+        self.neuron.theta_0 + self.rise(example, example.fired(t), t)
     }
 
     /// What is left at `t` of the threshold's rise, the neuron having last fired at `fired`, mV.
-    pub(crate) fn rise(&self, sheet: &Sheet, fired: Option<f64>, t: f64) -> f64 {
-        let printed = (self.neuron.first_threshold == FirstThreshold::Printed).then_some(sheet.start);
+    pub(crate) fn rise(&self, example: &Example, fired: Option<f64>, t: f64) -> f64 {
+        let printed = (self.neuron.first_threshold == FirstThreshold::Printed).then_some(example.start);
         self.neuron.rise(fired.or(printed), t)
     }
 
     /// The margin at `t`, mV.
-    pub(crate) fn margin_at(&self, sheet: &Sheet, t: f64) -> f64 {
-        match sheet.next(t) {
+    pub(crate) fn margin_at(&self, example: &Example, t: f64) -> f64 {
+        match example.next(t) {
             Some(target) if target - t <= self.taper.length => self.taper.before(target - t).b,
             _ => self.margin.height,
         }
     }
 
     /// Adds up, by train, what `part` gives at `t` of the inputs before, the neuron having fired at `earlier` targets only.
-    fn sum(&self, sheet: &Sheet, t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
+    fn sum(&self, example: &Example, t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
         out.fill(0.0);
-        let inputs = sheet.before(t);
-        let age = self.neuron.ages(sheet.start, t);
+        let inputs = example.before(t);
+        let age = self.neuron.ages(example.start, t);
         let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
         let (mut at, mut one) = (f64::NAN, 0.0);
         for &(s, train) in &inputs[from..] {

@@ -7,7 +7,7 @@ use super::rows::Statement;
 use crate::neuron::Time;
 use crate::{Result, Stop};
 
-/// All of silence, laid out to be priced.
+/// All silence of a problem, ready to be evaluated.
 #[derive(Debug, Clone)]
 pub(crate) enum Silence {
     /// At the points of the grid.
@@ -25,7 +25,7 @@ impl Silence {
     }
 
     /// The worst instant of each stretch in which potential, with this share of the margin, exceeds the threshold by more
-    /// than `tolerance`. On the grid the whole margin is asked for, as nothing lies between its rows.
+    /// than `tolerance`. On the grid the whole margin counts, as nothing lies between its rows.
     pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
         match self {
             Self::Grid(rows) => rows.broken(weights, tolerance),
@@ -33,7 +33,7 @@ impl Silence {
         }
     }
 
-    /// By how much silence is broken at worst, with this share of the margin, mV; below 0 where it is kept.
+    /// The worst violation of silence with this share of the margin, mV; negative where there is none.
     pub(crate) fn worst(&self, weights: &[f64], share: f64) -> f64 {
         largest(self.broken(weights, share, f64::NEG_INFINITY).iter().map(|peak| peak.excess))
     }

@@ -19,7 +19,7 @@ pub(crate) struct Targets {
     pub(crate) behind: Vec<f64>,
 }
 
-/// What is asked at one target.
+/// The rows at one target.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TargetRow<'a> {
     pub(crate) threshold: f64,
@@ -38,7 +38,7 @@ impl Targets {
             at: vec![],
             behind: vec![],
         };
-        for pattern in 0..statement.sheets.len() {
+        for pattern in 0..statement.examples.len() {
             targets.push(statement, pattern, delta_t, stop)?;
         }
         Ok(targets)
@@ -48,10 +48,10 @@ impl Targets {
     pub(crate) fn push(&mut self, statement: &Statement, pattern: usize, delta_t: f64, stop: Stop<'_>) -> Result<()> {
         let mut row = vec![0.0; self.trains];
         let mut new = Self { names: vec![], times: vec![], thresholds: vec![], at: vec![], behind: vec![], ..*self };
-        for target in 0..statement.sheets[pattern].targets.len() {
+        for target in 0..statement.examples[pattern].targets.len() {
             stop.check()?;
             new.names.push((pattern, target));
-            new.times.push(statement.sheets[pattern].targets[target]);
+            new.times.push(statement.examples[pattern].targets[target]);
             new.thresholds.push(statement.state_into(Row::Target { pattern, target }, &mut row)?);
             new.at.extend_from_slice(&row);
             statement.behind_into(pattern, target, delta_t, &mut row)?;
@@ -90,7 +90,7 @@ impl Targets {
         TargetRow { threshold: self.thresholds[k], at: &self.at[columns.clone()], behind: &self.behind[columns] }
     }
 
-    /// The pattern's first target at `t` or later: when it is, ms, and what is asked there.
+    /// The pattern's first target at `t` or later: its time, ms, and its rows.
     pub(crate) fn next(&self, pattern: usize, t: f64) -> Option<(f64, TargetRow<'_>)> {
         let k = self.names.iter().zip(&self.times).position(|(name, &time)| name.0 == pattern && time >= t)?;
         Some((self.times[k], self.row(k)))

@@ -18,7 +18,7 @@ const HELD: usize = 1 << 24;
 const LOOK_UP: usize = 8;
 
 impl VanRossumSpatial {
-    /// Fills a matrix, by stored exponentials where they are worth their making.
+    /// Fills a matrix, by stored exponentials where that is faster.
     pub(in crate::metrics) fn fill(
         &self,
         kernel: &Kernel,

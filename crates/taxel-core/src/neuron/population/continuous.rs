@@ -8,7 +8,7 @@ use crate::neuron::threshold::OutputSpike;
 use crate::vectors::wide;
 use crate::{Result, SpikeTrains, Stop};
 
-/// From this share of tau on the tangent says less than the kernel's largest value.
+/// From this share of tau on the tangent is a weaker bound than the kernel's largest value.
 const LONG: f64 = 0.3;
 
 /// What all neurons have in common: the inputs by time, and what passes between them.
@@ -33,7 +33,7 @@ struct Interval {
     step: Step,
     /// What is left at its end of a rise at its beginning.
     fade: f64,
-    /// How far ahead is looked, ms: an input a hair before a crossing is at it.
+    /// The time after an input up to which crossings are found, ms: an input that is so little before a crossing is at it.
     ahead: f64,
     /// The least that is left there of the rise.
     faded: f64,
@@ -143,7 +143,7 @@ fn may_matter(a: f64, b: f64, rise: f64, edge: f64, script: &Script, interval: &
     (top >= script.floor + rise * interval.faded) | (edge <= interval.until)
 }
 
-/// Goes through the interval before, adds an input, and says whether any neuron may matter.
+/// Advances through the interval before, adds an input, and returns whether any neuron may fire.
 #[inline(always)]
 fn one_input<W: Weight>(
     lanes: &mut Lanes,

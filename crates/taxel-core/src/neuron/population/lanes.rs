@@ -9,7 +9,7 @@ pub(super) const LANES: usize = 32;
 pub(super) const FADED: f64 = 1.0 - 1e-9;
 pub(super) const SLACK: f64 = 1e-11;
 
-/// A block looks for Ctrl-C at every so manieth interval or point.
+/// Intervals or points between two checks of a block for Ctrl-C.
 pub(super) const LOOK: usize = 1 << 16;
 
 /// A number that weights come in.
@@ -23,7 +23,7 @@ pub(super) struct Lanes {
     pub(super) b: [f64; LANES],
     /// What is left of the threshold's rise, mV; infinite in the refractory time.
     pub(super) rise: [f64; LANES],
-    /// When the refractory time ends and the rise sets in, ms; infinite where neither lies ahead.
+    /// The time at which the refractory time ends and the rise begins, ms; infinite where neither is to come.
     pub(super) edge: [f64; LANES],
     /// Inputs after the first and up to the second time are lost, ms.
     pub(super) deaf_from: [f64; LANES],
@@ -55,7 +55,7 @@ impl Lanes {
         }
     }
 
-    /// 1 for a neuron that hears an input at `t`, 0 where it is lost.
+    /// 1 for a neuron at which an input at `t` counts, 0 where it is lost.
     #[inline(always)]
     pub(super) fn hears(&self, t: f64) -> [f64; LANES] {
         let mut hears = [1.0; LANES];

@@ -163,7 +163,7 @@ pub(super) const FIELDS: [Field; 16] = [
         name: "noise_floor",
         manual: "noise_floor",
         unit: "ticks",
-        text: "Smallest difference that makes no event.",
+        text: "Largest difference that makes no event.",
         register: 5,
         shift: 8,
         mask: 0xff,

@@ -44,7 +44,7 @@ pub struct Registers {
     /// FA-1: by how much a quiet frame lowers the threshold, B of Table 5.3. In units of 1/1024 theta_0.
     #[serde(default = "at_reset::threshold_decay")]
     pub threshold_decay: u8,
-    /// Smallest difference that makes no event. In units of ticks.
+    /// Largest difference that makes no event. In units of ticks.
     pub noise_floor: u8,
     /// Driven lines (the register holds one less; the manual's field has 6 bits, read: 8).
     pub lines: u16,

@@ -41,7 +41,7 @@ impl Factor {
         backward(&self.l, self.stride, &self.inverse, self.len(), x);
     }
 
-    /// `-(L L')^-1` times the limits: where the rows alone, no sign asked, would have their multipliers.
+    /// `-(L L')^-1` times the limits: the multipliers of the rows as equalities.
     pub(super) fn optimum(&self) -> Vec<f64> {
         let mut x: Vec<f64> = self.limits.iter().map(|y| -y).collect();
         x.resize(self.padded(), 0.0);
@@ -62,7 +62,7 @@ impl Factor {
         self.limits.push((limit - dot(&d[..m], &self.limits)) / pivot);
     }
 
-    /// Appends rows, but none whose squared pivot is `least` or below, nor more than `most` in all; says which it took.
+    /// Appends rows, but none whose squared pivot is `least` or below, nor more than `most` in all; returns which were appended.
     ///
     /// `g` has a column of `stride` numbers a new row, its products with the rows here, then 0; `own` the products of
     /// the new rows with each other.

@@ -81,7 +81,7 @@ impl<'a> Best<'a> {
         if self.gap() <= tolerance {
             return Ok(());
         }
-        // Where what binds cannot be told, good multipliers and the nearest weights that meet the rows will do.
+        // Where the binding rows cannot be identified, good multipliers and the nearest feasible weights are enough.
         self.offer(near.clone(), None);
         if program.gap(near) <= tolerance
             && let Some(weights) = nearest(&near.weights, &program.hard(), &program.lower, &program.upper, stop)?

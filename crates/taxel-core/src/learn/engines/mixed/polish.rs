@@ -1,4 +1,4 @@
-//! From near the optimum to rounding: zeros, bounds and binding rows taken as equalities, one accurate solve.
+//! From near the optimum to rounding: one accurate solve with zeros, bounds and binding rows as equalities.
 //!
 //! The guess comes from the interior point. Where signs come out wrong (a multiplier below 0, a weight across 0 or a
 //! bound, a row broken) the guess is mended and solved again.
@@ -84,7 +84,7 @@ impl<'a> Polish<'a> {
         out
     }
 
-    /// Puts what does not move where the guess says.
+    /// Sets the weights that do not move to the places of the guess.
     fn snap(&mut self) {
         for (k, place) in self.guess.places.iter().enumerate() {
             match place {
@@ -219,7 +219,7 @@ impl<'a> Polish<'a> {
         Some(least)
     }
 
-    /// Exchanges what has the wrong sign; says how much that is.
+    /// Exchanges rows and bounds with multipliers of the wrong sign; returns how many.
     fn mend(&mut self) -> usize {
         let program = self.program;
         let gradient = self.gradient();

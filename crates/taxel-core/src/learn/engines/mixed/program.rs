@@ -66,7 +66,7 @@ pub(super) struct Program {
     pub(super) of_below: Vec<f64>,
 }
 
-/// Keeps what is kept, and all behind.
+/// Retains the entries that `keep` marks, and all after its end.
 pub(super) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
     let mut keep = keep.iter();
     values.retain(|_| keep.next().copied().unwrap_or(true));
@@ -161,7 +161,7 @@ impl Program {
         slope
     }
 
-    /// How far the tangent of the smooth terms at `w` lies below 0 at weights of 0.
+    /// By how much the tangent of the smooth terms at `w` is below 0 at weights of 0.
     pub(super) fn tangent(&self, w: &[f64]) -> f64 {
         let missed = self.missed(w);
         let lift: f64 = missed.iter().zip(&self.wanted).map(|(x, m)| x * (2.0 * m + x)).sum();

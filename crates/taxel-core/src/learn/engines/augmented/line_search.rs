@@ -1,0 +1,125 @@
+//! The exact search along a Newton step: the Lagrangian there is piecewise quadratic.
+
+use super::Lagrangian;
+use crate::learn::statement::Norm;
+use crate::vectors::{add, dot};
+
+/// A step is taken whole where the slope along it has fallen to this share at its end; a search stops at that of `EXACT`.
+const WHOLE: f64 = 0.05;
+const EXACT: f64 = 1e-3;
+
+/// A kink that the line search passes: share at the start, its change, and its part of the slope.
+struct Passing {
+    share: f64,
+    change: f64,
+    lean: f64,
+    low: f64,
+}
+
+impl Lagrangian<'_> {
+    pub(super) fn move_along(&mut self, direction: &[f64]) -> bool {
+        let (problem, o) = (self.problem, self.objective);
+        let silent = problem.silent.len();
+        let mut rise = Vec::with_capacity(self.excess.len());
+        if o.d > 0.0 {
+            problem.silent.potential(direction, &mut rise);
+        } else {
+            rise.resize(silent, 0.0);
+        }
+        rise.extend(problem.targets.iter().map(|row| dot(row.at, direction)));
+        let lift: Vec<f64> = problem.targets.iter().map(|row| dot(row.behind, direction)).collect();
+        let smooth = {
+            let against: f64 =
+                self.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
+            let square = dot(direction, direction);
+            let (mut from, mut bend) = (self.rho * against, self.rho * square);
+            from += 2.0 * o.b * dot(&self.behind, &lift);
+            bend += 2.0 * o.b * dot(&lift, &lift);
+            if o.norm == Norm::Square {
+                from += 2.0 * o.l2 * dot(&self.weights, direction);
+                bend += 2.0 * o.l2 * square;
+            }
+            (from, bend)
+        };
+        let start = dot(&self.gradient, direction);
+        let mut end = 1.0;
+        let t = loop {
+            let (passing, steady) = self.passing(&rise, end);
+            let slope = |t: f64| self.slope_along(t, direction, smooth, steady, &passing);
+            let (mut low, mut at_low, mut high, mut at_high) = (0.0, start, end, slope(end));
+            if at_high <= WHOLE * start.abs() {
+                if end < 64.0 && at_high < -0.5 * start.abs() {
+                    end *= 4.0;
+                    continue;
+                }
+                break end;
+            }
+            let mut t = high;
+            // Illinois: a secant that never keeps the same end twice at full value.
+            for _ in 0..60 {
+                t = low + (high - low) * (at_low / (at_low - at_high)).clamp(1e-3, 0.999);
+                let here = slope(t);
+                if here.abs() <= EXACT * start.abs() || high - low <= 1e-12 * high {
+                    break;
+                }
+                if here > 0.0 {
+                    (high, at_high) = (t, here);
+                    at_low *= 0.5;
+                } else {
+                    (low, at_low) = (t, here);
+                    at_high *= 0.5;
+                }
+            }
+            break t;
+        };
+        // From an infinite direction not even a step of 0 leads to numbers.
+        if !(t.is_finite() && start.is_finite()) {
+            return false;
+        }
+        add(&mut self.weights, t, direction);
+        self.excess.iter_mut().zip(&rise).for_each(|(x, r)| *x += t * r);
+        add(&mut self.behind, t, &lift);
+        true
+    }
+
+    /// The kinks that a step as long as `end` passes, and the slope of all that lie beyond theirs throughout.
+    fn passing(&self, rise: &[f64], end: f64) -> (Vec<Passing>, f64) {
+        let silent = self.problem.silent.len();
+        let (d, c) = (self.objective.d, 2.0 * self.objective.c);
+        let [one, other] = self.delta.map(|delta| 1.0 / delta);
+        let mut passing = Vec::new();
+        let mut steady = 0.0;
+        let rows = self.excess.iter().zip(rise).zip(&self.shares);
+        for (k, ((&x, &r), &share)) in rows.enumerate() {
+            let (weight, steep, low) = if k < silent { (d, one, 0.0) } else { (c, other, -0.5) };
+            let (from, change) = (share + x * steep, r * steep);
+            let to = from + end * change;
+            if from.max(to) <= low {
+                steady += low * weight * r;
+            } else if from.min(to) >= low + 1.0 {
+                steady += (low + 1.0) * weight * r;
+            } else {
+                passing.push(Passing { share: from, change, lean: weight * r, low });
+            }
+        }
+        (passing, steady)
+    }
+
+    fn slope_along(&self, t: f64, direction: &[f64], smooth: (f64, f64), steady: f64, passing: &[Passing]) -> f64 {
+        let mut sum = smooth.0 + t * smooth.1 + steady;
+        for p in passing {
+            sum += p.lean * (p.share + t * p.change).clamp(p.low, p.low + 1.0);
+        }
+        let (mut along, mut square) = (0.0, 0.0);
+        for (n, (&w, &d)) in self.weights.iter().zip(direction).enumerate() {
+            let here = w + t * d;
+            sum += self.hold(n, here).0 * d;
+            along += here * d;
+            square += here * here;
+        }
+        if self.objective.norm == Norm::Norm && square > 0.0 {
+            sum += self.objective.l2 * along / square.sqrt();
+        }
+        sum
+    }
+}

@@ -1,0 +1,68 @@
+//! Multipliers of the rows as they were stated, and the proof that the rows contradict each other.
+
+use super::kernels::add_rows;
+use super::working_set::Kind;
+use super::{DualActiveSet, RowId};
+
+/// Multipliers of the active rows, as they were stated (not scaled).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Multipliers {
+    /// One an equality, in the order in which they were added; any sign.
+    pub equalities: Vec<f64>,
+    /// Of the active inequalities, 0 or more; of all others it is 0.
+    pub inequalities: Vec<(RowId, f64)>,
+}
+
+/// Proof that the rows contradict each other within the bounds (Farkas).
+///
+/// With `g = A_eq'y + A_in'z` the rows demand `g.w <= y.value + z.limit`, but no w within the bounds gives less than
+/// `sum_n min(lower_n g_n, upper_n g_n)`, which is larger.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Ray {
+    /// y and z.
+    pub multipliers: Multipliers,
+    /// By how much it is larger.
+    pub gap: f64,
+}
+
+impl DualActiveSet {
+    /// Multipliers by slot as multipliers of the rows as stated.
+    pub(super) fn stated(&self, by_slot: &[f64]) -> Multipliers {
+        let mut out = Multipliers { equalities: vec![0.0; self.equalities.len()], inequalities: Vec::new() };
+        for &slot in &self.live {
+            let u = by_slot[slot] / self.rows[slot].length;
+            match self.rows[slot].kind {
+                Kind::Equality(k) => out.equalities[k] = u,
+                Kind::Inequality(id) if u > 0.0 => out.inequalities.push((id, u)),
+                _ => {}
+            }
+        }
+        out.inequalities.sort_by_key(|&(id, _)| id);
+        out
+    }
+
+    /// The ray as a proof, if it is one: multipliers of bounds are left out, and the gap must exceed rounding.
+    pub(super) fn proof(&self, by_slot: Vec<f64>) -> Option<Ray> {
+        let bounds = |slot: usize| matches!(self.rows[slot].kind, Kind::Lower(_) | Kind::Upper(_));
+        let slots: Vec<usize> = self.live.iter().copied().filter(|&s| by_slot[s] != 0.0 && !bounds(s)).collect();
+        let by: Vec<f64> =
+            slots.iter().map(|&s| if self.is_equality(s) { by_slot[s] } else { by_slot[s].max(0.0) }).collect();
+        let mut g = vec![0.0; self.stride];
+        add_rows(&self.coefficients, self.stride, &slots, &by, &mut g);
+        let (mut least, mut size, mut widest) = (0.0, 0.0, 0.0_f64);
+        for (n, &g) in g[..self.lower.len()].iter().enumerate().filter(|(_, g)| **g != 0.0) {
+            let (low, high) = (self.lower[n] * g, self.upper[n] * g);
+            least += low.min(high);
+            size += low.abs().max(high.abs());
+            widest = widest.max(self.lower[n].abs()).max(self.upper[n].abs());
+        }
+        let mut rounding = 0.0;
+        for (&slot, &by) in slots.iter().zip(&by) {
+            least -= by * self.rows[slot].limit;
+            size += (by * self.rows[slot].limit).abs();
+            rounding += by.abs();
+        }
+        rounding *= f64::EPSILON * widest * (self.lower.len() as f64).sqrt();
+        (least > 1e-12 * size + rounding).then(|| Ray { multipliers: self.stated(&by_slot), gap: least })
+    }
+}

@@ -1,0 +1,140 @@
+//! The working set: rows by slot, and the products of each with each (the Gram matrix).
+
+use super::kernels::products;
+use super::{BLOCK, DualActiveSet, RowId, TOLERANCE};
+use crate::vectors::{Aligned, LANES, dot};
+use crate::{Result, problem};
+
+/// The least tolerance of a long row, scaled to length 1.
+const FINEST: f64 = 4e-14;
+/// The rows that memory is allocated for at first, where so many could be active; more rows move what is there.
+const AT_FIRST: usize = 1024;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Free,
+    Equality(usize),
+    Inequality(RowId),
+    Lower(usize),
+    Upper(usize),
+}
+
+/// A row of the working set, scaled to length 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    pub(super) kind: Kind,
+    pub(super) length: f64,
+    pub(super) limit: f64,
+}
+
+impl Row {
+    /// The violation up to which the row counts as satisfied.
+    pub(super) fn tolerance(&self) -> f64 {
+        (TOLERANCE / self.length).clamp(FINEST, TOLERANCE)
+    }
+}
+
+impl DualActiveSet {
+    pub(super) fn add(&mut self, kind: Kind, coefficients: &[f64], limit: f64) -> Result<usize> {
+        if coefficients.len() != self.lower.len() {
+            return Err(problem!("row: {} coefficients for {} weights", coefficients.len(), self.lower.len()));
+        }
+        if !(limit.is_finite() && coefficients.iter().all(|a| a.is_finite())) {
+            return Err(problem!("row: holds a coefficient or limit that is not finite"));
+        }
+        let length = dot(coefficients, coefficients).sqrt();
+        let length = if length > 0.0 { length } else { 1.0 };
+        let slot = self.slot(Row { kind, length, limit: limit / length });
+        for (to, a) in self.coefficients[slot * self.stride..].iter_mut().zip(coefficients) {
+            *to = a / length;
+        }
+        self.fresh.push(slot);
+        Ok(slot)
+    }
+
+    /// Puts a row into a free slot; its coefficients are 0.
+    pub(super) fn slot(&mut self, row: Row) -> usize {
+        let slot = self.free.pop().unwrap_or(self.rows.len());
+        if slot == self.rows.len() {
+            self.rows.push(row);
+            self.place.push(None);
+            self.multipliers.push(0.0);
+            self.excess.push(0.0);
+            if self.coefficients.len() < self.rows.len() * self.stride {
+                let mut coefficients = Aligned::zeros(self.capacity(self.rows.len()) * self.stride);
+                coefficients[..self.coefficients.len()].copy_from_slice(&self.coefficients);
+                self.coefficients = coefficients;
+            }
+        } else {
+            self.coefficients[slot * self.stride..][..self.stride].fill(0.0);
+        }
+        self.rows[slot] = row;
+        let at = self.live.partition_point(|&s| s < slot);
+        self.live.insert(at, slot);
+        slot
+    }
+
+    /// The number of slots to allocate where so many are in use.
+    pub(super) fn capacity(&self, slots: usize) -> usize {
+        (slots + slots / 2 + 64).max(self.lower.len().min(AT_FIRST))
+    }
+
+    /// Enlarges the Gram matrix to all slots.
+    pub(super) fn enlarge_gram(&mut self) {
+        let slots = self.rows.len();
+        if slots <= self.gram_stride {
+            return;
+        }
+        let stride = self.capacity(slots).next_multiple_of(LANES);
+        let stride = if stride.is_multiple_of(64) { stride + LANES } else { stride };
+        let mut gram = Aligned::zeros(stride * stride);
+        for (new, old) in gram.chunks_exact_mut(stride).zip(self.gram.chunks_exact(self.gram_stride.max(1))) {
+            new[..self.gram_stride].copy_from_slice(old);
+        }
+        (self.gram, self.gram_stride) = (gram, stride);
+    }
+
+    /// Computes the products of the fresh rows with all others, in one matrix product; returns those rows.
+    pub(super) fn extend_gram(&mut self) -> Vec<usize> {
+        self.enlarge_gram();
+        let fresh = std::mem::take(&mut self.fresh);
+        let (slots, stride) = (self.rows.len(), self.stride);
+        for fresh in fresh.chunks(4 * BLOCK) {
+            let mut rows = Aligned::zeros(fresh.len() * stride);
+            for (row, &slot) in rows.chunks_exact_mut(stride).zip(fresh) {
+                row.copy_from_slice(&self.coefficients[slot * stride..][..stride]);
+            }
+            let mut sums = vec![0.0; fresh.len() * slots];
+            products(&rows, &self.coefficients[..slots * stride], stride, &mut sums, slots);
+            for (&slot, sums) in fresh.iter().zip(sums.chunks_exact(slots)) {
+                self.gram[slot * self.gram_stride..][..slots].copy_from_slice(sums);
+            }
+            for other in 0..slots {
+                for (k, &slot) in fresh.iter().enumerate() {
+                    self.gram[other * self.gram_stride + slot] = sums[k * slots + other];
+                }
+            }
+        }
+        fresh
+    }
+
+    /// The slot of a bound's row, added if it has none yet.
+    pub(super) fn bound(&mut self, n: usize, upper: bool) -> usize {
+        if let Some(slot) = self.bounds[n][usize::from(upper)] {
+            return slot;
+        }
+        let (kind, sign, limit) =
+            if upper { (Kind::Upper(n), 1.0, self.upper[n]) } else { (Kind::Lower(n), -1.0, -self.lower[n]) };
+        let slot = self.slot(Row { kind, length: 1.0, limit });
+        self.bounds[n][usize::from(upper)] = Some(slot);
+        self.coefficients[slot * self.stride + n] = sign;
+        self.enlarge_gram();
+        for other in 0..self.rows.len() {
+            let product = sign * self.coefficients[other * self.stride + n];
+            self.gram[slot * self.gram_stride + other] = product;
+            self.gram[other * self.gram_stride + slot] = product;
+        }
+        self.excess[slot] = sign * self.weights[n] - limit;
+        slot
+    }
+}

@@ -1,0 +1,51 @@
+//! What seems to bind where an interior point ended.
+
+use super::super::program::{Guess, Place, Point};
+use super::{Interior, PrimalDual};
+use crate::vectors::dot;
+
+/// Where an interior point ended.
+pub(in super::super) struct Iterate {
+    pub(in super::super) point: Point,
+    /// What seems to bind.
+    pub(in super::super) guess: Guess,
+}
+
+impl Interior<'_> {
+    pub(super) fn finish(&self, state: &PrimalDual) -> Iterate {
+        let program = self.program;
+        let weights = self.weights(&state.x);
+        let n = program.width();
+        // What binds has a multiplier larger for its kind than its distance; costs are about 1.
+        let typical = |v: &[f64]| dot(v, v) / v.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let (far, force) = (typical(&state.x).clamp(1e-3, 1.0), typical(&state.low).max(1.0));
+        let (room, press) = (typical(&state.slack).clamp(1e-3, 1.0), typical(&state.inequality).max(1.0));
+        let mut at_low = vec![true; n];
+        let mut places: Vec<Place> = program
+            .lower
+            .iter()
+            .zip(&program.upper)
+            .map(|(l, u)| if l == u { Place::Lower } else { Place::Free })
+            .collect();
+        for (j, part) in self.parts.iter().enumerate() {
+            let k = part.synapse;
+            if state.x[j] / far >= state.low[j] / force {
+                at_low[k] = false;
+            }
+            if (part.range - state.x[j]) / far < state.high[j] / force {
+                places[k] = if part.sign > 0.0 { Place::Upper } else { Place::Lower };
+            }
+        }
+        for (k, place) in places.iter_mut().enumerate() {
+            if at_low[k] && *place == Place::Free {
+                let split = program.l1 > 0.0 && program.lower[k] < 0.0 && program.upper[k] > 0.0;
+                *place = if split { Place::Zero } else { Place::Lower };
+            }
+        }
+        let binding = state.slack.iter().zip(&state.inequality).map(|(s, z)| s / room < z / press).collect();
+        let pull = if self.normed { state.dual.1.iter().map(|y| -y).collect() } else { vec![0.0; n] };
+        let (equality, inequality) = (state.equality.clone(), state.inequality.clone());
+        let point = Point { weights, equality, inequality, pull };
+        Iterate { point, guess: Guess { places, binding } }
+    }
+}

@@ -1,0 +1,175 @@
+//! The queue between decoding and reading out.
+
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+use taxel_core::encode::Zeroing;
+use taxel_core::{Array, Events};
+
+use crate::locked::lock;
+
+/// Events that wait for the readout, and how far the board's time has arrived without any.
+#[derive(Debug)]
+pub(super) struct ReadoutQueue {
+    state: Mutex<Waiting>,
+    came: Condvar,
+    limit: usize,
+}
+
+#[derive(Debug)]
+struct Waiting {
+    events: Events,
+    quiet: Option<Quiet>,
+    zeroings: Vec<Zeroing>,
+    dropped: u64,
+    closed: bool,
+}
+
+/// After the events that were handed over no data arrive before this time, us.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Quiet {
+    /// By the host's clock: an event that comes late may contradict it.
+    Believed(i64),
+    /// As the board has promised.
+    Promised(i64),
+}
+
+impl Quiet {
+    /// us.
+    pub(super) fn until(self) -> i64 {
+        match self {
+            Self::Believed(t) | Self::Promised(t) => t,
+        }
+    }
+}
+
+/// What the readout processes at once, beside the events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Taken {
+    /// How far time has arrived after the events.
+    pub quiet: Option<Quiet>,
+    /// No more data will arrive.
+    pub last: bool,
+}
+
+impl ReadoutQueue {
+    pub(super) fn new(array: &Array, limit: usize) -> Self {
+        let events = Events::empty(array.clone());
+        let state = Waiting { events, quiet: None, zeroings: vec![], dropped: 0, closed: false };
+        Self { state: Mutex::new(state), came: Condvar::new(), limit }
+    }
+
+    /// Adds events, with the board's promise after them, and leaves `events` empty; those that find no room are dropped. Returns how
+    /// many were so far. One wake-up.
+    pub(super) fn put(&self, events: &mut Events, promised: Option<i64>) -> u64 {
+        let mut state = self.state();
+        let room = self.limit.saturating_sub(state.events.len());
+        if state.events.is_empty() && state.events.markers.is_empty() && events.len() <= room {
+            std::mem::swap(&mut state.events, events);
+        } else {
+            let dropped = events.len().saturating_sub(room);
+            state.dropped += dropped as u64;
+            state.events.append(events, room.min(events.len()));
+            events.clear();
+        }
+        state.quiet = promised.map(Quiet::Promised);
+        let dropped = state.dropped;
+        drop(state);
+        self.came.notify_one();
+        dropped
+    }
+
+    /// Sets up to when no data arrive after the events that wait.
+    pub(super) fn quiet(&self, quiet: Quiet) {
+        self.state().quiet = Some(quiet);
+        self.came.notify_one();
+    }
+
+    /// Adds zeroings, each of which has its own time.
+    pub(super) fn zero(&self, zeroings: &[Zeroing]) {
+        self.state().zeroings.extend_from_slice(zeroings);
+        self.came.notify_one();
+    }
+
+    /// Ends it; `quiet` is up to when nothing arrived.
+    pub(super) fn close(&self, quiet: Option<Quiet>) {
+        let mut state = self.state();
+        state.quiet = quiet.or(state.quiet);
+        state.closed = true;
+        drop(state);
+        self.came.notify_one();
+    }
+
+    /// Waits until something is there and takes all of it; adds to `zeroings`.
+    pub(super) fn take(&self, events: &mut Events, zeroings: &mut Vec<Zeroing>) -> Taken {
+        events.clear();
+        let nothing = |s: &mut Waiting| {
+            let silent = s.events.is_empty() && s.events.markers.is_empty() && s.zeroings.is_empty();
+            silent && s.quiet.is_none() && !s.closed
+        };
+        let mut state = self.came.wait_while(self.state(), nothing).unwrap_or_else(PoisonError::into_inner);
+        std::mem::swap(&mut state.events, events);
+        zeroings.append(&mut state.zeroings);
+        Taken { quiet: state.quiet.take(), last: state.closed }
+    }
+
+    /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
+    fn state(&self) -> MutexGuard<'_, Waiting> {
+        lock(&self.state)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use taxel_core::Intensities;
+
+    use super::*;
+
+    fn events(t: &[i64], ticks: Option<u16>) -> Events {
+        let n = t.len();
+        let intensity = ticks.map(|v| Intensities { ticks: vec![v; n], present: vec![true; n] });
+        let (x, y, p) = (vec![1; n], vec![2; n], vec![true; n]);
+        Events { t: t.to_vec(), x, y, p, intensity, ..Events::empty(Array::thesis()) }
+    }
+
+    #[test]
+    fn what_was_handed_over_in_pieces_is_taken_as_one() {
+        let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
+        for (t, ticks) in [(&[1, 2][..], None), (&[3], Some(7)), (&[4], None)] {
+            let mut piece = events(t, ticks);
+            assert_eq!(readout_queue.put(&mut piece, None), 0);
+            assert!(piece.is_empty());
+        }
+        let mut taken = Events::empty(Array::thesis());
+        assert_eq!(readout_queue.take(&mut taken, &mut vec![]), Taken { quiet: None, last: false });
+        assert_eq!(taken.t, [1, 2, 3, 4]);
+        let intensity = taken.intensity.as_ref().expect("one had an intensity");
+        assert_eq!(intensity.ticks, [0, 0, 7, 0]);
+        assert_eq!(intensity.present, [false, false, true, false]);
+        taken.view().check().expect("columns are equally long");
+    }
+
+    #[test]
+    fn what_finds_no_room_is_counted() {
+        let readout_queue = ReadoutQueue::new(&Array::thesis(), 3);
+        assert_eq!(readout_queue.put(&mut events(&[1, 2], None), None), 0);
+        assert_eq!(readout_queue.put(&mut events(&[3, 4, 5], None), None), 2);
+        let mut taken = Events::empty(Array::thesis());
+        readout_queue.take(&mut taken, &mut vec![]);
+        assert_eq!(taken.t, [1, 2, 3]);
+    }
+
+    #[test]
+    fn silence_is_taken_once_and_only_where_nothing_came_after_it() {
+        let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
+        let mut taken = Events::empty(Array::thesis());
+        readout_queue.quiet(Quiet::Believed(100));
+        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Believed(100)));
+        readout_queue.quiet(Quiet::Believed(200));
+        readout_queue.put(&mut events(&[150], None), None);
+        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, None);
+        readout_queue.put(&mut events(&[], None), Some(300));
+        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Promised(300)));
+        readout_queue.close(None);
+        assert!(readout_queue.take(&mut taken, &mut vec![]).last);
+    }
+}

@@ -1,0 +1,301 @@
+"""What a result is computed from: the digest of every source that a module's imports lead to.
+
+A result still counts as long as these are the same. Followed are the modules that define what is imported, to the end;
+of each counts the syntax tree without docstrings, so comments and formatting do not. The package's private base
+(argument checks, files, limits) is left out. A module that finds files beside itself brings those along, and one that
+imports by a name that it computes brings its whole package along. Of the compiled part each name that is used counts
+with the digest of the Rust room that binds it and the rooms below.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterator, Mapping
+from functools import cache, cached_property
+from importlib.util import find_spec
+from pathlib import Path
+
+from taxel import _core
+
+__all__ = ["Sources", "installed_sources"]
+
+_CORE = "taxel._core"
+#: What every room needs: a change there moves no result.
+_BASE = "taxel._base"
+#: Files beside a module that are no data of it.
+_CODE = {".py", ".pyi", ".pyc", ".so", ".typed"}
+
+
+class Sources:
+    """Follow imports through the sources of some packages.
+
+    Parameters
+    ----------
+    roots : mapping of str to Path
+        By name, each package's folder, or the file of a module that stands alone.
+    compiled : mapping of str to str
+        The digest of each name of the compiled part.
+
+    Examples
+    --------
+    >>> found = installed_sources().parts("taxel.neuron")
+    >>> "taxel.neuron" in found, "taxel._core.neuron_run" in found, "taxel.learn.cone_x" in found
+    (True, True, False)
+    """
+
+    def __init__(self, roots: Mapping[str, Path], compiled: Mapping[str, str]) -> None:
+        self._roots, self._compiled = dict(roots), dict(compiled)
+        self._modules: dict[str, _Module | None] = {}
+
+    def parts(self, *modules: str) -> dict[str, str]:
+        """Return the digest of every part that some modules' results hang on.
+
+        Parameters
+        ----------
+        *modules : str
+            Names, such as "taxel.neuron".
+
+        Returns
+        -------
+        dict of str to str
+            By name of a module, name in ``taxel._core``, or path of a data file; sorted.
+        """
+        done: set[str] = set()
+        found: dict[str, str] = {}
+        open_ = list(modules)
+        while open_:
+            name = open_.pop()
+            if name in done:
+                continue
+            done.add(name)
+            if name.startswith(f"{_CORE}."):
+                compiled = self._compiled.get(name.removeprefix(f"{_CORE}."))
+                found |= {} if compiled is None else {name: compiled}  # what is only there for types has none
+            elif (module := self._module(name)) is not None:
+                found[name] = module.digest
+                data = module.data if self._roots[name.split(".")[0]].is_dir() else []
+                found |= {self._shown(file): _digest(file.read_bytes()) for file in data}
+                open_ += self._used(module)
+        return dict(sorted(found.items()))
+
+    def digest(self, *modules: str) -> str:
+        """Return one digest of all that `parts` finds."""
+        return _digest(repr(self.parts(*modules)).encode())
+
+    def _module(self, name: str) -> _Module | None:
+        if name not in self._modules:
+            path = None if f"{name}.".startswith(f"{_BASE}.") else self._path(name)
+            self._modules[name] = None if path is None else _Module(name, path)
+        return self._modules[name]
+
+    def _path(self, name: str) -> Path | None:
+        first, *inner = name.split(".")
+        root = self._roots.get(first)
+        if root is None or root.suffix:
+            return root if root is not None and not inner else None
+        place = root.joinpath(*inner)
+        for path in (place / "__init__.py", place.with_suffix(".py")):
+            if path.is_file():
+                return path
+        return None
+
+    def _shown(self, file: Path) -> str:
+        root = next(root for root in self._roots.values() if file.is_relative_to(root))
+        return file.relative_to(root.parent).as_posix()
+
+    def _used(self, module: _Module) -> Iterator[str]:
+        for source, name in module.taken:
+            if name is None or self._is_module(f"{source}.{name}"):
+                continue  # a module: what is taken from it counts
+            yield from self._home(source, name)
+        for alias, chain in module.chains:
+            source, name = module.bound[alias]
+            whole = source if name is None else f"{source}.{name}"
+            if self._is_module(whole):
+                yield from self._reached(whole, chain)
+        if module.computes_names:
+            yield from (other for other in self._beside(module))
+
+    def _is_module(self, name: str) -> bool:
+        return name == _CORE or self._path(name) is not None
+
+    def _reached(self, module: str, chain: tuple[str, ...]) -> Iterator[str]:
+        """Find what ``module.a.b`` leads to; all of the module where it is handed on whole."""
+        for name in chain:
+            if module != _CORE and self._is_module(f"{module}.{name}"):
+                module = f"{module}.{name}"
+            else:
+                yield from self._home(module, name)
+                return
+        yield from (f"{_CORE}.{name}" for name in self._compiled) if module == _CORE else (module,)
+
+    def _home(self, module: str, name: str) -> Iterator[str]:
+        """Find the module that defines a name which another one gives."""
+        if module == _CORE:
+            yield f"{_CORE}.{name}"
+            return
+        there = self._module(module)
+        if there is None or name == "__version__":
+            return
+        if name in there.defined or name not in there.bound:
+            yield module
+            return
+        source, original = there.bound[name]
+        whole = source if original is None else f"{source}.{original}"
+        if self._is_module(whole):
+            yield from self._reached(whole, ())
+        elif original is not None:
+            yield from self._home(source, original)
+
+    def _beside(self, module: _Module) -> Iterator[str]:
+        package = module.name if module.path.name == "__init__.py" else module.name.rpartition(".")[0]
+        folder = module.path.parent
+        for file in sorted(folder.rglob("*.py")):
+            inside = file.relative_to(folder).with_suffix("").parts
+            yield ".".join([package, *(part for part in inside if part != "__init__")])
+
+
+class _Module:
+    """A module's syntax tree and what it imports."""
+
+    def __init__(self, name: str, path: Path) -> None:
+        self.name, self.path = name, path
+        tree = ast.parse(path.read_bytes())
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and _described(
+                node
+            ):
+                del node.body[0]
+        self.digest = _digest("".join(_flat(tree)).encode())
+        #: Where each name comes from that an import binds: module, and name in it; those for types too.
+        self.bound: dict[str, tuple[str, str | None]] = {}
+        #: What is taken when the module runs.
+        self.taken: list[tuple[str, str | None]] = []
+        for node, runs in _imports(tree):
+            for alias, source, original in _names(node):
+                self.bound[alias] = (source, original)
+                if runs:
+                    self.taken.append((source, original))
+        self._tree = tree
+        self.defined = {name for node in tree.body for name in _defines(node)}
+
+    @cached_property
+    def chains(self) -> list[tuple[str, tuple[str, ...]]]:
+        """List how each name that an import binds is used: ``learn.ConeX`` is ``("learn", ("ConeX",))``."""
+        bases = {id(node.value) for node in ast.walk(self._tree) if isinstance(node, ast.Attribute)}
+        found = []
+        for node in ast.walk(self._tree):
+            if isinstance(node, ast.Attribute | ast.Name) and id(node) not in bases:
+                chain: list[str] = []
+                inner: ast.expr = node
+                while isinstance(inner, ast.Attribute):
+                    chain.append(inner.attr)
+                    inner = inner.value
+                if isinstance(inner, ast.Name) and inner.id in self.bound:
+                    found.append((inner.id, tuple(reversed(chain))))
+        return sorted(set(found))
+
+    @cached_property
+    def computes_names(self) -> bool:
+        """Whether it imports by a name that it computes."""
+        calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call)]
+        named = [(getattr(call.func, "id", getattr(call.func, "attr", "")), call) for call in calls]
+        return any(
+            name == "import_module" and not (call.args and isinstance(call.args[0], ast.Constant))
+            for name, call in named
+        )
+
+    @cached_property
+    def data(self) -> list[Path]:
+        """The files beside it that are no code, where it looks for files there; none below another package."""
+        looks = any(isinstance(node, ast.Name) and node.id == "__file__" for node in ast.walk(self._tree))
+        if not looks and "importlib.resources" not in {source for source, _ in self.taken}:
+            return []
+        folder = self.path.parent
+        packages = {file.parent for file in folder.rglob("__init__.py")} - {folder}
+        return sorted(
+            file
+            for file in folder.rglob("*")
+            if file.is_file() and file.suffix not in _CODE and not packages & set(file.parents)
+        )
+
+
+def _described(node: ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    first = node.body[0] if node.body else None
+    return isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and isinstance(first.value.value, str)
+
+
+def _flat(value: object) -> Iterator[str]:
+    """Write a tree down, the same in every Python: what one lacks or leaves empty is left out."""
+    if isinstance(value, ast.AST):
+        yield f"({type(value).__name__}"
+        for name, inner in ast.iter_fields(value):
+            if inner is not None and inner != []:
+                yield f" {name}="
+                yield from _flat(inner)
+        yield ")"
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _flat(inner)
+    else:
+        yield repr(value)
+
+
+def _imports(tree: ast.Module) -> Iterator[tuple[ast.Import | ast.ImportFrom, bool]]:
+    """Find every import, and whether it happens when the module runs: else it is for types alone."""
+    for_types = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)
+        for part in node.body
+        for inner in ast.walk(part)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node, id(node) not in for_types
+
+
+def _names(node: ast.Import | ast.ImportFrom) -> Iterator[tuple[str, str, str | None]]:
+    """Return the name that an import binds, the module, and the name in it."""
+    for alias in node.names:
+        if isinstance(node, ast.ImportFrom):
+            yield alias.asname or alias.name, node.module or "", alias.name
+        elif alias.asname:
+            yield alias.asname, alias.name, None
+        else:
+            first = alias.name.split(".")[0]
+            yield first, first, None
+
+
+def _defines(node: ast.stmt) -> Iterator[str]:
+    """Return the names that a statement at a module's level defines."""
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        yield node.name
+    elif isinstance(node, ast.Assign | ast.AnnAssign | ast.AugAssign):
+        for inner in ast.walk(node):
+            if isinstance(inner, ast.Name) and isinstance(inner.ctx, ast.Store):
+                yield inner.id
+    elif isinstance(node, ast.If | ast.Try | ast.For | ast.With):
+        for part in ast.iter_child_nodes(node):
+            if isinstance(part, ast.stmt):
+                yield from _defines(part)
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:12]
+
+
+@cache
+def installed_sources(*more: str | Path) -> Sources:
+    """Return the sources of `taxel` as it is installed.
+
+    Parameters
+    ----------
+    *more : str or Path
+        Packages beside it whose imports are followed, by name; files of modules that stand alone.
+    """
+    files = {file.stem: file for file in more if isinstance(file, Path)}
+    packages = {name: find_spec(name) for name in ("taxel", *(name for name in more if isinstance(name, str)))}
+    folders = {name: Path(str(spec.origin)).parent for name, spec in packages.items() if spec is not None}
+    return Sources(folders | files, _core.source_digests())

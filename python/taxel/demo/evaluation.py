@@ -1,0 +1,107 @@
+"""The result of one run of the demo: detections of a readout beside the simulated truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.demo.judging import Judged, judge, plain_rule
+from taxel.detect import Readout, run
+from taxel.detections import Detections
+from taxel.encode import ContactArea
+from taxel.events import Events
+from taxel.simulate import Act, Contact, play, truth
+from taxel.spikes import SpikeTrains, to_ms, to_us
+from taxel.tare import Tare
+from taxel.wire import FRAME_US
+
+__all__ = ["Evaluation", "evaluate_acts", "evaluate_events"]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One run: events, spikes, detections of the neurons and of the plain rule, truth, and how they compare."""
+
+    readout: Readout
+    tare: Tare
+    events: Events
+    """From the start marker on."""
+    area: SpikeTrains
+    """Contact area of these events."""
+    found: Detections
+    plain: Detections
+    contacts: list[Contact]
+    force_n: NDArray[np.float32]
+    """By frame, from the board's first."""
+    judged: Judged
+    judged_plain: Judged
+
+    @property
+    def start_us(self) -> int:
+        """When the board marked the start."""
+        return int(to_us(self.area.start))
+
+    @property
+    def stop_us(self) -> float:
+        """When the last frame ended."""
+        return len(self.force_n) * FRAME_US
+
+    def crossings(self, label: str) -> NDArray[np.float64]:
+        """Return when a neuron's potential crossed its threshold, ms."""
+        return to_ms(self.found[label].t) + self.readout.neurons[label].delay_ms
+
+    def potential(self, label: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a neuron's potential at `times` (ms), mV."""
+        one = self.readout.neurons[label]
+        return one.neuron.potential(one.weights, self.area, times, spikes=self.crossings(label))
+
+    def first_input(self, contact: Contact, label: str) -> float | None:
+        """Return the time (us) of the first input spike of a touch, or of the last one at its end; None without any."""
+        begin, end = contact.start_us - FRAME_US, contact.stop_us + 5_000.0
+        rises, falls = to_us(self.area[0]), to_us(self.area[5])
+        if label == "contact":
+            inputs = rises[(rises >= begin) & (rises < contact.stop_us)]
+            return float(inputs[0]) if len(inputs) else None
+        inputs = falls[(falls >= contact.start_us) & (falls < end)]
+        return float(inputs[-1]) if len(inputs) else None
+
+
+def evaluate_acts(
+    acts: Sequence[Act], readout: Readout, *, seed: int, watch: Callable[[float], object] = lambda _: None
+) -> Evaluation:
+    """Simulate acts without waiting for the clock, and run the readout on the events.
+
+    `watch` is called with the share that is done.
+    """
+    return evaluate_events(play(acts, seed=seed, watch=watch).events, acts, readout)
+
+
+def evaluate_events(
+    events: Events, acts: Sequence[Act], readout: Readout, found: Detections | None = None
+) -> Evaluation:
+    """Run the readout on events, those of the tare among them; or judge the detections `found` live."""
+    start = events.markers[0][0]
+    tare = Tare.take(events, stop_us=start)
+    if found is None:
+        found = run(readout, events, frame_us=FRAME_US, tare=tare)
+    # Before the start marker the board sends the rest of every taxel, which is no touch.
+    found = found[found.t >= start]
+    area = ContactArea(tare=tare).encode(events)
+    area = area.between(to_ms(start), area.stop)
+    contacts, force = truth(acts)
+    plain = plain_rule(area, FRAME_US)
+    return Evaluation(
+        readout=readout,
+        tare=tare,
+        events=events.between(start, np.inf),
+        area=area,
+        found=found,
+        plain=plain,
+        contacts=contacts,
+        force_n=force,
+        judged=judge(found, contacts),
+        judged_plain=judge(plain, contacts),
+    )

@@ -1,0 +1,281 @@
+"""How many bits a sensor gives about labels (thesis chapter 5): by period, number of taxels, time and cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from taxel._base.arguments import callback, instance, several, text, whole
+from taxel.encode import ChangeEvents, Encoder
+from taxel.information.answers import Answer, Point, is_told
+from taxel.information.controls import controls
+from taxel.information.estimate import Estimate, estimate, zero_test
+from taxel.information.keeping import Verdict, keeps
+from taxel.information.nested import Nested, training_curve
+from taxel.information.question import Question
+from taxel.information.rasters import features, frame_grams
+from taxel.information.sampling import (
+    Spikes,
+    pictures_of,
+)
+from taxel.information.spiking import readout_responses
+from taxel.information.trials import LabelledTrial
+from taxel.information.wire_rate import kilobits_per_second
+from taxel.spikes import to_ms
+
+__all__ = ["CLASSIFIERS", "answer"]
+
+#: Beside the discriminants of every answer, at the reference setting.
+CLASSIFIERS = ("neighbours", "cone_r", "tempotron")
+#: Numbers of neighbours that are tried.
+NEIGHBOURS = (1, 3, 5, 9, 15)
+#: From so many trials on their matrices are worth more than one thread.
+_WORTH_THREADS = 1000
+#: Pictures are held against events where they fit in so many values.
+_MOST_VALUES = 2**28
+
+
+def answer(
+    trials: Sequence[LabelledTrial],
+    *,
+    encoder: Encoder | None = None,
+    window_ms: float | None = None,
+    windows_ms: Sequence[float] | None = None,
+    periods_ms: Sequence[float] | None = None,
+    taxels: Sequence[int] | None = None,
+    pools: Sequence[int] | None = None,
+    taxels_at_ms: float | None = None,
+    draws: int = 5,
+    folds: int = 10,
+    shuffles: int = 20,
+    classifiers: Sequence[str] = ("neighbours",),
+    seed: int = 0,
+    progress: Callable[[str, int, int], object] | None = None,
+) -> Answer:
+    """Ask labelled trials how many bits their events hold about the labels, by period, time, taxels and cost.
+
+    Parameters
+    ----------
+    trials : sequence of LabelledTrial
+        Of one array.
+    encoder : Encoder, optional
+        `ChangeEvents` or `FA1`; its period is set. Left out: change events of one bit with the floor of `floor_of`.
+    window_ms : float, ms, optional
+        How far after the contact to look at most; needed where trials have no end. The shortest trial where left out.
+    windows_ms, periods_ms : sequence of float, ms, optional
+        Steps of 1, 2, 5 where they are left out: windows from a fortieth of the longest, periods from the finest that
+        the recordings show, or a 500th of the window.
+    taxels : sequence of int, optional
+        Numbers of taxels that are drawn at random among those that ever send an event; 10, 30, 100, 300 where left out.
+    pools : sequence of int, optional
+        Taxels of so many by so many taken for one; 2, 4 and 7 where left out.
+    taxels_at_ms : float, ms, optional
+        The period at which taxels are taken away or pooled, one of those asked for; the finest where it is left out.
+    draws : int, 1 or more
+        Of sampling phases and of random taxels; answers are their means.
+    folds : int, 2 or more
+    shuffles : int, 1 or more
+        Of the test against zero.
+    classifiers : sequence of {"neighbours", "cone_r", "tempotron"}
+        Beside the discriminants, at the full setting.
+    seed : int, 0 or more
+    progress : function of (what, done, all), optional
+        What it raises ends the work.
+
+    Returns
+    -------
+    Answer
+
+    Raises
+    ------
+    ProblemError : as `taxel.information.folds`; a period finer than the recordings; trials of several arrays; no event
+        in any trial
+    """
+    listed = [instance(f"trials[{k}]", one, LabelledTrial) for k, one in enumerate(several("trials", trials))]
+    if progress is not None:
+        callback("progress", progress)
+    for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
+        whole(name, value, least)
+    also = [text("classifiers", one, CLASSIFIERS) for one in several("classifiers", classifiers)]
+    asked = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed), progress)
+    asked.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms, len(also), int(shuffles))
+    # Threads that wait for each other over small matrices cost more than they bring, and very much on a busy machine.
+    with threadpool_limits(1 if len(listed) < _WORTH_THREADS else None):
+        return asked.answer(also, int(shuffles))
+
+
+class _Answering(Question):
+    """Answers a question setting by setting."""
+
+    def answer(self, classifiers: list[str], shuffles: int) -> Answer:
+        """Answer all."""
+        values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
+        said: dict[tuple[int, float], list[Any]] = {}
+        about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
+        frames: dict[int, list[Any]] = {}
+        by_column: dict[tuple[str, int], list[Any]] = {}
+        reference: tuple[Spikes, list[NDArray[np.float64]], list[int], Nested] | None = None
+        missing: set[str] = set()
+        for period in self.periods:
+            for draw in range(self.draws):
+                self.tell(f"{to_ms(period):g} ms, draw {draw + 1}")
+                spikes = self.spikes(period, draw)
+                for window, grams in zip(self.windows, self.grams(spikes, self.windows), strict=True):
+                    sizes = [features(spikes, window)] * len(grams)
+                    found = self.nested(grams, sizes, draw=draw)
+                    said.setdefault((period, window), []).append(found.responses)
+                    about.setdefault((period, window), []).append(_about(spikes, window, values))
+                    missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in found.missing}
+                    if reference is None and window == self.windows[-1]:
+                        reference = spikes, grams, sizes, found
+                for name, column in self.columns.items():
+                    self.tell(f"{to_ms(period):g} ms, {name}")
+                    by_column.setdefault((name, period), []).append(self.nested(grams, sizes, column, draw).responses)
+                self.tell(f"{to_ms(period):g} ms, pictures")
+                picture = self._pictures(spikes)
+                if picture is not None:
+                    frames.setdefault(period, []).append(self.nested(*picture, draw=draw).responses)
+        assert reference is not None  # there are a period, a draw and a window at least
+        estimates = {key: self.estimate(responses) for key, responses in said.items()}
+        everything = len(self.active)
+        points = []
+        for (period, window), one in estimates.items():
+            verdict = None
+            if period != self.periods[0]:
+                verdict = keeps(one, estimates[self.periods[0], window], groups=self.groups)
+            points.append(_point(period, window, everything, "all", one, about[period, window], verdict))
+        full = next(p for p in points if p.verdict is None and p.window_ms == to_ms(self.windows[-1]))
+        spikes, grams, sizes, first = reference
+        self.tell("labels shuffled", 0)
+        zero = zero_test(
+            lambda labels: self._shuffled(grams, sizes, labels),
+            self.labels,
+            full.found.bits,
+            groups=self.groups,
+            shuffles=shuffles,
+            seed=self.seed,
+        )
+        self._warn(missing)
+        taxels = self._by_taxels(full, values)
+        if not is_told(full.found, zero):
+            points = [_with_nothing(p) if p.window_ms == full.window_ms else p for p in points]
+            taxels = tuple(map(_with_nothing, taxels))
+        return Answer(
+            labels={str(name): int(n) for name, n in zip(*np.unique(self.labels, return_counts=True), strict=True)},
+            groups=0 if self.groups is None else len(np.unique(self.groups)),
+            encoder=repr(self.encoder),
+            full=full,
+            points=tuple(points),
+            taxels=taxels,
+            frames={to_ms(period): self.estimate(responses) for period, responses in frames.items()},
+            controls=controls(self),
+            zero=zero,
+            training=self._training(grams, sizes, first),
+            classifiers={name: self._classified(name, spikes, grams, sizes) for name in classifiers},
+            parameters=self._columns_answered(by_column, about, everything),
+            notes=tuple(self.notes),
+            draws=self.draws,
+            seed=self.seed,
+        )
+
+    def _shuffled(self, grams: list[NDArray[np.float64]], sizes: list[int], labels: Any) -> NDArray[np.generic]:
+        self.tell("labels shuffled")
+        return self.nested(grams, sizes, labels).responses
+
+    def _pictures(self, spikes: Spikes) -> tuple[list[NDArray[np.float64]], list[int]] | None:
+        """Return the pictures' inner products to the whole window; None without values, or where they are too many."""
+        bins = int(spikes.bins_to(self.window_us).max(initial=0))
+        active = len(np.unique(spikes.taxel))
+        if not all(held.has_values for held in self.held) or not 0 < bins * active * spikes.trials <= _MOST_VALUES:
+            return None
+        values = pictures_of(self.trials, self.held, spikes, self.contact, bins)
+        return frame_grams(values, spikes, [self.window_us]), [bins * active]
+
+    def _by_taxels(self, full: Point, values: bool) -> tuple[Point, ...]:
+        """Answer by number of taxels."""
+        period = self.taxels_at
+        window = self.window_us
+        found = []
+        for kind, size in [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]:
+            said, about, taxels = [], [], size
+            for draw in range(self.draws):
+                self.tell(f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}")
+                if kind == "random":
+                    random = np.random.default_rng([self.seed, draw, size, 1])
+                    chosen = np.sort(random.choice(self.active, size, replace=False))
+                    spikes = self.spikes(period, draw).of(chosen)
+                else:
+                    spikes = self.spikes(period, draw, size)
+                    taxels = spikes.taxels
+                grams = self.grams(spikes, [window])[0]
+                said.append(self.nested(grams, [features(spikes, window)] * len(grams), draw=draw).responses)
+                about.append(_about(spikes, window, values))
+            one = self.estimate(said)
+            found.append(_point(period, window, taxels, kind, one, about, keeps(one, full.found, groups=self.groups)))
+        return tuple(found)
+
+    def _training(
+        self, grams: list[NDArray[np.float64]], sizes: list[int], first: Nested
+    ) -> tuple[tuple[int, float], ...]:
+        self.tell("by number of training trials")
+        least = int(np.unique(self.labels, return_counts=True)[1].min())
+        most = least - -(-least // self.folds)
+        steps = sorted({max(2, most // k) for k in (12, 6, 3, 2)} - {most})
+        steps = [n for n in steps if n < most]
+        said = training_curve(grams, sizes, self.labels, first, steps, seed=self.seed)
+        curve = [(n, estimate(self.labels, one, redraws=2).bits) for n, one in zip(steps, said, strict=True)]
+        return (*curve, (most, estimate(self.labels, first.responses, redraws=2).bits))
+
+    def _classified(self, name: str, spikes: Spikes, grams: list[NDArray[np.float64]], sizes: list[int]) -> Estimate:
+        self.tell(name)
+        if name == "neighbours":
+            return self.estimate(self.nested(grams, sizes, neighbours=NEIGHBOURS).responses)
+        fold = self.nested([grams[-1]], [sizes[-1]], ridges=[1.0]).folds
+        return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, fold))
+
+    def _columns_answered(
+        self, by_column: dict[tuple[str, int], list[Any]], about: dict[Any, Any], everything: int
+    ) -> dict[str, tuple[Point, ...]]:
+        found: dict[str, list[Point]] = {}
+        for (name, period), said in by_column.items():
+            one = self.estimate(said, self.columns[name])
+            found.setdefault(name, []).append(
+                _point(period, self.windows[-1], everything, "all", one, about[period, self.windows[-1]], None)
+            )
+        return {name: tuple(points) for name, points in found.items()}
+
+    def _warn(self, missing: set[str]) -> None:
+        self.notes += sorted(missing)[:3]
+        if self.groups is None:
+            self.notes.append(
+                "no groups are named: what trials of one person, session or pose share counts as the label's"
+            )
+        runs = 1 + int(np.count_nonzero(self.labels[1:] != self.labels[:-1]))
+        # Recordings of a trial each may stand in any order.
+        ordered = len({id(one.source) for one in self.trials}) < len(self.trials)
+        if ordered and runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
+            self.notes.append("each label's trials lie together: a drift of the sensor would count as the label's")
+        if not self.ended:
+            self.notes.append("trials have no end of their own: how long a touch lasts is known within the window only")
+
+
+def _about(spikes: Spikes, window: float, values: bool) -> tuple[float, float, float]:
+    counts = spikes.counts(window)
+    return float(counts.mean()), float(np.mean(counts == 0)), kilobits_per_second(spikes, window, values=values)
+
+
+def _point(
+    period: int, window: float, taxels: int, kind: str, found: Estimate, about: list[Any], verdict: Verdict | None
+) -> Point:
+    events, silent, kbps = np.mean(about, axis=0)
+    return Point(to_ms(period), to_ms(window), taxels, kind, found, float(events), float(silent), float(kbps), verdict)
+
+
+def _with_nothing(point: Point) -> Point:
+    """Return a setting that is held against one whose bits are not told from nothing."""
+    return point if point.verdict is None else replace(point, verdict=replace(point.verdict, says="nothing"))

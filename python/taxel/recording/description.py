@@ -1,0 +1,177 @@
+"""What a table of events or pictures cannot hold, as JSON: the entry ``about`` of a .npz and of a .h5."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from taxel._base import limits
+from taxel._base.arguments import flag, number, text, whole
+from taxel._core import FormatError, ProblemError
+from taxel.array import Array
+from taxel.detections import Detections
+from taxel.formats.checks import sensor
+from taxel.labels import Note
+from taxel.recording.contents import Contents
+from taxel.recording.notes import BoardChange, Zeroing
+from taxel.wire import Registers
+
+__all__ = ["about_of", "array_of", "board_changes_of", "detections_of", "json_of", "notes_of", "zeroings_of"]
+
+
+def json_of(contents: Contents) -> str:
+    """Return what stands beside the columns of a table, as files hold it."""
+    registers = contents.registers
+    changes = contents.register_changes
+    driven = registers.array if registers is not None else changes[0][1].array if changes else contents.array
+    said: dict[str, Any] = {
+        "array": contents.array._geometry(),
+        "source": contents.source,
+        "registers": None if registers is None else json.loads(registers._json()),
+        "registers_array": None if driven == contents.array else driven._geometry(),
+        "register_changes": [[at, json.loads(held._json())] for at, held in changes],
+        "board_changes": [[change.at_ns, change._described()] for change in contents.board_changes],
+        "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in contents.notes],
+        "detections": [
+            [0, d.label, d.t, d.known, None if np.isnan(d.slope) else d.slope, d.repaired] for d in contents.detections
+        ],
+        "counts": dict(contents.counts),
+        "verdict": contents.verdict,
+        "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in contents.zeroings],
+        "columns": contents.columns,
+        "truncated": contents.truncated,
+        "rebuilt": dict(contents.rebuilt),
+        "lost": contents.lost,
+    }
+    return json.dumps({name: value for name, value in said.items() if value})
+
+
+def about_of(place: str, said: str) -> dict[str, Any]:
+    """Return the fields of `Contents` that a file's ``about`` holds, checked.
+
+    Raises
+    ------
+    FormatError : no JSON as taxel writes it (names the entry)
+    """
+    limits.unpacked(place, len(said), limits.DESCRIPTION)
+    entry = "the whole"
+    fields: dict[str, Any] = {}
+    try:
+        about = json.loads(said)
+        if not isinstance(about, dict):
+            raise ProblemError("no object")
+        for entry, read in _ENTRIES.items():
+            if about.get(entry) is not None:
+                fields[entry] = read(about[entry], place)
+        driven = fields.pop("registers_array", None) or fields.get("array") or Array.thesis()
+        for entry in ("registers", "register_changes"):
+            if entry in fields:
+                fields[entry] = _registers(fields[entry], driven)
+    except FormatError:
+        raise
+    except RecursionError:
+        raise FormatError(f"{place}: nested too deeply; must be JSON as taxel writes it") from None
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, ProblemError) as error:
+        line = str(error).split("\n", maxsplit=1)[0][:200]
+        raise FormatError(f"{place}, {entry}: {line}; must be JSON as taxel writes it") from None
+    return fields
+
+
+def array_of(said: Mapping[str, Any]) -> Array:
+    """Return the sensor that a file describes."""
+    if not isinstance(said, Mapping):
+        raise ProblemError("no object")
+    return Array._from_geometry(dict(said))
+
+
+def notes_of(said: Any) -> tuple[Note, ...]:
+    """Return notes from records of text, t_us and at_ns."""
+    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), whole("at_ns", n["at_ns"])) for n in said)
+
+
+def detections_of(said: Any) -> Detections:
+    """Return detections from records of (host ns, label, t, known, slope[, repaired]); JSON has no NaN."""
+    rows = list(said)
+    slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
+    repaired = [row[5] if len(row) > 5 else False for row in rows]
+    label, t, known = ([row[k] for row in rows] for k in (1, 2, 3))
+    return Detections._of(label, t, known, slopes, repaired=repaired)
+
+
+def zeroings_of(said: Any) -> tuple[Zeroing, ...]:
+    """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
+    zeroings = (
+        Zeroing(
+            whole("t", one["t"], -limits.TIME_US, limits.TIME_US),
+            whole("x", one["x"], 0, 65_535),
+            whole("y", one["y"], 0, 65_535),
+            number("rest", one["rest"]),
+            None if one["before"] is None else number("before", one["before"]),
+        )
+        for one in said
+    )
+    return tuple(sorted(zeroings, key=lambda one: one.t))
+
+
+def board_changes_of(said: Any) -> tuple[BoardChange, ...]:
+    """Return changes of the board from pairs of the host's time (ns) and a record of t_us, change, version, asked."""
+    return tuple(
+        BoardChange(
+            _time("t_us", one["t_us"]),
+            whole("at_ns", at),
+            text("change", one["change"]),
+            None if one.get("version") is None else whole("version", one["version"], 0, 255),
+            flag("asked", one.get("asked", False)),
+        )
+        for at, one in said
+    )
+
+
+def _time(name: str, said: Any) -> int | None:
+    return None if said is None else whole(name, said, -limits.TIME_US, limits.TIME_US)
+
+
+def _registers(said: Any, driven: Array) -> Any:
+    """Return a set of registers, or a list of times and sets, checked against the array that they drive."""
+    if isinstance(said, list):
+        return tuple((whole("at_ns", at), Registers._of(held, driven)) for at, held in said)
+    return Registers._of(said, driven)
+
+
+def _counts(said: Any, depth: int = 0) -> dict[str, Any]:
+    """Return counts by cause, whole numbers of 0 or more; those of the decoder stand in one of their own."""
+    if not isinstance(said, dict):
+        raise ProblemError("no object")
+    return {
+        name: n if n is None else _counts(n, 1) if isinstance(n, dict) and depth == 0 else whole(name, n, 0)
+        for name, n in said.items()
+    }
+
+
+def _texts(said: Any) -> tuple[str, ...]:
+    if not isinstance(said, list):
+        raise ProblemError("no list")
+    return tuple(text("entry", one) for one in said)
+
+
+#: How each entry is read, by its name; of the registers only later, as another entry says what they drive.
+_ENTRIES: dict[str, Any] = {
+    "array": lambda said, place: sensor(place, array_of(said)),
+    "source": lambda said, _: text("source", said),
+    "registers": lambda said, _: said,
+    "registers_array": lambda said, place: sensor(place, array_of(said)),
+    "register_changes": lambda said, _: said,
+    "board_changes": lambda said, _: board_changes_of(said),
+    "notes": lambda said, _: notes_of(said),
+    "detections": lambda said, _: detections_of(said),
+    "counts": lambda said, _: _counts(said),
+    "verdict": lambda said, _: text("verdict", said),
+    "zeroings": lambda said, _: zeroings_of(said),
+    "columns": lambda said, _: _texts(said),
+    "truncated": lambda said, _: flag("truncated", said),
+    "rebuilt": lambda said, _: _counts(said),
+    "lost": lambda said, _: _texts(said),
+}

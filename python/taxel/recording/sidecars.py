@@ -1,0 +1,68 @@
+"""What lies beside a recording as a file of its own: labels that people set, and a calibration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from taxel._core import ProblemError
+from taxel.calibration import Calibration
+from taxel.labels import Labels, Note, beside
+from taxel.recording.contents import Contents, alone, once
+from taxel.recording.kinds import ENDINGS
+
+__all__ = ["calibration_beside", "has_calibration", "with_sidecars"]
+
+
+def with_sidecars(of: Contents) -> Contents:
+    """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration that lie beside it."""
+    sources: dict[str, Contents] = {}
+    for name, one in (of.sources or {of.label: of}).items():
+        # Labels are by the clock of the file's first source.
+        sources[name] = _of_one(one, first=not sources)
+    if not of.sources:
+        return sources[of.label]
+    for name, one in sources.items():
+        sources[name] = one.but(sources=sources)
+    return alone(sources)
+
+
+def _of_one(of: Contents, *, first: bool) -> Contents:
+    changed = {}
+    if first and of.kind in ENDINGS.values() and beside(of.path).is_file():
+        changed["notes"] = once(lambda: of.notes + _labels(of.path))
+    calibration = once(lambda: calibration_beside(of.path, of), lambda: has_calibration(of.path))
+    return of.but(calibration=calibration, **changed)
+
+
+def _labels(path: Path) -> tuple[Note, ...]:
+    """Return the labels that people set on a finished recording."""
+    labels = Labels(beside(path))
+    name = labels.named(path)
+    rows = sorted((row for row in labels.rows if row.recording == name), key=lambda row: row.t or 0)
+    return tuple(Note(row.text, row.t, row.at_ns) for row in rows)
+
+
+def has_calibration(path: Path) -> bool:
+    """Tell whether a calibration lies beside a file."""
+    return Calibration.beside(path) is not None
+
+
+def calibration_beside(path: Path, of: Contents) -> Calibration | None:
+    """Return the calibration that lies beside a file (`Calibration.beside`); None where there is none.
+
+    Raises
+    ------
+    FormatError : it cannot be read
+    ProblemError : it is of another array than the recording, or of readings in another unit
+    """
+    place = Calibration.beside(path)
+    if place is None:
+        return None
+    found = Calibration.load(place)
+    read = "ticks" if of.frames is None else of.frames.unit
+    if found.array != of.array or found.of != read:
+        raise ProblemError(
+            f"{place}: turns {found.of} of {found.array!r} into {found.unit}; {of.name} holds {read} of "
+            f"{of.array!r}, another array"
+        )
+    return found

@@ -1,0 +1,283 @@
+// Runs the logic for Python: frames of trip times in, bytes of the link and of the serial line out.
+//
+// The bench stands where the analogue board and the pins' cells stand: it follows the chain of shift registers and the
+// multiplexer's address by their pins, and answers each ramp with comparators that trip at the ticks given for what these
+// select. It knows nothing of what the logic makes of it.
+#include <cstdint>
+#include <cstring>
+#include <deque>
+#include <utility>
+#include <vector>
+
+#include "Vtaxel_top.h"
+#include "verilated.h"
+
+namespace {
+
+constexpr int kWindow = 1 << 17;  // ticks of a ramp that the bench follows
+constexpr uint16_t kNotReturned = 65535;
+
+struct Bench {
+    VerilatedContext context;
+    Vtaxel_top top;
+    int columns, rows, channels, steps, baud;
+    int lines;                        // driven of these columns: none stands at the others
+    std::vector<uint16_t> ticks;      // by taxel, row after row
+    std::vector<uint8_t> chain;       // the shift registers, 1 where a line is driven
+    bool chain_clock = false;
+    bool inverted = false;            // comparators fall when they trip, in this read and in the next one
+    bool inverted_next = false;
+    bool shared = false;              // two lines or none were driven when a ramp began
+    // The ramp that runs: at which sample each comparator trips.
+    std::vector<uint64_t> trips = std::vector<uint64_t>(kWindow);
+    std::vector<int> used;
+    uint64_t level = 0;
+    int tick = -1;                    // of the ramp; below 0: none
+    bool ramp_before = false;
+    uint64_t sampled[2] = {0, 0};     // in this clock
+    uint64_t before[2] = {0, 0};      // in the clock before: what the pins' cells hold
+    // The serial line and the link.
+    std::deque<uint8_t> to_send;
+    int bit = -1, bit_clocks = 0;
+    int rx_bit = -1, rx_clocks = 0, rx_byte = 0;
+    uint64_t sent_at = ~uint64_t{0};  // the clock of the middle of the last byte's stop bit
+    std::vector<uint8_t> serial, payload, last;
+    std::vector<uint64_t> edges;      // the clocks of frames' edges
+    std::vector<uint8_t> marks;       // record_sync at each edge
+    uint64_t clock = 0;
+    int phase = 0;
+    uint32_t random = 1;
+    uint32_t ready_of = 256;          // of 256 clocks the link accepts a byte in so many
+
+    // What no reset reaches begins with random bits.
+    explicit Bench(int seed) : top(prepared(context, seed)) {}
+
+    static VerilatedContext* prepared(VerilatedContext& context, int seed) {
+        context.randReset(2);
+        context.randSeed(seed);
+        return &context;
+    }
+
+    void select() {
+        int line = -1;
+        for (int x = 0; x < lines; x++) {
+            if (!chain[x]) continue;
+            if (line >= 0) shared = true;
+            line = x;
+        }
+        if (line < 0) {
+            shared = true;
+            line = 0;
+        }
+        for (int t : used) trips[t] = 0;
+        used.clear();
+        level = 0;
+        inverted = inverted_next;
+        for (int c = 0; c < channels; c++) {
+            const int y = steps * c + top.rsel;
+            const uint16_t t = y < rows ? ticks[y * columns + line] : 0;
+            if (t == kNotReturned) {
+                level |= uint64_t{1} << c;
+            } else {
+                trips[t] |= uint64_t{1} << c;
+                used.push_back(t);
+            }
+        }
+    }
+
+    // One sample of all comparators at the start of a tick; then the tick passes.
+    uint64_t sample() {
+        const uint64_t now = level;
+        if (tick >= 0) {
+            if (tick < kWindow) level |= trips[tick];
+            tick++;
+        }
+        return now;
+    }
+
+    void drive(uint64_t even, uint64_t odd) {
+        uint8_t* pins = reinterpret_cast<uint8_t*>(&top.comparators);
+        const uint64_t flip = inverted ? ~uint64_t{0} : 0;
+        even ^= flip;
+        odd ^= flip;
+        for (int k = 0; k < channels / 4; k++) {
+            uint8_t byte = 0;
+            for (int c = 0; c < 4; c++) {
+                byte |= ((even >> (4 * k + c)) & 1) << (2 * c);
+                byte |= ((odd >> (4 * k + c)) & 1) << (2 * c + 1);
+            }
+            pins[k] = byte;
+        }
+    }
+
+    void after_fast() {
+        // The ramp of the clock that begins now, and the samples of its two halves.
+        const bool rises = (top.ramp & 1) && !ramp_before;
+        ramp_before = top.ramp & 2;
+        if (rises) {
+            select();
+            tick = 0;
+        }
+        sampled[0] = sample();
+        sampled[1] = sample();
+    }
+
+    void after_slow() {
+        clock++;
+        if (top.csel_reg_clk_out && !chain_clock) {
+            for (int x = columns - 1; x > 0; x--) chain[x] = chain[x - 1];
+            chain[0] = top.csel_reg_din_out;
+        }
+        chain_clock = top.csel_reg_clk_out;
+        if (top.frame_sync_out) {
+            edges.push_back(clock);
+            marks.push_back(top.record_sync);
+        }
+        // The serial line, both ways.
+        if (rx_bit < 0) {
+            if (!top.tx) {
+                rx_bit = 0;
+                rx_clocks = baud + baud / 2;
+                rx_byte = 0;
+            }
+        } else if (--rx_clocks == 0) {
+            if (rx_bit < 8) {
+                rx_byte |= (top.tx & 1) << rx_bit;
+                rx_clocks = baud;
+                rx_bit++;
+            } else {
+                if (top.tx) serial.push_back(rx_byte);
+                rx_bit = -1;
+            }
+        }
+        if (bit >= 0 && --bit_clocks == 0) {
+            bit++;
+            bit_clocks = baud;
+            if (bit == 9 && to_send.size() == 1) sent_at = clock + baud / 2;
+            if (bit == 10) {
+                bit = -1;
+                to_send.pop_front();
+            }
+        }
+        if (bit < 0 && !to_send.empty()) {
+            bit = 0;
+            bit_clocks = baud;
+        }
+        top.rx = bit < 0 ? 1 : bit == 0 ? 0 : bit == 9 ? 1 : (to_send.front() >> (bit - 1)) & 1;
+        random = random * 1664525u + 1013904223u;
+        top.tready = (random >> 24) < ready_of;
+    }
+
+    // What the link accepts at the edge to come.
+    void before_slow() {
+        if (top.tvalid && top.tready) {
+            payload.push_back(top.tdata);
+            last.push_back(top.tlast);
+        }
+    }
+
+    // One of six parts of 20 ns, in which are two clocks of 10 ns and three of 6.67: an edge of either, or of both.
+    void part(int k) {
+        const bool fast_up = k == 0 || k == 2 || k == 4;
+        const bool slow_up = k == 0 || k == 3;
+        if (fast_up) drive(before[0], before[1]);
+        if (slow_up) before_slow();
+        top.clk_fast = fast_up;
+        if (slow_up) top.clk = 1;
+        if (k == 1 || k == 4) top.clk = 0;
+        top.eval();
+        if (fast_up) {
+            before[0] = sampled[0];
+            before[1] = sampled[1];
+            after_fast();
+        }
+        if (slow_up) after_slow();
+    }
+
+    void step() {
+        part(phase);
+        phase = phase == 5 ? 0 : phase + 1;
+    }
+};
+
+}  // namespace
+
+extern "C" {
+
+Bench* bench_new(int columns, int rows, int channels, int steps, int baud, int seed) {
+    auto* b = new Bench(seed);
+    b->columns = columns;
+    b->lines = columns;
+    b->rows = rows;
+    b->channels = channels;
+    b->steps = steps;
+    b->baud = baud;
+    b->ticks.assign(columns * rows, 0);
+    b->chain.assign(columns, 1);
+    b->top.rx = 1;
+    b->top.tready = 1;
+    return b;
+}
+
+void bench_delete(Bench* b) { delete b; }
+
+// Holds the logic in reset for some clocks.
+void bench_reset(Bench* b) {
+    b->top.reset = 1;
+    for (int k = 0; k < 6 * 8; k++) b->step();
+    b->top.reset = 0;
+    b->payload.clear();
+    b->last.clear();
+    b->serial.clear();
+    b->edges.clear();
+    b->rx_bit = -1;
+    b->shared = false;
+}
+
+void bench_ticks(Bench* b, const uint16_t* ticks) { std::memcpy(b->ticks.data(), ticks, b->ticks.size() * 2); }
+
+// Runs to the next frame's edge, or for so many clocks; returns whether the edge came.
+int bench_run(Bench* b, uint64_t clocks) {
+    const size_t edges = b->edges.size();
+    const uint64_t until = b->clock + clocks;
+    while (b->clock < until) {
+        b->step();
+        if (b->edges.size() != edges) return 1;
+    }
+    return 0;
+}
+
+void bench_send(Bench* b, const uint8_t* bytes, int count) {
+    b->sent_at = ~uint64_t{0};
+    b->to_send.insert(b->to_send.end(), bytes, bytes + count);
+}
+
+int bench_sending(Bench* b) { return static_cast<int>(b->to_send.size()); }
+uint64_t bench_sent_at(Bench* b) { return b->sent_at; }
+uint64_t bench_clock(Bench* b) { return b->clock; }
+uint64_t bench_edge(Bench* b) { return b->edges.back(); }
+int bench_recording(Bench* b) { return b->top.record_sync; }
+// Whether a ramp began with two lines driven, or none, since this was last asked.
+int bench_shared(Bench* b) { return std::exchange(b->shared, false); }
+void bench_lines(Bench* b, int lines) { b->lines = lines; }
+void bench_invert(Bench* b, int inverted) { b->inverted_next = inverted; }
+void bench_link(Bench* b, uint32_t ready_of) { b->ready_of = ready_of; }
+
+// Moves what was received into `to`; returns how many bytes. `ends` marks a datagram's last byte.
+int bench_payload(Bench* b, uint8_t* to, uint8_t* ends, int room) {
+    const int count = static_cast<int>(b->payload.size()) < room ? b->payload.size() : room;
+    std::memcpy(to, b->payload.data(), count);
+    std::memcpy(ends, b->last.data(), count);
+    b->payload.erase(b->payload.begin(), b->payload.begin() + count);
+    b->last.erase(b->last.begin(), b->last.begin() + count);
+    return count;
+}
+
+int bench_serial(Bench* b, uint8_t* to, int room) {
+    const int count = static_cast<int>(b->serial.size()) < room ? b->serial.size() : room;
+    std::memcpy(to, b->serial.data(), count);
+    b->serial.erase(b->serial.begin(), b->serial.begin() + count);
+    return count;
+}
+
+}  // extern "C"

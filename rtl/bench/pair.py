@@ -1,0 +1,97 @@
+"""The logic beside the emulated board: the same trip times and writes for both."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from logic import WRITE_CLOCKS, Logic
+from taxel import Array
+from taxel.simulate import Board
+from taxel.wire import Registers
+
+#: Values of `previous` and `intensity` of the emulated board as parameters of the logic.
+PREVIOUS = {"last_sent": {}, "last_sample": {"PREVIOUS_SAMPLE": 1}}
+INTENSITY = {"value": {}, "difference": {"DIFFERENCE": 1}, "nothing": {"VALUED": 0}}
+
+
+def answers(serial: str) -> str:
+    """Return the whole lines that are no lines of faults."""
+    lines = serial.splitlines(keepends=True)
+    return "".join(line for line in lines if line.endswith("\n") and not line.startswith("fault"))
+
+
+class Pair:
+    """The logic and the emulated board, both at the start of a frame.
+
+    Parameters
+    ----------
+    columns, rows, channels : int
+    previous, intensity : str
+        As of the emulated board.
+    **parameters : int
+        Others of `Logic`.
+    """
+
+    def __init__(
+        self,
+        columns: int,
+        rows: int,
+        channels: int = 16,
+        *,
+        previous: Any = "last_sent",
+        intensity: Any = "value",
+        **parameters: Any,
+    ) -> None:
+        self.array = Array(rows, columns)
+        options = PREVIOUS[previous] | INTENSITY[intensity] | {"FAULT_CLOCKS": 5000} | parameters
+        self.logic = Logic(columns, rows, channels, **options)
+        registers = Registers(array=self.array, channels=channels)
+        self.board = Board(registers, self.array, previous=previous, intensity=intensity, queue=1 << 30)
+        self.expected: list[bytes] = []
+        self.received: list[bytes] = []
+        self.answers = self.board.greeting
+        self.serial = ""
+        #: The command that was sent and that the emulated board has not got yet: it acts at a frame's edge.
+        self.waits = b""
+        # The frame before time 0 is not sent.
+        self.logic.edge()
+        self.logic.edge()
+
+    def frame(self, ticks: Any, data: bytes = b"", after: int = 0) -> None:
+        """Scan a frame; in it, `after` clocks from its edge on, the host begins to send one command."""
+        if self.waits and self.logic.call("sent_at") + WRITE_CLOCKS <= self.logic.call("edge"):
+            self.answers += self.board.command(self.waits)
+            self.waits = b""
+        self.logic.call("invert", int(self.board.registers.invert_comparator))
+        self.logic.call("lines", self.board.registers.lines)
+        self.expected += self.board.frame(np.asarray(ticks, np.uint16))
+        self.logic.ticks(ticks)
+        if data:
+            if self.waits or self.logic.run(after):
+                raise ValueError("one command at a time, begun within the frame")
+            self.logic.send(data)
+            self.waits = data
+        self.logic.edge()
+        self.received += self.logic.datagrams()
+        self.serial += self.logic.serial()
+
+    @property
+    def answered(self) -> bool:
+        """Whether no command is on its way, nor an answer."""
+        return not self.waits and self.answers == answers(self.serial)
+
+    def finish(self) -> None:
+        """Scan quiet frames until everything was sent."""
+        still = np.zeros(self.array.shape, np.uint16)
+        self.frame(still)
+        while not self.answered:
+            self.frame(still)
+        self.logic.edge()
+        self.received += self.logic.datagrams()
+        # Status lines end when all of them are out, and a line of faults may follow.
+        until = self.logic.call("clock") + 40_000
+        while self.logic.call("clock") < until:
+            self.logic.run(4000)
+        self.serial += self.logic.serial()

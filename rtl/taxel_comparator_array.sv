@@ -1,0 +1,102 @@
+// All channels of the converter and the timer that they share: raises the ramp for a read, and hands over what was counted.
+//
+// The scan's clock and the fast one are of one PLL, but nothing here rests on their phase: single bits that alternate from read
+// to read cross through two flip-flops, and what they announce stands still meanwhile. Counting begins with the ramp in the
+// fast clock's own domain, so how long a crossing takes plays no part in a count.
+module taxel_comparator_array #(
+    parameter int CHANNELS = 16,
+    parameter int DELAY = 2
+) (
+    input  logic                     clk,
+    input  logic                     reset,
+    input  logic                     read_start,
+    input  logic                     step_end,
+    input  logic [15:0]              length,      // of the ramp, in ticks; from a read's start on
+    input  logic                     inverted,    // comparators fall when they trip
+    output logic                     read_done,   // the counts of the read that ended last stand from here to the next one
+    output logic [CHANNELS-1:0]      tripped,
+    output logic [CHANNELS-1:0]      first,       // at the first sample of the pair
+    output logic [CHANNELS-1:0][14:0] at,         // the pair of samples
+    input  logic                     clk_fast,
+    input  logic [CHANNELS-1:0][1:0] comparators, // samples of the first and second half of a clock
+    output logic [1:0]               ramp
+);
+
+  // On the scan's clock: the number of the read that began last, and of the one that ended last, modulo 2.
+  logic began, ended, done, done_before;
+
+  always_ff @(posedge clk) begin
+    if (read_start) began <= !began;
+    if (step_end) ended <= began;
+    done_before <= done;
+    read_done   <= done != done_before;
+    if (reset) {began, ended} <= '0;
+    if (reset) {read_done, done_before} <= '0;
+  end
+
+  // On the fast clock.
+  logic reset_fast, began_fast, ended_fast, began_before, number, copied, copy;
+  logic start, begins, begun, open, inverted_next, inverted_now, done_fast;
+  logic [14:0] pair;
+  logic [CHANNELS-1:0][1:0] sampled;
+  logic [CHANNELS-1:0] tripped_now, first_now;
+  logic [CHANNELS-1:0][14:0] at_now;
+
+  taxel_synchroniser to_reset (.clk(clk_fast), .from(reset), .to(reset_fast));
+  taxel_synchroniser to_began (.clk(clk_fast), .from(began), .to(began_fast));
+  taxel_synchroniser to_ended (.clk(clk_fast), .from(ended), .to(ended_fast));
+  taxel_synchroniser to_done (.clk, .from(done_fast), .to(done));
+
+  // The counts of a read are copied when it has ended and the samples of its ramp are over, or at the latest when the next
+  // read's begin.
+  assign copy = !copied && ((ended_fast == number && !open && !begun) || begins);
+
+  always_ff @(posedge clk_fast) begin
+    began_before <= began_fast;
+    start        <= began_fast != began_before;
+    if (start) inverted_next <= inverted;
+    if (begins) inverted_now <= inverted_next;
+    sampled <= comparators;
+    if (copy) begin
+      tripped   <= tripped_now;
+      first     <= first_now;
+      at        <= at_now;
+      done_fast <= !done_fast;
+      copied    <= 1'b1;
+    end
+    if (begins) begin
+      number <= !number;
+      copied <= 1'b0;
+    end
+    if (reset_fast) begin
+      {began_before, start, number, done_fast} <= '0;
+      copied <= 1'b1;
+    end
+  end
+
+  taxel_ramp_counter #(.DELAY(DELAY)) counter (
+      .clk_fast,
+      .reset(reset_fast),
+      .start,
+      .length,
+      .ramp,
+      .begins,
+      .begun,
+      .open,
+      .pair
+  );
+
+  for (genvar c = 0; c < CHANNELS; c++) begin : g_column
+    taxel_comparator_column column (
+        .clk_fast,
+        .begun,
+        .open,
+        .pair,
+        .sample(sampled[c] ^ {2{inverted_now}}),
+        .tripped(tripped_now[c]),
+        .first(first_now[c]),
+        .at(at_now[c])
+    );
+  end
+
+endmodule

@@ -1,0 +1,54 @@
+// The queue of events: a ring in block memory, with two registers behind it as its output comes late.
+module taxel_event_fifo #(
+    parameter int DEPTH = 4096,
+    parameter int BITS = 47
+) (
+    input  logic            clk,
+    input  logic            reset,
+    input  logic            push,   // only where not full
+    input  logic [BITS-1:0] entered,
+    output logic            full,
+    output logic            empty,  // nothing is in it, nor on its way to the output
+    output logic            ready,  // the oldest stands at the output
+    output logic [BITS-1:0] oldest,
+    input  logic            pop     // only where ready
+);
+
+  localparam int PLACES = $clog2(DEPTH);
+
+  logic [BITS-1:0] ring[DEPTH];
+  logic [PLACES-1:0] write, read;
+  logic [PLACES:0] waiting;  // in the ring
+  logic [BITS-1:0] fetched;
+  logic fetched_valid, fetch, move;
+
+  assign full  = waiting == (PLACES + 1)'(DEPTH);
+  assign empty = waiting == 0 && !fetched_valid && !ready;
+  assign move  = fetched_valid && (!ready || pop);
+  assign fetch = waiting != 0 && (!fetched_valid || move);
+
+  always_ff @(posedge clk) begin
+    if (push) begin
+      ring[write] <= entered;
+      write       <= write == PLACES'(DEPTH - 1) ? '0 : write + PLACES'(1);
+    end
+    if (fetch) begin
+      fetched <= ring[read];
+      read    <= read == PLACES'(DEPTH - 1) ? '0 : read + PLACES'(1);
+    end
+    waiting <= waiting + (PLACES + 1)'(push) - (PLACES + 1)'(fetch);
+    if (fetch) fetched_valid <= 1'b1;
+    else if (move) fetched_valid <= 1'b0;
+    if (move) oldest <= fetched;
+    if (move) ready <= 1'b1;
+    else if (pop) ready <= 1'b0;
+    if (reset) begin
+      write         <= '0;
+      read          <= '0;
+      waiting       <= '0;
+      fetched_valid <= 1'b0;
+      ready         <= 1'b0;
+    end
+  end
+
+endmodule

@@ -1,0 +1,71 @@
+// Drives one line at a time through a chain of shift registers (74HC164): a single one stands at the place of the line.
+//
+// A later line is reached by shifting on. For an earlier one the old one is shifted out beyond the last line, and a new one in.
+// After reset, and where there are more lines than before, the whole chain is shifted through, as nobody knows what it holds.
+// A pulse takes 2 x HALF clocks, so a jump over n lines settles n pulses later.
+module taxel_line_select #(
+    parameter int COLUMNS = 64,
+    parameter int HALF = 1  // clocks of half a pulse
+) (
+    input  logic       clk,
+    input  logic       reset,
+    input  logic       start,  // of a line
+    input  logic [6:0] line,
+    input  logic [7:0] lines,  // less one
+    output logic       csel_clk,
+    output logic       csel_din
+);
+
+  localparam int HALF_BITS = $clog2(HALF + 1);
+
+  logic [6:0] at;  // which line is selected
+  logic [7:0] known;  // lines less one for which the chain is known to hold a single one
+  logic       unknown;
+  logic [7:0] pulses, insert;  // how many are left, and at which of them the one goes in
+  logic [7:0] out, wanted;
+  logic [HALF_BITS-1:0] left;
+
+  always_comb begin
+    out    = 8'(at) > lines ? 8'd0 : lines + 8'd1 - 8'(at);
+    wanted = 8'(line) + 8'd1;
+    if (unknown || lines > known) wanted = 8'(COLUMNS);
+    else if (line > at) wanted = 8'(line - at);
+    else if (out > wanted) wanted = out;
+  end
+
+  always_ff @(posedge clk) begin
+    if (reset) begin
+      unknown  <= 1'b1;
+      pulses   <= '0;
+      csel_clk <= 1'b0;
+      csel_din <= 1'b0;
+      at       <= '0;
+      known    <= '0;
+      insert   <= '0;
+      left     <= HALF_BITS'(1);
+    end else if (start) begin
+      pulses   <= wanted;
+      insert   <= (!unknown && lines <= known && line > at) ? 8'd0 : 8'(line) + 8'd1;
+      at       <= line;
+      known    <= lines;
+      unknown  <= 1'b0;
+      csel_clk <= 1'b0;
+      csel_din <= 1'b0;
+      left     <= HALF_BITS'(HALF);
+    end else if (left != HALF_BITS'(1)) begin
+      left <= left - HALF_BITS'(1);
+    end else begin
+      left <= HALF_BITS'(HALF);
+      if (csel_clk) begin
+        csel_clk <= 1'b0;
+        csel_din <= 1'b0;
+        pulses   <= pulses - 8'd1;
+      end else if (pulses != 0) begin
+        // The data stand half a pulse before the clock rises, and until it has fallen.
+        if (pulses == insert && !csel_din) csel_din <= 1'b1;
+        else csel_clk <= 1'b1;
+      end
+    end
+  end
+
+endmodule

@@ -1,0 +1,174 @@
+// The scan: which line is driven, which step of it is read, and when the ramp rises.
+//
+// Frame after frame without a pause: each line has STEPS steps, and of each step the last `step_read` is read, after the taxels
+// have settled. `EARLY` clocks before a frame's edge the registers as written are taken for the next frame. All pulses are of
+// one clock; those of a frame's, a line's and a step's start come together.
+module taxel_mux_ctrl
+  import taxel_registers::*;
+  import taxel_types::*;
+#(
+    parameter int COLUMNS = 64,
+    parameter int STEPS = 4,
+    parameter registers_t AT_RESET = '0
+) (
+    input  logic              clk,
+    input  logic              reset,
+    input  registers_t        written,
+    input  logic [2:0]        markers,         // how many wait, and what they mark
+    input  logic [MARKERS-1:0] starts,
+    output logic              markers_taken,
+    output registers_t        active,          // of this frame
+    input  logic [15:0]       stamp,           // of a step that starts now
+    output logic              zero,            // time 0
+    output logic              frame_start,
+    output logic              step_start,
+    output logic              read_start,      // of the ramp and the conversion
+    output logic              step_end,        // which is the end of the read
+    output logic              reading,         // the line's part that is read, a step's part that is read
+    output logic              converting,
+    output read_t             read,            // of this step
+    output logic [2:0]        rsel,
+    output logic              csel_clk,
+    output logic              csel_din
+);
+
+  localparam int EARLY = 16;
+
+  registers_t committed;
+  logic [2:0] committed_markers;
+  logic [MARKERS-1:0] committed_starts;
+  logic [31:0] line_left, reading_left;
+  logic [15:0] step_left, converting_left;
+  logic [7:0] place;
+  logic [6:0] line, next_line;
+  logic [2:0] step;
+  logic line_start, last_line, stepping, early, early_line;
+  logic initial_frame, initial_begun;
+  logic line_over, step_over;
+  logic [7:0] next_lines;
+  logic next_random;
+
+  assign markers_taken = early && last_line;
+  assign line_over = line_left == 32'd1;
+  assign step_over = stepping && step_left == 16'd1;
+
+  always_ff @(posedge clk) begin
+    // Whether this is the last line is known from its second clock on.
+    last_line     <= place == active.lines;
+    early         <= line_left == 32'(EARLY + 1);
+    frame_start   <= 1'b0;
+    line_start    <= 1'b0;
+    step_start    <= 1'b0;
+    zero          <= 1'b0;
+    step_end      <= step_over;
+    read_start    <= stepping && step_left == active.step_read;
+    line_left     <= line_left - 32'd1;
+    if (stepping) step_left <= step_left - 16'd1;
+    if (markers_taken) begin
+      committed         <= written;
+      committed_markers <= markers;
+      committed_starts  <= starts;
+    end
+    if (step_over) begin
+      if (step == 3'(STEPS - 1)) begin
+        stepping <= 1'b0;
+      end else begin
+        step       <= step + 3'd1;
+        step_left  <= active.step_period;
+        step_start <= 1'b1;
+      end
+    end
+    if (line_over) begin
+      line_start <= 1'b1;
+      step_start <= 1'b1;
+      stepping   <= 1'b1;
+      step       <= '0;
+      line       <= next_line;
+      if (last_line) begin
+        frame_start   <= 1'b1;
+        zero          <= initial_frame && initial_begun;
+        initial_frame <= initial_frame && !initial_begun;
+        initial_begun <= 1'b1;
+        place         <= '0;
+        active        <= committed;
+        line_left     <= committed.line_period;
+        step_left     <= committed.step_period;
+      end else begin
+        place     <= place + 8'd1;
+        line_left <= active.line_period;
+        step_left <= active.step_period;
+      end
+    end
+    if (reset) begin
+      // As at the end of a frame of one line.
+      active         <= AT_RESET;
+      active.lines   <= '0;
+      place          <= '0;
+      line_left      <= 32'(EARLY + 4);
+      stepping       <= 1'b0;
+      step           <= '0;
+      line           <= '0;
+      step_left      <= 16'd0;
+      initial_frame  <= 1'b1;
+      initial_begun <= 1'b0;
+    end
+  end
+
+  // The debug signal of the line's read: it ends with `line_read`.
+  assign reading = reading_left != 0;
+  assign converting = converting_left != 0;
+  always_ff @(posedge clk) begin
+    if (line_start) reading_left <= active.line_read;
+    else if (reading_left != 0) reading_left <= reading_left - 32'd1;
+    if (read_start) converting_left <= active.step_read;
+    else if (converting_left != 0) converting_left <= converting_left - 16'd1;
+    if (reset) begin
+      reading_left    <= '0;
+      converting_left <= '0;
+    end
+  end
+
+  // What holds for a step is latched when it starts: its conversion ends when the scan has moved on.
+  always_ff @(posedge clk) begin
+    if (step_start) begin
+      read.initial_frame <= initial_frame;
+      read.frame_first   <= frame_start;
+      read.frame_last    <= place == active.lines && step == 3'(STEPS - 1);
+      read.line          <= line;
+      read.step          <= step;
+      read.stamp         <= stamp;
+      read.ramp          <= active.ramp;
+      read.noise_floor   <= active.noise_floor;
+      read.markers       <= committed_markers;
+      read.starts        <= committed_starts;
+    end
+    rsel <= step;
+  end
+
+  assign next_lines  = last_line ? committed.lines : active.lines;
+  assign next_random = last_line ? committed.random_lines : active.random_lines;
+
+  taxel_random_lines order (
+      .clk,
+      .reset,
+      .next(early_line),
+      .first(last_line),
+      .random(next_random),
+      .lines(next_lines),
+      .line(next_line)
+  );
+
+  // One clock after the registers of the next frame are taken.
+  always_ff @(posedge clk) early_line <= early && !reset;
+
+  taxel_line_select #(.COLUMNS(COLUMNS)) select (
+      .clk,
+      .reset,
+      .start(line_start),
+      .line,
+      .lines(active.lines),
+      .csel_clk,
+      .csel_din
+  );
+
+endmodule

@@ -1,0 +1,100 @@
+// The registers as written, behind the rules of registers.toml: a write that breaks one changes nothing.
+//
+// Every command is answered. One that finds no room for its answer is refused, and counted.
+module taxel_register_file
+  import taxel_registers::*;
+  import taxel_types::*;
+#(
+    parameter int COLUMNS = 64,
+    parameter int ROWS = 64,
+    parameter int CHANNELS = 16,
+    parameter int STEPS = 4,
+    parameter registers_t AT_RESET = '0
+) (
+    input  logic               clk,
+    input  logic               reset,
+    input  logic               command,
+    input  logic [2:0]         number,
+    input  logic [31:0]        value,
+    output logic               answer,       // to a command: one clock
+    output answer_t            answered,
+    input  logic               room,         // for an answer
+    output logic               refused_full, // a command found none
+    output registers_t         written,
+    output logic [2:0]         markers,      // starts and stops of recordings that wait for a frame
+    output logic [MARKERS-1:0] starts,
+    input  logic               markers_taken,
+    output logic               marker_lost
+);
+
+  registers_t changed;
+  logic begun, checked;
+  logic [2:0] n;
+  logic [31:0] word_written;
+  logic reserved;
+  logic [3:0] rule;
+  logic reads, greets;
+
+  // What this build does not have: FA-1 and version 2 of the wire.
+  function automatic logic lacking(registers_t r);
+    return r.mechanoreceptor || r.wire_version != 2'd0;
+  endfunction
+
+  always_ff @(posedge clk) begin
+    // The command as it came; the registers as they would be.
+    begun        <= command && room;
+    refused_full <= command && !room;
+    n            <= number;
+    word_written <= value;
+    changed      <= store(written, number, value);
+    reserved     <= (value & ~mask(number)) != 0;
+    reads        <= number == 3'd6 && value < 32'd8;
+    greets       <= number == 3'd6 && value == 32'd8;
+    // What is wrong with them.
+    checked <= begun;
+    rule    <= reserved || lacking(changed) ? 4'd4 : refused(changed, STEPS, COLUMNS, ROWS, CHANNELS);
+    // The answer.
+    answer            <= checked;
+    answered.number <= n;
+    answered.value    <= word_written;
+    answered.kind     <= rule == 4'd0 ? ANSWER_OK : ANSWER_BAD;
+    if (reads) begin
+      answered.number <= word_written[2:0];
+      answered.value    <= word(written, word_written[2:0]);
+      answered.kind     <= ANSWER_OK;
+    end else if (greets) begin
+      answered.kind <= ANSWER_GREETING;
+    end else if (rule != 4'd0) begin
+      answered.value <= 32'(rule);
+    end
+    if (checked && !reads && !greets && rule == 4'd0) written <= changed;
+    if (reset) begin
+      {begun, checked, answer, refused_full} <= '0;
+      written <= AT_RESET;
+    end
+  end
+
+  // Starts and stops, the oldest in bit 0, until the scan takes them for a frame.
+  logic marks;
+  logic [2:0] still;
+  assign marks  = checked && !reads && !greets && rule == 4'd0 && changed.record != written.record;
+  assign still = markers_taken ? 3'd0 : markers;
+
+  always_ff @(posedge clk) begin
+    marker_lost <= 1'b0;
+    markers     <= still;
+    if (marks) begin
+      if (still == 3'(MARKERS)) begin
+        marker_lost <= 1'b1;
+      end else begin
+        markers <= still + 3'd1;
+        starts[still[1:0]] <= changed.record;
+      end
+    end
+    if (reset) begin
+      markers     <= '0;
+      marker_lost <= 1'b0;
+    end
+  end
+
+endmodule

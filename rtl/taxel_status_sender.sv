@@ -1,0 +1,200 @@
+// Status lines in ASCII: the greeting, the answers to commands, and which faults there were.
+//
+// A fault line gives the count since reset. Lines of faults come unasked, at most once in FAULT_CLOCKS, where no answer waits.
+module taxel_status_sender
+  import taxel_types::*;
+#(
+    parameter int COLUMNS = 64,
+    parameter int ROWS = 64,
+    parameter int CHANNELS = 16,
+    parameter int FAULT_CLOCKS = 1_000_000
+) (
+    input  logic       clk,
+    input  logic       reset,
+    input  logic [1:0] version,    // of the wire that is spoken
+    input  logic       ready,      // an answer waits
+    input  answer_t    oldest,
+    output logic       pop,
+    input  logic       queue_lost,    // one event or marker more
+    input  logic       queue_lost_2,  // and one more
+    input  logic       not_returned,
+    input  logic [2:0] skipped,       // so many bytes more
+    input  logic       refused,       // one command more
+    output logic       valid,      // a byte for the serial line
+    output logic [7:0] data,
+    input  logic       taken
+);
+
+  // The counts, by fault: queue, comparator, command; and as they were given last.
+  logic [COUNT_BITS-1:0] counts[3], given[3];
+
+  always_ff @(posedge clk) begin
+    counts[0] <= counts[0] + COUNT_BITS'(queue_lost) + COUNT_BITS'(queue_lost_2);
+    counts[1] <= counts[1] + COUNT_BITS'(not_returned);
+    counts[2] <= counts[2] + COUNT_BITS'(skipped) + COUNT_BITS'(refused);
+    if (reset) for (int k = 0; k < 3; k++) counts[k] <= '0;
+  end
+
+  typedef enum logic [1:0] {
+    IDLE,
+    DIGITS,   // a count becomes digits, a bit a clock
+    SENDING
+  } state_t;
+
+  state_t state;
+  logic fault;           // the line is of a fault
+  logic greeted;
+  logic [1:0] which;     // fault
+  logic [2:0] look;      // which faults are still to be looked at
+  answer_t line;
+  logic [5:0] at;        // character of the line
+  logic [COUNT_BITS-1:0] bits;
+  logic [5:0] bits_left;
+  logic [COUNT_DIGITS-1:0][3:0] digits;
+  logic look_again;
+
+  taxel_clock_div #(.PERIOD(FAULT_CLOCKS)) pace (.clk, .restart(reset), .pulse(look_again));
+
+  function automatic logic [7:0] hex(logic [3:0] digit);
+    return digit < 4'd10 ? 8'h30 + 8'(digit) : 8'h37 + 8'(digit);
+  endfunction
+
+  function automatic logic [COUNT_DIGITS-1:0][3:0] doubled(logic [COUNT_DIGITS-1:0][3:0] of, logic carry);
+    logic [COUNT_DIGITS-1:0][3:0] sum;
+    for (int k = 0; k < COUNT_DIGITS; k++) sum[k] = of[k] >= 4'd5 ? of[k] + 4'd3 : of[k];
+    return {sum[COUNT_DIGITS-1:0]} << 1 | (4 * COUNT_DIGITS)'(carry);
+  endfunction
+
+  // A number of at most three digits, of the array or its channels: its digits from the left.
+  function automatic logic [7:0] numeral(int number, logic [5:0] k);
+    int digits_of;
+    digits_of = number >= 100 ? 3 : number >= 10 ? 2 : 1;
+    if (32'(k) >= digits_of) return 8'd0;
+    case (digits_of - 1 - 32'(k))
+      0: return 8'h30 + 8'(number % 10);
+      1: return 8'h30 + 8'(number / 10 % 10);
+      default: return 8'h30 + 8'(number / 100);
+    endcase
+  endfunction
+
+  // The characters of each line; 0 is none, and is left out.
+  localparam logic [0:12][7:0] BOARD = "taxel-board v";
+  localparam logic [0:2][7:0] OK = "ok ";
+  localparam logic [0:3][7:0] BAD = "bad ";
+  localparam logic [0:2][7:0] REG = "REG";
+  localparam logic [0:5][7:0] RULE = " rule ";
+  localparam logic [0:5][7:0] FAULT = "fault ";
+  localparam logic [0:2][0:10][7:0] NAMES = {"queue ", 40'd0, "comparator ", "command ", 24'd0};
+  logic [7:0] character;
+  logic last;
+  logic zeros;  // only zeros so far
+
+  always_comb begin
+    character = 8'd0;
+    last = 1'b0;
+    if (fault) begin
+      if (at < 6'd6) character = FAULT[at[2:0]];
+      else if (at < 6'd17) character = NAMES[which][4'(at - 6'd6)];
+      else if (at < 6'd17 + 6'(COUNT_DIGITS)) begin
+        if (digits[COUNT_DIGITS-1] != 0 || !zeros || at == 6'd16 + 6'(COUNT_DIGITS))
+          character = hex(digits[COUNT_DIGITS-1]);
+      end else last = 1'b1;
+    end else begin
+      case (line.kind)
+        ANSWER_GREETING: begin
+          if (at < 6'd13) character = BOARD[at[3:0]];
+          else if (at == 6'd13) character = 8'h31 + 8'(version);
+          else if (at == 6'd14) character = " ";
+          else if (at < 6'd18) character = numeral(ROWS, at - 6'd15);
+          else if (at == 6'd18) character = "x";
+          else if (at < 6'd22) character = numeral(COLUMNS, at - 6'd19);
+          else if (at == 6'd22) character = " ";
+          else if (at < 6'd26) character = numeral(CHANNELS, at - 6'd23);
+          else if (at == 6'd26) character = "c";
+          else if (at == 6'd27) character = "h";
+          else last = 1'b1;
+        end
+        ANSWER_OK: begin
+          if (at < 6'd3) character = OK[at[1:0]];
+          else if (at < 6'd6) character = REG[2'(at - 6'd3)];
+          else if (at == 6'd6) character = hex({1'b0, line.number});
+          else if (at == 6'd7) character = "=";
+          else if (at == 6'd8) character = "0";
+          else if (at == 6'd9) character = "x";
+          else if (at < 6'd18) character = hex(line.value[31:28]);
+          else last = 1'b1;
+        end
+        default: begin
+          if (at < 6'd4) character = BAD[at[1:0]];
+          else if (at < 6'd7) character = REG[2'(at - 6'd4)];
+          else if (at == 6'd7) character = hex({1'b0, line.number});
+          else if (at < 6'd14) character = RULE[3'(at - 6'd8)];
+          else if (at == 6'd14) character = hex(line.value[3:0]);
+          else last = 1'b1;
+        end
+      endcase
+    end
+    if (last) character = 8'h0A;
+  end
+
+  assign valid = state == SENDING && character != 8'd0;
+  assign data  = character;
+  assign pop   = state == IDLE && greeted && ready;
+
+  always_ff @(posedge clk) begin
+    if (look_again) look <= 3'b111;
+    case (state)
+      IDLE: begin
+        at    <= '0;
+        zeros <= 1'b1;
+        fault <= 1'b0;
+        if (!greeted) begin
+          greeted   <= 1'b1;
+          line.kind <= ANSWER_GREETING;
+          state     <= SENDING;
+        end else if (ready) begin
+          line  <= oldest;
+          state <= SENDING;
+        end else if (look != 0) begin
+          // One fault a clock.
+          which <= look[0] ? 2'd0 : look[1] ? 2'd1 : 2'd2;
+          look  <= look & (look - 3'd1);
+          for (int k = 2; k >= 0; k--) begin
+            if (look[k] && (look & 3'((1 << k) - 1)) == 0 && counts[k] != given[k]) begin
+              fault     <= 1'b1;
+              bits      <= counts[k];
+              given[k]  <= counts[k];
+              digits    <= '0;
+              bits_left <= 6'(COUNT_BITS);
+              state     <= DIGITS;
+            end
+          end
+        end
+      end
+      DIGITS: begin
+        digits    <= doubled(digits, bits[COUNT_BITS-1]);
+        bits      <= bits << 1;
+        bits_left <= bits_left - 6'd1;
+        if (bits_left == 6'd1) state <= SENDING;
+      end
+      default: begin
+        if (taken || character == 8'd0) begin
+          at <= at + 6'd1;
+          if (!fault && line.kind == ANSWER_OK && at >= 6'd10) line.value <= line.value << 4;
+          if (fault && at >= 6'd17) begin
+            if (character != 8'd0) zeros <= 1'b0;
+            digits <= digits << 4;
+          end
+          if (last) state <= IDLE;
+        end
+      end
+    endcase
+    if (reset) begin
+      state   <= IDLE;
+      greeted <= 1'b0;
+      look    <= '0;
+      for (int k = 0; k < 3; k++) given[k] <= '0;
+    end
+  end
+
+endmodule

@@ -1,0 +1,42 @@
+// Bytes from the serial line: 8 bits, no parity, one stop bit, CLOCKS clocks a bit. The line is of no clock.
+module taxel_uart_rx #(
+    parameter int CLOCKS = 868
+) (
+    input  logic       clk,
+    input  logic       reset,
+    input  logic       rx,
+    output logic       valid,
+    output logic [7:0] data
+);
+
+  localparam int BITS = $clog2(CLOCKS + CLOCKS / 2 + 1);
+
+  logic line, busy;
+  logic [BITS-1:0] left;
+  logic [3:0] bits;  // how many are still to come, with the stop bit
+
+  taxel_synchroniser settle (.clk, .from(rx), .to(line));
+
+  always_ff @(posedge clk) begin
+    valid <= 1'b0;
+    left  <= left - BITS'(1);
+    if (!busy) begin
+      // From the start bit's edge to the middle of the first bit.
+      left <= BITS'(CLOCKS + CLOCKS / 2 - 1);
+      bits <= 4'd9;
+      busy <= !line;
+    end else if (left == BITS'(1)) begin
+      left <= BITS'(CLOCKS);
+      bits <= bits - 4'd1;
+      if (bits == 4'd1) begin
+        busy  <= 1'b0;
+        // Without a stop bit it is no byte.
+        valid <= line;
+      end else begin
+        data <= {line, data[7:1]};
+      end
+    end
+    if (reset) {busy, valid} <= '0;
+  end
+
+endmodule

@@ -1,0 +1,163 @@
+"""Whole frames of the simulated logic, datagram by datagram against the emulated board."""
+
+import numpy as np
+import pytest
+
+from pair import Pair, answers
+from taxel.simulate import NOT_RETURNED
+from taxel.wire import Command, Decoder, Registers
+
+#: Columns, rows, channels, and what a value is compared with.
+BUILDS = [(8, 8, 16, "last_sent"), (5, 7, 16, "last_sample"), (9, 64, 16, "last_sent"), (3, 20, 64, "last_sent")]
+
+
+def pressures(rng: np.random.Generator, pair: Pair, before: np.ndarray) -> np.ndarray:
+    """Return trip times of the next frame: some move, by little or by much, or to the edges of the ramp."""
+    ramp = pair.board.registers.ramp
+    ticks = before.copy()
+    moves = rng.random(ticks.shape) < rng.choice([0.0, 0.05, 0.5, 1.0])
+    near = np.clip(ticks.astype(int) + rng.integers(-6, 7, ticks.shape), 0, 65_534)
+    drawn = rng.choice([0, 1, 2, ramp - 1, ramp, ramp + 1, ramp + 2, 60_000], ticks.shape)
+    far = rng.integers(0, ramp + 1, ticks.shape)
+    chosen = np.where(rng.random(ticks.shape) < 0.5, near, np.where(rng.random(ticks.shape) < 0.2, drawn, far))
+    ticks[moves] = chosen.clip(0, 65_534)[moves]
+    ticks[rng.random(ticks.shape) < 0.01] = NOT_RETURNED
+    return ticks
+
+
+def write(rng: np.random.Generator, pair: Pair) -> bytes:
+    """Return a command: a register of a set that holds all rules, a bit of one that was flipped, or a read."""
+    held = pair.board.registers
+    kind = rng.choice(["timing", "floor", "flags", "record", "nonsense", "read"])
+    if kind == "record":
+        return Command(7, int(rng.integers(0, 2)) << 16).to_bytes()
+    if kind == "floor":
+        lines = int(rng.integers(0, pair.array.columns + 1))
+        return Command(5, lines << 16 | int(rng.choice([0, 1, 3, 10, 255])) << 8).to_bytes()
+    if kind == "flags":
+        return Command(0, int(rng.choice([0, 4, 8, 12]))).to_bytes()
+    if kind == "read":
+        return Command(6, int(rng.integers(0, 10))).to_bytes()
+    if kind == "nonsense":
+        # Not the high bits of the line's period: frames would last for minutes.
+        number = int(rng.choice([1, 2, 3, 4, 5, 7]))
+        return Command(number, held.words[number] ^ 1 << int(rng.integers(0, 9 if number == 1 else 32))).to_bytes()
+    least = held.channels + 10
+    step_period = int(rng.integers(least, 2 * least))
+    step_read = step_period - int(rng.choice([1, 2, 20, 20, least - 1, 0]))
+    steps = -(-max(pair.array.rows, 64) // held.channels)
+    line_read = steps * step_period + int(rng.integers(0, 40))
+    line_period = line_read + int(rng.choice([0, 1, 17, 300]))
+    ramp = int(rng.choice([1, 2, 3 * step_read - 1, rng.integers(1, max(2, 3 * step_read))]))
+    number = int(rng.integers(1, 5))
+    values = {1: line_period, 2: line_read, 3: max(step_read, 1) << 16 | step_period, 4: ramp}
+    return Command(number, values[number]).to_bytes()
+
+
+def clocks(registers: Registers) -> int:
+    return round(registers.frame_us * 100)
+
+
+@pytest.mark.parametrize(("columns", "rows", "channels", "previous"), BUILDS)
+def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(columns, rows, channels, previous):
+    rng = np.random.default_rng([columns, rows, channels])
+    pair = Pair(columns, rows, channels, previous=previous, seed=int(rng.integers(1, 1000)))
+    ticks = np.zeros(pair.array.shape, np.uint16)
+    for _ in range(200):
+        ticks = pressures(rng, pair, ticks)
+        registers = pair.board.registers
+        command = write(rng, pair) if pair.answered and rng.random() < 0.7 else b""
+        if command and not settles(pair, command):
+            command = b""
+        pair.frame(ticks, command, int(rng.integers(0, clocks(registers))) if command else 0)
+    pair.finish()
+    assert not pair.logic.call("shared")
+    assert pair.received == pair.expected
+    assert sum(map(len, pair.received)) > 2_000
+    assert answers(pair.serial) == pair.answers
+    assert pair.answers.count("bad") > 0
+    assert pair.answers.count("ok") > 3
+    assert last_faults(pair.serial) == last_faults(pair.board.faults())
+    assert last_faults(pair.serial)["comparator"] > 0
+
+
+def settles(pair: Pair, command: bytes) -> bool:
+    """Return whether the analogue side can follow a write.
+
+    The ramp must fall for one clock at least: to a comparator one that does not fall is no second one. And where there
+    are more lines than before, the whole chain is shifted through once before line 0 is read.
+    """
+    written, held = Command.from_bytes(command), pair.board.registers
+    if written.register == 3:
+        return (written.value >> 16) < written.value & 0xFFFF
+    more = written.register == 5 and (written.value >> 16 & 0xFF) + 1 > held.lines
+    return not more or round((held.step_period - held.step_read) * 100) > 2 * pair.array.columns + 4
+
+
+def last_faults(lines: str) -> dict[str, int]:
+    return {line.split()[1]: int(line.split()[2]) for line in lines.splitlines() if line.startswith("fault")}
+
+
+@pytest.mark.parametrize("intensity", ["difference", "nothing"])
+def test_the_intensity_word_is_as_chosen(intensity):
+    rng = np.random.default_rng(5)
+    pair = Pair(8, 8, intensity=intensity)
+    ticks = np.zeros((8, 8), np.uint16)
+    for _ in range(60):
+        ticks = pressures(rng, pair, ticks)
+        pair.frame(ticks)
+    pair.finish()
+    assert pair.received == pair.expected
+    assert len(pair.received) > 20
+
+
+def test_a_slow_link_changes_no_byte():
+    rng = np.random.default_rng(6)
+    pair = Pair(8, 8, QUEUE=4096)
+    pair.logic.call("link", 30)
+    ticks = np.zeros((8, 8), np.uint16)
+    for _ in range(100):
+        ticks = pressures(rng, pair, ticks)
+        pair.frame(ticks)
+    pair.logic.call("link", 256)
+    pair.finish()
+    assert pair.received == pair.expected
+    assert "fault queue" not in pair.serial
+
+
+def test_a_full_frame_of_64_by_64_goes_without_a_loss():
+    pair = Pair(64, 64)
+    still = np.zeros((64, 64), np.uint16)
+    pair.frame(still)
+    pair.frame(still + 100)
+    for _ in range(4):
+        pair.frame(still + 100)
+    assert pair.received == pair.expected
+    decoder = Decoder()
+    events = [decoder.push(datagram) for datagram in pair.received]
+    assert sum(map(len, events)) == 4096
+    assert "fault queue" not in pair.serial
+
+
+def test_what_finds_no_room_is_dropped_counted_and_sent_later():
+    pair = Pair(8, 8, QUEUE=16)
+    pair.logic.call("link", 0)
+    still = np.full((8, 8), 50, np.uint16)
+    pair.logic.ticks(still)
+    pair.logic.edge()
+    pair.logic.run(1000)
+    pair.logic.call("link", 256)
+    pair.logic.run(1000)
+    pair.logic.ticks(still)
+    pair.logic.edge()
+    pair.logic.edge()
+    pair.logic.run(6000)
+    decoder = Decoder()
+    events = [decoder.push(datagram) for datagram in pair.logic.datagrams()]
+    places = [place for part in events for place in zip(part.x.tolist(), part.y.tolist(), strict=True)]
+    assert len(places) == len(set(places)) == 64
+    # The queue, its two registers and the packer's own are full before the rest of the frame is lost.
+    kept = 16 + 2 + 1
+    order = [(x, 4 * channel + step) for x in range(8) for step in range(4) for channel in range(2)]
+    assert places[:kept] == order[:kept]
+    assert last_faults(pair.logic.serial())["queue"] >= 64 - kept

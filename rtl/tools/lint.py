@@ -1,0 +1,42 @@
+"""Lint the RTL with Verilator, every warning an error; where Verilator is not installed, say so.
+
+Usage: python rtl/tools/lint.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+
+from logic import PACKAGES, QUIET, RTL, run, verilator
+
+#: Builds that differ in what is elaborated.
+BUILDS: tuple[dict[str, int], ...] = (
+    {},
+    {"CHANNELS": 64},
+    {"COLUMNS": 5, "ROWS": 7, "PREVIOUS_SAMPLE": 1, "DIFFERENCE": 1, "VALUED": 0},
+)
+
+
+def main() -> int:
+    """Lint each build; return the exit status."""
+    if verilator() is None:
+        print("rtl: not linted, as Verilator is not installed: make rtl-tools")
+        return 0
+    for build in BUILDS:
+        options = [f"-G{name}={value}" for name, value in build.items()]
+        sources = [RTL / name for name in (*PACKAGES, "taxel_top.sv")]
+        try:
+            run(
+                "verilator", "--lint-only", "-Wall", *QUIET, f"-I{RTL}", "--top-module", "taxel_top", *options, *sources
+            )
+        except RuntimeError as error:
+            print(error)
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

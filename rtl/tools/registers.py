@@ -1,0 +1,204 @@
+"""Write the RTL's package of registers, `rtl/taxel_registers.sv`, from registers.toml.
+
+Usage: python rtl/tools/registers.py [TO]. A test compares the file with what this makes.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+HEAD = "// Made from registers.toml by rtl/tools/registers.py (`make rtl-registers`): edit that.\n"
+#: Bits of the arithmetic in rules: 8 steps of 16 bits, and counts of 32 bits, fit.
+WIDTH = 40
+COMPARED = {ast.LtE: "<=", ast.Lt: "<", ast.GtE: ">=", ast.Gt: ">", ast.Eq: "==", ast.NotEq: "!="}
+OPERATOR = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
+
+Table = dict[str, Any]
+
+
+def read(path: Path) -> Table:
+    """Return the source with every value filled in."""
+    source = tomllib.loads(path.read_text())
+    for field in source["field"]:
+        field.setdefault("offset", 0)
+        field.setdefault("least", field["offset"])
+        field.setdefault("greatest", 2 ** field["bits"] - 1 + field["offset"])
+    for rule in source["rule"]:
+        rule.setdefault("warns", False)
+    return source
+
+
+def held(source: Table) -> list[Table]:
+    """Return the fields that lie in a register."""
+    return [field for field in source["field"] if "register" in field]
+
+
+def arithmetic(node: ast.expr, fields: dict[str, Table]) -> str:
+    """Write an expression of a rule in `WIDTH` bits."""
+    match node:
+        case ast.Name(id=name) if name in fields:
+            offset = fields[name]["offset"]
+            wide = f"{WIDTH}'(r.{name})"
+            return f"({wide} + {WIDTH}'d{offset})" if offset else wide
+        case ast.Name(id=name):
+            return f"{WIDTH}'({name})"
+        case ast.Constant(value=number):
+            return f"{WIDTH}'d{number}"
+        case ast.BinOp(left=left, op=op, right=right):
+            return f"({arithmetic(left, fields)} {OPERATOR[type(op)]} {arithmetic(right, fields)})"
+    raise ValueError(f"registers.toml: {ast.unparse(node)} is no arithmetic")
+
+
+def condition(node: ast.expr, fields: dict[str, Table]) -> str:
+    """Write what a rule demands."""
+    match node:
+        case ast.BoolOp(op=op, values=values):
+            word = " && " if isinstance(op, ast.And) else " || "
+            return "(" + word.join(condition(part, fields) for part in values) + ")"
+        case ast.Compare(left=left, ops=[op], comparators=[right]):
+            return f"({arithmetic(left, fields)} {COMPARED[type(op)]} {arithmetic(right, fields)})"
+    raise ValueError(f"registers.toml: {ast.unparse(node)} is no comparison")
+
+
+def struct(source: Table) -> str:
+    """Write the struct: what the bits of each field hold."""
+    rows = []
+    for field in held(source):
+        kind = "logic" if field["bits"] == 1 else f"logic [{field['bits'] - 1}:0]"
+        text = field["text"] + (f" The bits hold {field['offset']} less." if field["offset"] else "")
+        rows.append(f"    // {text}\n    {kind} {field['name']};")
+    return "  typedef struct packed {\n" + "\n".join(rows) + "\n  } registers_t;\n"
+
+
+def words(source: Table) -> str:
+    """Write how fields lie in the eight words."""
+    reads, masks, stores = [], [], []
+    for n in range(8):
+        here = [field for field in held(source) if field["register"] == n]
+        if not here:
+            continue
+        parts = []
+        for f in here:
+            high, low, name = f["low"] + f["bits"] - 1, f["low"], f["name"]
+            parts.append(f"(32'(r.{name}) << {low})" if low else f"32'(r.{name})")
+            where = f"[{low}]" if f["bits"] == 1 else f"[{high}:{low}]"
+            stores.append((n, f"{name} = value{where};"))
+        mask = sum((2 ** f["bits"] - 1) << f["low"] for f in here)
+        reads.append(f"      3'd{n}: return {' | '.join(parts)};")
+        masks.append(f"      3'd{n}: return 32'h{mask:08X};")
+    blocks = []
+    for n in sorted({n for n, _ in stores}):
+        rows = "\n".join(f"        changed.{row}" for m, row in stores if m == n)
+        blocks.append(f"      3'd{n}: begin\n{rows}\n      end")
+    newline = "\n"
+    return f"""
+  // What register n holds; 0 where there is no such field.
+  function automatic logic [31:0] word(registers_t r, logic [2:0] n);
+    case (n)
+{newline.join(reads)}
+      default: return 32'd0;
+    endcase
+  endfunction
+
+  // Which bits register n has; the others are reserved and must be 0.
+  function automatic logic [31:0] mask(logic [2:0] n);
+    case (n)
+{newline.join(masks)}
+      default: return 32'd0;
+    endcase
+  endfunction
+
+  // The registers with one of them set, whatever the rules say.
+  function automatic registers_t store(registers_t r, logic [2:0] n, logic [31:0] value);
+    registers_t changed;
+    changed = r;
+    case (n)
+{newline.join(blocks)}
+      default: ;
+    endcase
+    return changed;
+  endfunction
+"""
+
+
+def rules(source: Table) -> str:
+    """Write the rules that refuse, as the number of the first that is broken."""
+    fields = {field["name"]: field for field in held(source)}
+    rows = []
+    for name, f in fields.items():
+        if f["least"] > f["offset"]:
+            rows.append(f"    if ({arithmetic(ast.Name(name), fields)} < {WIDTH}'d{f['least']}) return 4'd4;")
+        if f["greatest"] < 2 ** f["bits"] - 1 + f["offset"]:
+            rows.append(f"    if ({arithmetic(ast.Name(name), fields)} > {WIDTH}'d{f['greatest']}) return 4'd4;")
+    for rule in source["rule"]:
+        if not rule["warns"]:
+            demanded = condition(ast.parse(rule["holds"], mode="eval").body, fields)
+            rows.append(f"    if (!{demanded}) return 4'd{rule['number']};")
+    newline = "\n"
+    return f"""
+  // The number of the first rule that refuses these registers; 0: none.
+  function automatic logic [3:0] refused(registers_t r, int steps, int driven_lines, int sense_lines, int channels);
+{newline.join(rows)}
+    return 4'd0;
+  endfunction
+"""
+
+
+def at_reset(source: Table) -> str:
+    """Write what a build holds at reset: the first preset of its size and channels."""
+    cases = []
+    for large in (True, False):
+        for channels in (16, 64):
+            fitting = [
+                p["values"]
+                for p in source["preset"]
+                if (p["sense_lines"] > 64) == large and p["values"].get("channels", 16) == channels
+            ]
+            values = []
+            for f in held(source):
+                value = fitting[0].get(f["name"], f["default"])
+                values.append(f"{f['name']}: {f['bits']}'d{value - f['offset']}")
+            chosen = ("is_large" if large else "!is_large") + f" && channels == {channels}"
+            body = ",\n          ".join(values)
+            cases.append(f"    if ({chosen})\n      r = '{{\n          {body}}};")
+    newline = "\n"
+    lines = next(f for f in held(source) if f["name"] == "lines")
+    return f"""
+  // What a build holds at reset; beyond 64 lines the lines' times are fitted to its steps.
+  function automatic registers_t at_reset(int steps, int driven_lines, int sense_lines, int channels);
+    registers_t r;
+    logic is_large;
+    is_large = driven_lines > 64 || sense_lines > 64;
+    r = '0;
+{newline.join(cases)}
+    r.lines = {lines["bits"]}'(driven_lines - {lines["offset"]});
+    if (is_large) begin
+      if (r.line_read < 32'(steps) * 32'(r.step_period)) r.line_read = 32'(steps) * 32'(r.step_period);
+      if (r.line_period < r.line_read) r.line_period = r.line_read;
+    end
+    return r;
+  endfunction
+"""
+
+
+def package(source: Table) -> str:
+    """Write the whole package."""
+    return (
+        f"{HEAD}// What the board's registers hold, how they lie in words, and the rules that they obey.\n"
+        f"package taxel_registers;\n\n{struct(source)}{words(source)}{rules(source)}{at_reset(source)}\nendpackage\n"
+    )
+
+
+def main() -> None:
+    """Write the package."""
+    to = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "rtl" / "taxel_registers.sv"
+    to.write_text(package(read(ROOT / "registers.toml")))
+
+
+if __name__ == "__main__":
+    main()

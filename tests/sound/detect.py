@@ -1,0 +1,125 @@
+"""Sound calls of `taxel.detect`."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import taxel
+from sound.things import ARRAY, FOUND, FRAMES, LEVELS, TARE, Sound, fresh, method, plain
+
+READOUT = taxel.Readout(LEVELS, {"a": (taxel.Neuron(tau=2.0), [0.5] * 32)}, array=ARRAY)
+RECIPE = taxel.detect.Recipe(LEVELS, {"tau": 5.0}, {"a": {"ub": 1.0}})
+EXAMPLE = taxel.detect.Example(taxel.Frames(np.eye(4)[:, :, None] * np.ones(4), [0, 9000, 18000, 27000]), {"a": [9000]})
+
+
+def read_out() -> taxel.detect.ReadoutStream:
+    return READOUT.stream()
+
+
+def judged(folds: Any) -> taxel.detect.Judged:
+    folds = folds if isinstance(folds, int) else [folds]
+    return taxel.detect.judge([EXAMPLE, EXAMPLE], RECIPE, folds)
+
+
+#: A sound call of everything public that takes anything, by its full name.
+SOUND: dict[str, Sound] = {
+    "taxel.Readout": plain(
+        taxel.Readout,
+        encoder=LEVELS,
+        neurons=READOUT.neurons,
+        array=ARRAY,
+        delay_ms={"a": 1.0},
+        run_threshold=0.9,
+        delays_ms=[0.0],
+    ),
+    "taxel.Readout.to_nir": method(READOUT, "to_nir", path="readout.nir", spike_ms=0.1, overwrite=True),
+    "taxel.Readout.from_nir": plain(
+        taxel.Readout.from_nir, path="here.nir", encoder=LEVELS, neuron=taxel.Neuron(), spike_ms=0.1
+    ),
+    "taxel.Readout.from_json": plain(taxel.Readout.from_json, text=READOUT.to_json()),
+    "taxel.Readout.save": method(READOUT, "save", path="readout.json", overwrite=True),
+    "taxel.Readout.load": plain(taxel.Readout.load, path="here_readout.json"),
+    "taxel.Readout.stream": method(READOUT, "stream", array=ARRAY, frame_us=192.0, tare=TARE, wire_version=2),
+    "taxel.detect.ReadoutStream": plain(
+        taxel.detect.ReadoutStream, readout=READOUT, array=ARRAY, frame_us=192.0, tare=TARE, wire_version=2
+    ),
+    "taxel.detect.ReadoutStream.push": fresh(read_out, "push", x=FRAMES),
+    "taxel.detect.ReadoutStream.advance": fresh(read_out, "advance", t_us=5),
+    "taxel.detect.run": plain(
+        taxel.detect.run, readout=READOUT, source=FRAMES, frame_us=192.0, tare=TARE, wire_version=2
+    ),
+    "taxel.detect.score": plain(taxel.detect.score, found=FOUND, truth={"a": [10], "b": [25]}, window_ms=50.0),
+    "taxel.detect.Spread.of": plain(taxel.detect.Spread.of, values=[1.0, 2.0]),
+    "taxel.detect.Recipe": plain(
+        taxel.detect.Recipe,
+        encoder=LEVELS,
+        learner={"tau": 5.0},
+        neurons={"a": {"ub": 1.0}},
+        run_threshold=1.0,
+        about="a touch",
+        source="made here",
+    ),
+    "taxel.detect.Recipe.learner_of": method(RECIPE, "learner_of", label="a"),
+    "taxel.detect.Recipe.from_dict": plain(taxel.detect.Recipe.from_dict, values={"encoder": {"name": "fa1"}}),
+    "taxel.detect.Recipe.load": plain(
+        taxel.detect.Recipe.load, recipe="here.toml", changes={"learner.tau": 5.0}, labels=["a"]
+    ),
+    "taxel.detect.Recipe.points_of": method(RECIPE, "points_of", label="a"),
+    "taxel.detect.judge": plain(
+        taxel.detect.judge,
+        examples=[EXAMPLE, EXAMPLE],
+        recipe=RECIPE,
+        k=2,
+        search=False,
+        window_ms=50.0,
+        frame_us=192.0,
+        progress=lambda _: None,
+    ),
+    "taxel.detect.choose": plain(
+        taxel.detect.choose,
+        examples=[EXAMPLE, EXAMPLE],
+        recipe=RECIPE,
+        k=2,
+        window_ms=50.0,
+        frame_us=192.0,
+        progress=lambda _: None,
+    ),
+    "taxel.detect.train": plain(taxel.detect.train, examples=[EXAMPLE], recipe=RECIPE, progress=lambda _: None),
+    "taxel.detect.Part": plain(
+        lambda **given: judged(taxel.detect.Fold([taxel.detect.Part(0)], [taxel.detect.Part(**given)])),
+        example=1,
+        start=0.0,
+        stop=30_000.0,
+    ),
+    "taxel.detect.Fold": plain(
+        lambda **given: judged(taxel.detect.Fold(**given)),
+        train=[taxel.detect.Part(0)],
+        test=[taxel.detect.Part(1)],
+        inner=[],
+    ),
+    "taxel.detect.Example": plain(
+        lambda **given: taxel.detect.train([taxel.detect.Example(**given)], RECIPE),
+        source=EXAMPLE.source,
+        labels={"a": [9000]},
+        tare=None,
+    ),
+    "taxel.detect.TrainedNeuron": plain(
+        lambda **given: taxel.Readout(LEVELS, {"a": taxel.detect.TrainedNeuron(**given)}, array=ARRAY),
+        neuron=taxel.Neuron(tau=2.0),
+        weights=[0.5] * 32,
+        delay_ms=1.0,
+    ),
+}
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.detect.Judged": lambda: judged(2),
+    "taxel.detect.Trained": lambda: judged(2).trained[0],
+    "taxel.detect.Score": lambda: taxel.detect.score(FOUND, {"a": [10], "b": [25]}),
+    "taxel.detect.Spread": lambda: taxel.detect.Spread.of([1.0, 2.0]),
+    "taxel.detect.Outcome": lambda: taxel.detect.Outcome("walk", EXAMPLE, FOUND),
+}
+
+#: What is not tried, and why.
+LEFT_OUT: dict[str, str] = {}

@@ -1,0 +1,217 @@
+"""Sound calls of `taxel.information`."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import taxel
+from sound.things import ARRAY, EVENTS, PLAIN, UNSIGNED, Sound, method, plain
+
+FOUND_BITS = taxel.information.estimate(["a", "b"] * 4, ["a", "b"] * 4, redraws=2)
+CLOUD = np.array([[0.0, 1.0], [3.0, 2.0], [0.5, 0.0], [2.0, 2.5], [1.0, 1.0], [3.5, 3.0], [0.2, 0.4], [2.5, 2.0]])
+LDA = taxel.information.LDA().fit(CLOUD, [0, 1] * 4)
+GRAM_LDA = taxel.information.GramLDA(features=2).fit(CLOUD @ CLOUD.T, [0, 1] * 4)
+NESTED = taxel.information.nested_predictions([CLOUD @ CLOUD.T], [2], [0, 1] * 4, count=2, inner=2)
+READOUTS = [
+    taxel.information.ConeRReadout(tau=5.0, bound=1.0).fit([PLAIN, PLAIN], [0, 1]),
+    taxel.information.TempotronReadout(epochs=3).fit([PLAIN, PLAIN], [0, 1]),
+]
+PRESSES = taxel.Events(
+    np.arange(8) * 10_000 + 1000, np.arange(8) % 2, [0] * 8, [True] * 8, array=ARRAY, intensity=np.arange(8) * 50 + 50
+)
+TOUCHES = [taxel.information.LabelledTrial(PRESSES, "ab"[k % 2], k * 10_000) for k in range(8)]
+
+
+def answer() -> taxel.information.Answer:
+    return taxel.information.answer(TOUCHES, window_ms=5.0, draws=1, folds=2, shuffles=1)
+
+
+#: A sound call of everything public that takes anything, by its full name.
+SOUND: dict[str, Sound] = {
+    "taxel.information.confusion_matrix": plain(
+        taxel.information.confusion_matrix, labels=["a", "b"], responses=["a", "a"], classes=["a", "b"]
+    ),
+    **{
+        f"taxel.information.{name}": plain(getattr(taxel.information, name), counts=[[5, 1], [2, 4]])
+        for name in ("label_entropy", "local_information", "panzeri_treves", "plug_in", "relevant_responses")
+    },
+    "taxel.information.quadratic_extrapolation": plain(
+        taxel.information.quadratic_extrapolation, counts=[[5, 1], [2, 4]], repetitions=2, seed=1
+    ),
+    "taxel.information.estimate": plain(
+        taxel.information.estimate,
+        labels=["a", "b"] * 4,
+        responses=["a", "b"] * 4,
+        groups=["x", "y", "z", "z"] * 2,
+        redraws=5,
+        confidence=0.9,
+        seed=1,
+    ),
+    "taxel.information.zero_test": plain(
+        taxel.information.zero_test,
+        answer=lambda labels: labels,
+        labels=["a", "b"] * 4,
+        found=1.0,
+        groups=["x", "y"] * 4,
+        shuffles=2,
+        seed=1,
+    ),
+    "taxel.information.folds": plain(
+        taxel.information.folds, labels=["a", "b"] * 4, count=2, groups=["x", "x", "y", "y"] * 2, seed=1
+    ),
+    "taxel.information.keeps": plain(
+        taxel.information.keeps, cheap=FOUND_BITS, dear=FOUND_BITS, share=0.9, groups=["x", "y"] * 4
+    ),
+    "taxel.information.LDA": plain(taxel.information.LDA, ridge=0.1, priors="equal"),
+    "taxel.information.LDA.fit": method(taxel.information.LDA(), "fit", x=CLOUD, y=[0, 1] * 4),
+    "taxel.information.LDA.predict": method(LDA, "predict", x=CLOUD),
+    "taxel.information.LDA.decision_function": method(LDA, "decision_function", x=CLOUD),
+    "taxel.information.fold_predictions": plain(
+        taxel.information.fold_predictions,
+        x=CLOUD,
+        y=[0, 1] * 4,
+        folds=[0, 0, 0, 0, 1, 1, 1, 1],
+        ridge=0.1,
+        priors="training",
+        keep="folds",
+        progress=lambda *_: None,
+    ),
+    "taxel.information.FoldSums": plain(
+        taxel.information.FoldSums, x=CLOUD, y=[0, 1] * 4, folds=[0, 0, 0, 0, 1, 1, 1, 1], keep="folds", progress=print
+    ),
+    "taxel.information.FoldSums.predictions": method(
+        taxel.information.FoldSums(CLOUD, ["a", "b"] * 4, [0, 0, 0, 0, 1, 1, 1, 1]),
+        "predictions",
+        merge={"a": "x", "b": "y"},
+        features=1,
+        ridge=0.1,
+        priors="training",
+        progress=lambda *_: None,
+    ),
+    "taxel.information.GramLDA": plain(taxel.information.GramLDA, features=2, ridge=0.1, priors="equal"),
+    "taxel.information.GramLDA.fit": method(
+        taxel.information.GramLDA(features=2), "fit", gram=CLOUD @ CLOUD.T, y=[0, 1] * 4
+    ),
+    "taxel.information.GramLDA.predict": method(GRAM_LDA, "predict", gram=CLOUD @ CLOUD.T),
+    "taxel.information.GramLDA.decision_function": method(GRAM_LDA, "decision_function", gram=CLOUD @ CLOUD.T),
+    "taxel.information.NearestNeighbours": plain(taxel.information.NearestNeighbours, neighbours=1),
+    "taxel.information.NearestNeighbours.fit": method(
+        taxel.information.NearestNeighbours(), "fit", distances=CLOUD @ CLOUD.T, y=[0, 1] * 4
+    ),
+    "taxel.information.NearestNeighbours.predict": method(
+        taxel.information.NearestNeighbours().fit(CLOUD @ CLOUD.T, [0, 1] * 4), "predict", distances=CLOUD @ CLOUD.T
+    ),
+    "taxel.information.distances_of": plain(taxel.information.distances_of, gram=CLOUD @ CLOUD.T),
+    "taxel.information.nested_predictions": plain(
+        taxel.information.nested_predictions,
+        grams=[CLOUD @ CLOUD.T],
+        features=[2],
+        y=[0, 1] * 4,
+        groups=["x", "x", "y", "y"] * 2,
+        count=2,
+        inner=2,
+        ridges=[1.0],
+        neighbours=(),
+        seed=1,
+    ),
+    "taxel.information.training_curve": plain(
+        taxel.information.training_curve,
+        grams=[CLOUD @ CLOUD.T],
+        features=[2],
+        y=[0, 1] * 4,
+        nested=NESTED,
+        sizes=[2],
+        seed=1,
+    ),
+    "taxel.information.RateCode": plain(taxel.information.RateCode, window_ms=10.0, resolution_ms=0.0, most_hz=100.0),
+    **{
+        f"taxel.information.{name}": plain(getattr(taxel.information, name), window_ms=10.0, resolution_ms=0.5)
+        for name in ("FirstSpikeLatency", "RelativeLatency", "RankOrder")
+    },
+    "taxel.information.Code.encode": method(
+        taxel.information.RankOrder(window_ms=10.0), "encode", values=[0.5, 1.0], onset_ms=1.0
+    ),
+    "taxel.information.Code.decode": method(
+        taxel.information.RateCode(window_ms=10.0), "decode", trains=UNSIGNED, onset_ms=1.0
+    ),
+    "taxel.information.compare_codes": plain(
+        taxel.information.compare_codes,
+        trials=[UNSIGNED] * 8,
+        labels=[0, 1] * 4,
+        codes={"rank": taxel.information.RankOrder(window_ms=10.0)},
+        onsets_ms=[0.0] * 8,
+        groups=list(range(8)),
+        folds=2,
+        seed=1,
+    ),
+    "taxel.information.ConeRReadout": plain(taxel.information.ConeRReadout, tau=5.0, bound=1.0, max_seconds=1.0),
+    "taxel.information.ConeRReadout.fit": method(
+        taxel.information.ConeRReadout(tau=5.0, bound=1.0), "fit", patterns=[PLAIN, PLAIN], y=[0, 1]
+    ),
+    "taxel.information.TempotronReadout": plain(
+        taxel.information.TempotronReadout, tau=5.0, epochs=3, max_seconds=1.0, seed=1
+    ),
+    "taxel.information.TempotronReadout.fit": method(
+        taxel.information.TempotronReadout(epochs=3), "fit", patterns=[PLAIN, PLAIN], y=[0, 1]
+    ),
+    **{
+        f"taxel.information.{type(readout).__name__}.{name}": method(readout, name, patterns=[PLAIN])
+        for readout in READOUTS
+        for name in ("predict", "decision_function")
+    },
+    "taxel.information.LabelledTrial": plain(
+        taxel.information.LabelledTrial,
+        source=EVENTS,
+        label="a",
+        start_us=0,
+        stop_us=500,
+        group="x",
+        parameters={"radius": "5"},
+        name="one",
+    ),
+    "taxel.information.read_trials": lambda: (
+        taxel.information.read_trials,
+        {"table": "here_trials.csv", "recordings": [taxel.open("here_events.npz")], "window_ms": 0.1},
+    ),
+    "taxel.information.notes_as_trials": lambda: (
+        taxel.information.notes_as_trials,
+        {"recordings": [taxel.open("here_events.npz").with_notes([taxel.Note("ball", 0, 0)])], "window_ms": 0.1},
+    ),
+    "taxel.information.recordings_as_trials": lambda: (
+        taxel.information.recordings_as_trials,
+        {"recordings": [taxel.open("here_events.npz")], "window_ms": 0.1},
+    ),
+    "taxel.information.answer": plain(
+        taxel.information.answer,
+        trials=TOUCHES,
+        encoder=taxel.encode.ChangeEvents(),
+        window_ms=5.0,
+        windows_ms=[2.0],
+        periods_ms=[1.0],
+        taxels=[1],
+        pools=[2],
+        taxels_at_ms=1.0,
+        draws=1,
+        folds=2,
+        shuffles=1,
+        classifiers=["neighbours"],
+        seed=1,
+        progress=lambda *_: None,
+    ),
+}
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.information.Answer": answer,
+    "taxel.information.Code": lambda: taxel.information.RankOrder(window_ms=10.0),
+    "taxel.information.Control": lambda: answer().controls[0],
+    "taxel.information.Estimate": lambda: FOUND_BITS,
+    "taxel.information.Nested": lambda: NESTED,
+    "taxel.information.Point": lambda: answer().full,
+    "taxel.information.Verdict": lambda: taxel.information.keeps(FOUND_BITS, FOUND_BITS),
+    "taxel.information.ZeroTest": lambda: answer().zero,
+}
+
+#: What is not tried, and why.
+LEFT_OUT: dict[str, str] = {}

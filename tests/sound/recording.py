@@ -1,0 +1,60 @@
+"""Sound calls of recordings."""
+
+from collections.abc import Callable
+from typing import Any
+
+import taxel
+from sound.things import ARRAY, EVENTS, TARE, Sound, plain
+
+#: A sound call of everything public that takes anything, by its full name.
+SOUND: dict[str, Sound] = {
+    "taxel.open": plain(taxel.open, path="here_events.npz", array=ARRAY, pairing="direct", differences=False),
+    "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
+    "taxel.Recording.frames": lambda: (taxel.open("here_events.npz").frames, {"rate_hz": 1000.0}),
+    "taxel.Recording.calibrated": lambda: (
+        taxel.open("here_events.npz").calibrated,
+        {"rate_hz": 1000.0, "rest": TARE},
+    ),
+    "taxel.cut": lambda: (
+        taxel.cut,
+        {
+            "recording": taxel.open("here_events.npz"),
+            "start_us": 0,
+            "stop_us": 300,
+            "columns": slice(0, 2),
+            "rows": slice(0, 2),
+            "label": None,
+            "before_us": 10.0,
+            "after_us": 10.0,
+        },
+    ),
+    "taxel.merge": lambda: (
+        taxel.merge,
+        {"recordings": [taxel.open("here_events.npz")] * 2, "gap_us": 1000.0, "beside": True},
+    ),
+    "taxel.Recording.with_notes": lambda: (
+        taxel.open("here_events.npz").with_notes,
+        {"notes": [taxel.Note("heel", 100, 0)]},
+    ),
+    "taxel.convert": plain(
+        taxel.convert, source=EVENTS, target="there.npz", frames_hz=1000.0, compression="none", overwrite=True
+    ),
+    "taxel.health": plain(taxel.health, recorded=EVENTS),
+    "taxel.Note": lambda: (
+        lambda **given: taxel.open("here_events.npz").with_notes([taxel.Note(**given)]),
+        {"text": "heel", "t": 100, "at_ns": 0, "recording": ""},
+    ),
+    "taxel.Recording": lambda: (taxel.Recording, {"contents": taxel.open("here_events.npz")._contents}),
+    "taxel.Recording.on_clock": lambda: (taxel.open("here_clock.mcap").on_clock, {"name": "host"}),
+}
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.BoardChange": lambda: taxel.open("here_clock.mcap").board_changes[0],
+    "taxel.Datagrams": lambda: taxel.open("here_clock.mcap").datagrams(),
+    "taxel.Health": lambda: taxel.health(EVENTS),
+    "taxel.Zeroing": lambda: taxel.open("here_clock.mcap").zeroings[0],
+}
+
+#: What is not tried, and why.
+LEFT_OUT: dict[str, str] = {}
