@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from _instructions import beside_avx2
 from _touch import compare, scene
 
 from taxel import Frames
@@ -29,6 +30,7 @@ def numpy_fa1(frames: Frames, theta_0: float) -> list[Any]:
     return spikes
 
 
+@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
     seconds, theta_0 = 0.25 if quick else 1.0, 150.0**0.7 / 1024

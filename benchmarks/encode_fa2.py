@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from _instructions import beside_avx2
 from _receptor import benchmark
 
 from taxel.encode import FA2
 
 
+@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
     return benchmark(__doc__, "FA-2", FA2(period_ms=0.192), quick=quick)

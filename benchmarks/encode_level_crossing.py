@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from _instructions import beside_avx2
 from _touch import compare, scene
 
 from taxel import Frames
@@ -25,6 +26,7 @@ def numpy_crossing(frames: Frames, levels: list[float], share: float) -> list[An
     return spikes
 
 
+@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
     seconds = 0.25 if quick else 1.0

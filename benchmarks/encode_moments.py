@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from _instructions import beside_avx2
 from _touch import FLOOR, compare, loaded, scene
 
 from taxel import Frames, Tare
@@ -40,6 +41,7 @@ def numpy_moments(frames: Frames, tare: Tare) -> list[Any]:
     return spikes
 
 
+@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
     seconds = 0.25 if quick else 1.0

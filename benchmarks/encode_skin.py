@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from _instructions import beside_avx2
 from _rounds import measure
 from _touch import compare, scene
 
@@ -31,6 +32,7 @@ def skin() -> Skin:
     )
 
 
+@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
     seconds = 0.25 if quick else 1.0

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from _instructions import beside_avx2
 from _touch import compare
 
 from taxel import Frames
@@ -44,6 +45,7 @@ def gait(seconds: float, rng: np.random.Generator) -> Frames:
     return Frames(on[:, None, :].astype(np.float32), t, unit="counts")
 
 
+@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
     seconds, name = 0.25 if quick else 1.0, "Izhikevich, 184 neurons"

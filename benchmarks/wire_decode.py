@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _instructions import beside_avx2
 from _peer import missing
 from _rounds import measure, ratio, stamp
 from numpy.typing import NDArray
@@ -148,6 +149,7 @@ def evt2(folder: Path, words: int) -> dict[str, Callable[[], Any]]:
     return runs | {"expelliarmus, EVT2": by_expelliarmus}
 
 
+@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     words, rounds = (WORDS // 20, 3) if quick else (WORDS, 11)
     data = streams(words)

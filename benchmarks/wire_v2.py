@@ -23,6 +23,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from _instructions import beside_avx2
 from _rounds import measure, ratio, stamp
 from numpy.typing import NDArray
 
@@ -137,6 +138,7 @@ def stream(frames: Frames, version: int, events: int) -> Stream:
     return Stream(b"".join(out), np.array([len(datagram) for datagram in out]), count, b"".join(empty))
 
 
+@beside_avx2
 def run(*, quick: bool) -> dict[str, Any]:
     scenes = {"full array": full(), "footfall": footfall(), "drop": drop()}
     bytes_an_event = {name: sizes(frames) for name, frames in scenes.items()}

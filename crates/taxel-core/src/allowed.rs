@@ -246,11 +246,11 @@ mod tests {
     #[test]
     fn an_error_names_the_entry_its_value_and_unit() {
         let parameter = |unit| Parameter { name: "tau", unit, range: Range::ABOVE_0 };
-        let said = |unit, value: &dyn Numbers| parameter(unit).check(value).unwrap_err().to_string();
-        assert_eq!(said("ms", &-1.0), "tau is -1 ms: must be above 0 and finite");
-        assert_eq!(said("", &f64::NAN), "tau is NaN: must be above 0 and finite");
-        assert_eq!(said("1/ms", &-1.0), "tau is -1/ms: must be above 0 and finite");
-        assert_eq!(said("mV", &[1.0, -2.0]), "tau[1] is -2 mV: must be above 0 and finite");
+        let message = |unit, value: &dyn Numbers| parameter(unit).check(value).unwrap_err().to_string();
+        assert_eq!(message("ms", &-1.0), "tau is -1 ms: must be above 0 and finite");
+        assert_eq!(message("", &f64::NAN), "tau is NaN: must be above 0 and finite");
+        assert_eq!(message("1/ms", &-1.0), "tau is -1/ms: must be above 0 and finite");
+        assert_eq!(message("mV", &[1.0, -2.0]), "tau[1] is -2 mV: must be above 0 and finite");
         assert!(parameter("ms").check(&None::<f64>).is_ok());
     }
 }

@@ -125,7 +125,7 @@ impl Board {
         })
     }
 
-    /// Chooses how it speaks version 2.
+    /// Sets the options of version 2.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! The one family of errors, and the flag by which a long call is told to stop.
+//! The one family of errors, and the flag by which a caller stops a long call.
 
 /// What can go wrong, in kinds that a caller can tell apart.
 ///

@@ -2,7 +2,7 @@
 
 use crate::{Array, Result, problem};
 
-/// How far an event may lie behind one before it and still be heard, us: datagrams overtake each other.
+/// How far an event may lie behind the one before it and still count, us: datagrams overtake each other.
 pub const FARTHEST_BACK_US: i64 = 100_000;
 
 /// The intensity words that belong to events.

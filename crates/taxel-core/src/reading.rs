@@ -1,4 +1,4 @@
-//! JSON read into what taxel holds; what does not fit is said as the rest of taxel says it, not in a parser's words.
+//! JSON read into parameters; what does not fit is reported in one line in the words of all messages, not in a parser's.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -10,15 +10,15 @@ pub struct Unfit {
     /// From the outermost name to the innermost, as `neuron.lambdas[2]`; empty where it is the whole.
     place: String,
     /// Goes on from the place.
-    said: String,
+    message: String,
 }
 
 impl Unfit {
     /// The whole error, of what was read.
     #[must_use]
     pub fn of(&self, what: &str) -> String {
-        let colon = if self.said.starts_with(" is ") && self.place.is_empty() { "" } else { ": " };
-        format!("{what}{colon}{}{}", self.place, self.said)
+        let colon = if self.message.starts_with(" is ") && self.place.is_empty() { "" } else { ": " };
+        format!("{what}{colon}{}{}", self.place, self.message)
     }
 
     /// The same for whoever wrote the parameter and knows its name alone, not the groups that it lies in.
@@ -36,12 +36,12 @@ impl Unfit {
 /// [`Unfit`] where it is no JSON, or not what is wanted.
 pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
     let value = serde_json::from_str(text).map_err(|error| {
-        let said = match error.classify() {
+        let message = match error.classify() {
             Category::Eof => "not JSON: it ends too early".to_owned(),
             // Serde names the sign that it waited for, which is seldom the one that is wrong.
             _ => format!("not JSON: see line {}, column {}", error.line(), error.column()),
         };
-        Unfit { place: String::new(), said }
+        Unfit { place: String::new(), message }
     })?;
     from_value(value)
 }
@@ -68,31 +68,31 @@ pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
 }
 
 /// Says in words what serde says; its texts are the only thing that an error of serde_json gives.
-fn in_words(place: String, there: Option<&Value>, said: &str) -> Unfit {
-    let quoted = |start: &str| said.strip_prefix(start).and_then(|rest| rest.split('`').nth(1));
-    let wanted = said.split_once(", expected ").map_or("", |(_, wanted)| wanted);
+fn in_words(place: String, there: Option<&Value>, message: &str) -> Unfit {
+    let quoted = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').nth(1));
+    let wanted = message.split_once(", expected ").map_or("", |(_, wanted)| wanted);
     let is = |right: &str| there.map_or(format!(": {right}"), |value| format!(" is {}: {right}", shown(value)));
     if let Some(name) = quoted("unknown field ") {
         let meant = nearest(name, wanted).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
         return Unfit {
             place: beside(&place, name),
-            said: format!(" is not known{meant}: there is {}", choice(wanted)),
+            message: format!(" is not known{meant}: there is {}", choice(wanted)),
         };
     }
     if let Some(name) = quoted("missing field ") {
         let dot = if place.is_empty() { "" } else { "." };
-        return Unfit { place: format!("{place}{dot}{name}"), said: " is missing".to_owned() };
+        return Unfit { place: format!("{place}{dot}{name}"), message: " is missing".to_owned() };
     }
-    let said = if said.starts_with("unknown variant ") {
+    let message = if message.starts_with("unknown variant ") {
         is(&format!("must be {}", choice(wanted)))
-    } else if said.starts_with("invalid ") {
+    } else if message.starts_with("invalid ") {
         is(&format!("must be {}", kind(wanted, there)))
-    } else if said.starts_with("must be ") {
-        is(said)
+    } else if message.starts_with("must be ") {
+        is(message)
     } else {
-        format!(": {said}")
+        format!(": {message}")
     };
-    Unfit { place, said }
+    Unfit { place, message }
 }
 
 /// The place of a name that its group does not know; some groups end the place with it, some before it.
@@ -128,11 +128,11 @@ fn edits(from: &str, to: &str) -> usize {
 
 /// A value as an error shows it: as JSON has it, not long, None for nothing.
 fn shown(value: &Value) -> String {
-    let said = match value {
+    let message = match value {
         Value::Null => "None".to_owned(),
         other => other.to_string(),
     };
-    if said.chars().count() <= 60 { said } else { said.chars().take(57).chain("...".chars()).collect() }
+    if message.chars().count() <= 60 { message } else { message.chars().take(57).chain("...".chars()).collect() }
 }
 
 /// One of several names: `"a"`, `"b"` or `"c"`.
@@ -203,7 +203,7 @@ mod tests {
         Later(Box<Whole>),
     }
 
-    fn said(text: &str) -> String {
+    fn message(text: &str) -> String {
         from_text::<Whole>(text).unwrap_err().of("whole")
     }
 
@@ -235,23 +235,23 @@ mod tests {
             (r#""tau": 1, "wings": 2"#, "wings is not known: there is \"tau\""),
         ] {
             let text = format!("{{{parameter}}}");
-            assert!(said(&text).starts_with(&format!("whole: {words}")), "{}", said(&text));
+            assert!(message(&text).starts_with(&format!("whole: {words}")), "{}", message(&text));
         }
-        assert_eq!(said("7"), "whole is 7: must be values by name");
+        assert_eq!(message("7"), "whole is 7: must be values by name");
     }
 
     #[test]
     fn the_name_that_was_meant_is_said() {
         assert_eq!((edits("kitten", "sitting"), edits("", "abc"), edits("flaw", "lawn")), (3, 3, 2));
-        assert!(said(r#"{"tau": 1, "smal": 2}"#).contains("smal is not known (did you mean small?): there is"));
-        assert!(!said(r#"{"tau": 1, "wings": 2}"#).contains("mean"));
+        assert!(message(r#"{"tau": 1, "smal": 2}"#).contains("smal is not known (did you mean small?): there is"));
+        assert!(!message(r#"{"tau": 1, "wings": 2}"#).contains("mean"));
     }
 
     #[test]
     fn a_text_that_is_no_json_is_said_by_its_place() {
-        assert_eq!(said("{\n\"tau\": x"), "whole: not JSON: see line 2, column 8");
-        assert_eq!(said("{\"tau\": 1"), "whole: not JSON: it ends too early");
-        assert_eq!(said(&"[".repeat(200)), "whole: not JSON: see line 1, column 128");
+        assert_eq!(message("{\n\"tau\": x"), "whole: not JSON: see line 2, column 8");
+        assert_eq!(message("{\"tau\": 1"), "whole: not JSON: it ends too early");
+        assert_eq!(message(&"[".repeat(200)), "whole: not JSON: see line 1, column 128");
     }
 
     #[test]

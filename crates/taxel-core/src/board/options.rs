@@ -29,7 +29,7 @@ pub enum IntensityWord {
     Nothing,
 }
 
-/// How a board speaks version 2.
+/// Options of a board that sends version 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Version2 {

@@ -357,9 +357,9 @@ mod tests {
     #[test]
     fn a_crossing_that_conducts_nonsense_is_named() {
         for wrong in [-1.0, f64::NAN, f64::INFINITY] {
-            let said =
+            let error =
                 grid(0.0, 0.0, 0.0, Idle::Held).currents_ua(&[0.0, 0.0, 0.0, wrong], 1.0, &[0.0; 2], Stop::never());
-            assert!(said.unwrap_err().to_string().contains("x 1, y 1"), "{wrong}");
+            assert!(error.unwrap_err().to_string().contains("x 1, y 1"), "{wrong}");
         }
     }
 }

@@ -151,7 +151,7 @@ impl Rule for Changes {
         }
     }
 
-    const HEARS_REPAIRED: bool = false;
+    const SPIKES_OF_REPAIRED: bool = false;
 
     fn repair(&mut self, channel: usize, from: f32, to: f32) {
         self.last[channel / BLOCK][channel % BLOCK] += to - from;

@@ -75,7 +75,7 @@ impl Law for ContactArea {
         Ok(Box::new(Area {
             levels: self.levels.clone(),
             loaded: Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?,
-            said: 0,
+            reported: 0,
             held: Held::all(blocks(array.len()) * BLOCK, 0.0),
             changed: vec![false; blocks(array.len())],
             // Place by place: which taxels exist is in `loaded`.
@@ -102,7 +102,7 @@ struct Area {
     levels: Vec<u32>,
     loaded: Loaded,
     /// The area at the end of the last stamp.
-    said: u32,
+    reported: u32,
     held: Held<f32>,
     changed: Vec<bool>,
     channels: Channels,
@@ -112,7 +112,7 @@ struct Area {
 impl Area {
     /// Ends the stamp at `t` us: emits a spike of each level that the area passed since the last one.
     fn say(&mut self, t: i64, out: &mut Vec<Spike>) {
-        let (before, now) = (self.said, self.loaded.area());
+        let (before, now) = (self.reported, self.loaded.area());
         if before == now {
             return;
         }
@@ -126,7 +126,7 @@ impl Area {
                 out.push(Spike { t: ms(t), train: (self.levels.len() + train) as u32, value: 1.0 });
             }
         }
-        self.said = now;
+        self.reported = now;
     }
 }
 

@@ -158,8 +158,8 @@ struct Afferent {
     /// theta (5.5) of the next sample.
     theta: [f64; BLOCK],
     /// The pressure whose rho is `base`; NaN where there is none such.
-    heard: Block,
-    /// No pressure within `reach * theta` of `heard` fires.
+    reference: Block,
+    /// No pressure within `reach * theta` of `reference` fires.
     reach: Block,
     /// Whether a sample without change would leave all this as it is.
     still: bool,
@@ -182,7 +182,7 @@ pub(super) struct Afferents {
     /// What no theta lies below; 0 where that is nothing or beyond f32.
     least: f64,
     /// The pressure whose rho is the least theta; 0 where alpha is above 1.
-    unheard: f64,
+    lowest_pressure: f64,
     /// One over the least theta.
     per_least: f64,
     /// The largest value of a spike.
@@ -214,7 +214,7 @@ impl Afferents {
             decay,
             theta_0,
             least,
-            unheard: if parameters.alpha > 1.0 { 0.0 } else { least.powf(1.0 / parameters.alpha) },
+            lowest_pressure: if parameters.alpha > 1.0 { 0.0 } else { least.powf(1.0 / parameters.alpha) },
             per_least: 1.0 / least,
             most: f64::from((1_u32 << parameters.bits) - 1),
             blocks: vec![],
@@ -250,19 +250,19 @@ impl Afferents {
         }
     }
 
-    /// How far a pressure may go from `heard`, whose rho is `base`, in proportion to theta, without a spike.
+    /// How far a pressure may go from `reference`, whose rho is `base`, in proportion to theta, without a spike.
     ///
-    /// theta is at most `most` until the next one. With `m = theta / base` the pressure may go by `r` of `heard`, where
+    /// theta is at most `most` until the next one. With `m = theta / base` the pressure may go by `r` of `reference`, where
     /// `(1 + r)^alpha <= 1 + m` and `(1 - r)^alpha >= 1 - m`. Both hold for `r = m / (alpha + |1 - alpha| m)`: with alpha
     /// below 1 by `(1 - m)^(1 / alpha - 1) <= 1 / (1 + (1 / alpha - 1) m)`, above 1 by Bernoulli's inequality; and for less, so
     /// that m may be the largest in the divisor. Where alpha is at most 1 and neither pressure is above
-    /// `theta unheard / least <= theta^(1 / alpha)`, neither rho is above theta. A ten-thousandth is left for rounding: values
-    /// of f32 that differ do so by 6e-8 of `heard`, so theta is at least 6e-8 alpha base where this is of use, and 5.1 errs
+    /// `theta lowest_pressure / least <= theta^(1 / alpha)`, neither rho is above theta. A ten-thousandth is left for rounding: values
+    /// of f32 that differ do so by 6e-8 of `reference`, so theta is at least 6e-8 alpha base where this is of use, and 5.1 errs
     /// by less than 1e-13 of base.
-    fn reach(&self, heard: f32, base: f64, theta: f64) -> f32 {
-        let (heard, most) = (f64::from(heard), theta.max(self.theta_0));
-        let near = heard / (self.alpha * base + (1.0 - self.alpha).abs() * most);
-        let low = (self.unheard - heard) * self.per_least;
+    fn reach(&self, reference: f32, base: f64, theta: f64) -> f32 {
+        let (reference, most) = (f64::from(reference), theta.max(self.theta_0));
+        let near = reference / (self.alpha * base + (1.0 - self.alpha).abs() * most);
+        let low = (self.lowest_pressure - reference) * self.per_least;
         let reach = 0.9999 * near.max(low);
         let sound = [reach, reach * self.least, most].iter().all(|x| SOUND.contains(x));
         // With 0 whatever changes is reckoned.
@@ -271,11 +271,11 @@ impl Afferents {
 
     /// Has an afferent begin again at a pressure whose rho is `base`.
     fn reset(&mut self, channel: usize, pressure: f32, base: f64, theta: f64) {
-        let heard = pressure.max(0.0);
-        let reach = self.reach(heard, base, theta);
+        let reference = pressure.max(0.0);
+        let reach = self.reach(reference, base, theta);
         let (afferent, lane) = (&mut self.blocks[channel / BLOCK], channel % BLOCK);
         (afferent.base[lane], afferent.theta[lane]) = (base, theta);
-        (afferent.heard[lane], afferent.reach[lane]) = (heard, reach);
+        (afferent.reference[lane], afferent.reach[lane]) = (reference, reach);
     }
 
     /// Reckons those that may fire.
@@ -300,8 +300,8 @@ impl Afferents {
                 let (Near { channel, theta }, u) = (some[k], rho[k] - base[k]);
                 // A baseline of 0 makes every change as large as a spike's value can be.
                 let size = if self.most > 1.0 { (u.abs() / self.theta_0).trunc().clamp(1.0, self.most) } else { 1.0 };
-                let said = if u > theta { size } else { -size };
-                out.push(Spike { t: ms(t), train: channel, value: said as f32 });
+                let signed = if u > theta { size } else { -size };
+                out.push(Spike { t: ms(t), train: channel, value: signed as f32 });
                 self.reset(channel as usize, values[k], rho[k], theta + self.jump);
                 self.blocks[channel as usize / BLOCK].still = false;
             }
@@ -319,7 +319,7 @@ impl Afferent {
             for k in 0..32 {
                 let lane = half * 32 + k;
                 let pressure = if held[lane] > 0.0 { held[lane] } else { 0.0 };
-                let within = (pressure - self.heard[lane]).abs() <= self.reach[lane] * theta[lane];
+                let within = (pressure - self.reference[lane]).abs() <= self.reach[lane] * theta[lane];
                 *bits |= if within { 0 } else { 1 << k };
             }
         }
@@ -342,7 +342,7 @@ impl Afferent {
 impl Rule for Afferents {
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
         let blank =
-            Afferent { base: [0.0; BLOCK], theta: [0.0; BLOCK], heard: [0.0; BLOCK], reach: [0.0; BLOCK], still: true };
+            Afferent { base: [0.0; BLOCK], theta: [0.0; BLOCK], reference: [0.0; BLOCK], reach: [0.0; BLOCK], still: true };
         self.blocks = vec![blank; held.len()];
         self.near = vec![Near::default(); (held.len() + 1) * BLOCK];
         for (block, values) in held.iter().enumerate() {
@@ -384,7 +384,7 @@ impl Rule for Afferents {
         self.near = near;
     }
 
-    const HEARS_REPAIRED: bool = false;
+    const SPIKES_OF_REPAIRED: bool = false;
 
     fn repair(&mut self, channel: usize, from: f32, to: f32) {
         let (mut values, mut rho) = ([0.0; BLOCK], [0.0; BLOCK]);
@@ -397,7 +397,7 @@ impl Rule for Afferents {
             self.reset(channel, to, rho[1], theta);
         } else {
             afferent.base[lane] += rho[1] - rho[0];
-            afferent.heard[lane] = f32::NAN;
+            afferent.reference[lane] = f32::NAN;
         }
     }
 
@@ -424,11 +424,11 @@ mod tests {
             power(picture, alpha, &mut rho);
             for lane in 0..BLOCK {
                 let u = rho[lane] - base[lane];
-                let said = f32::from(i8::from(u > theta[lane]) - i8::from(u < -theta[lane]));
-                if said == 0.0 {
+                let signed = f32::from(i8::from(u > theta[lane]) - i8::from(u < -theta[lane]));
+                if signed == 0.0 {
                     theta[lane] = if theta[lane] > theta_0 { theta[lane] - decay } else { theta_0 };
                 } else {
-                    out.push(Spike { t: ms(t), train: lane as u32, value: said });
+                    out.push(Spike { t: ms(t), train: lane as u32, value: signed });
                     (base[lane], theta[lane]) = (rho[lane], theta[lane] + jump);
                 }
             }

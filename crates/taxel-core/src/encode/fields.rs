@@ -102,7 +102,7 @@ impl Fields {
         by_width!(
             Instructions::best(), (fields: &Fields, block: usize, held: &[f32]) -> Block, [],
             |fields, block, held| by(fields, block, |row| fields.windows.read_avx512(row, held)),
-            |fields, block, held| by(fields, block, |row| fields.windows.read(row, held)),
+            |fields, block, held| by(fields, block, |row| fields.windows.read_avx2(row, held)),
             |fields, block, held| by(fields, block, |row| fields.windows.read(row, held))
         )
     }
@@ -213,10 +213,10 @@ mod tests {
                 }
                 assert!(felt[own.len()..].iter().all(|&felt| felt == 0.0));
                 for changed in 0..held.len() {
-                    let said =
+                    let felt =
                         new.any(block, &std::array::from_fn::<bool, 7, _>(|other| other == changed)[..held.len()]);
                     let needed = own.iter().flatten().any(|&(channel, _)| channel as usize / BLOCK == changed);
-                    assert!(said || !needed);
+                    assert!(felt || !needed);
                 }
             }
             for channel in 0..channels {

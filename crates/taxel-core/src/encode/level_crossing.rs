@@ -140,7 +140,7 @@ struct ChannelLevel {
     /// Whether the latest sample is above.
     above: bool,
     /// The state of the latest spike: follows `above` once that has lasted.
-    said: bool,
+    reported: bool,
     /// When `above` last changed, us.
     since: i64,
 }
@@ -188,7 +188,7 @@ impl Crossings {
             on_at: on as f32,
             off_at: off as f32,
             above: false,
-            said: false,
+            reported: false,
             since: i64::MIN,
         };
         let states = (0..channels).flat_map(|_| levels.iter().zip(&releases).map(blank)).collect();
@@ -240,8 +240,8 @@ impl Crossings {
             for level in 0..levels {
                 let state = &mut self.states[channel * levels + level];
                 state.above = value >= state.on_at;
-                state.said = state.above;
-                if state.said {
+                state.reported = state.above;
+                if state.reported {
                     self.speak_tonic(t, channel, level, true, out);
                 }
             }
@@ -277,7 +277,7 @@ impl Crossings {
                 state.since = t;
                 if self.hold == 0 {
                     self.say(t, train, out);
-                } else if above != state.said {
+                } else if above != state.reported {
                     self.trials.push_back((t + self.hold, train));
                 }
             }
@@ -287,8 +287,8 @@ impl Crossings {
 
     fn say(&mut self, t: i64, train: usize, out: &mut Vec<Spike>) {
         let state = &mut self.states[train];
-        state.said = state.above;
-        let on = state.said;
+        state.reported = state.above;
+        let on = state.reported;
         out.push(Spike { t: ms(t), train: train as u32, value: if on { 1.0 } else { -1.0 } });
         self.speak_tonic(t, train / self.levels.len(), train % self.levels.len(), on, out);
     }
@@ -312,7 +312,7 @@ impl Crossings {
             self.trials.pop_front();
             self.say_tonic(due, false, out);
             let state = self.states[train];
-            if state.above != state.said && state.since == due - self.hold {
+            if state.above != state.reported && state.since == due - self.hold {
                 self.say(due, train, out);
             }
         }

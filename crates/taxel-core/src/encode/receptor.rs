@@ -51,7 +51,7 @@ pub(super) trait Filter: Send + Clone + 'static {
     fn step<const SEE: bool>(&self, state: &mut Self::State, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64;
 
     /// Whether its spikes depend on values, and not on changes alone: then a value that a state repaired counts as any other.
-    const TELLS_VALUES: bool = false;
+    const SIGNALS_VALUES: bool = false;
 
     /// Moves what it holds of one channel by a difference that was there before, so that it is no change.
     fn shift(&self, _state: &mut Self::State, _lane: usize, _by: f64) {}
@@ -119,7 +119,7 @@ impl<F: Filter> Afferents<F> {
 
     /// Moves what a channel holds by a difference that was there before.
     fn shift(&mut self, channel: usize, by: f64) {
-        if !F::TELLS_VALUES {
+        if !F::SIGNALS_VALUES {
             self.filter.shift(&mut self.blocks[channel / BLOCK].state, channel % BLOCK, by);
         }
     }
@@ -220,7 +220,7 @@ impl<F: Filter> Rule for ByTaxel<F> {
         }
     }
 
-    const HEARS_REPAIRED: bool = F::TELLS_VALUES;
+    const SPIKES_OF_REPAIRED: bool = F::SIGNALS_VALUES;
 
     fn repair(&mut self, channel: usize, from: f32, to: f32) {
         let by = share(self.scale, to) - share(self.scale, from);

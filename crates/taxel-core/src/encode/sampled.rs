@@ -34,7 +34,7 @@ pub(super) trait Rule: Send + Clone + 'static {
 
     /// Whether a value that a state repaired gives spikes. In a rule of changes it does not, as the time of the change is not
     /// known: the rule's reference moves with the value ([`Rule::repair`]).
-    const HEARS_REPAIRED: bool = true;
+    const SPIKES_OF_REPAIRED: bool = true;
 
     /// A state reports that a channel which read `from` reads `to`, and did so before: that gives no spike.
     fn repair(&mut self, _channel: usize, _from: f32, _to: f32) {}
@@ -295,7 +295,7 @@ impl<R: Rule> Stream for Sampled<R> {
     }
 
     fn hears_repaired_ms(&self) -> Option<f64> {
-        R::HEARS_REPAIRED.then(|| ms(self.period) + self.latency_ms)
+        R::SPIKES_OF_REPAIRED.then(|| ms(self.period) + self.latency_ms)
     }
 
     fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {

@@ -308,7 +308,7 @@ impl<R: Rule> Type<R> {
 
     /// A channel reads something else, and did so before.
     fn repair(&mut self, channel: usize, from: f32, to: f32) {
-        if R::HEARS_REPAIRED {
+        if R::SPIKES_OF_REPAIRED {
             return;
         }
         for (lane, weight) in self.fields.feeling(channel) {

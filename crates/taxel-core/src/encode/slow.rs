@@ -36,7 +36,7 @@ pub(super) struct SlowState {
 impl Filter for Slow {
     type State = SlowState;
 
-    const TELLS_VALUES: bool = true;
+    const SIGNALS_VALUES: bool = true;
 
     fn settled(&self, x: &Lanes) -> (SlowState, Lanes) {
         let drive = x.map(|x| (1.0 - self.loss) * x);

@@ -250,7 +250,7 @@ impl Pairs {
         }
     }
 
-    fn hear(&mut self, channel: usize, value: f32) {
+    fn read(&mut self, channel: usize, value: f32) {
         let (levels, gain) = (self.levels.len(), self.model.gain);
         let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
         for (level, &at) in self.levels.iter().enumerate() {
@@ -312,7 +312,7 @@ impl Rule for Pairs {
             falls.input = [self.model.gain; LANES];
         }
         for channel in 0..self.channels {
-            self.hear(channel, held[channel / BLOCK][channel % BLOCK]);
+            self.read(channel, held[channel / BLOCK][channel % BLOCK]);
         }
         // Lanes beyond the last train receive no input and stay at rest.
         let used = self.channels * self.levels.len() % LANES;
@@ -341,7 +341,7 @@ impl Rule for Pairs {
                 for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
                     let value = values[channel % BLOCK];
                     if !self.bracket.holds(channel, value) {
-                        self.hear(channel, value);
+                        self.read(channel, value);
                     }
                 }
             }

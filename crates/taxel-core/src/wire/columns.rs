@@ -60,7 +60,7 @@ impl<'a> Room<'a> {
 ///
 /// # Safety
 ///
-/// `U` must have the size and alignment of `T`, and whoever writes must write valid `U` that are valid `T` too.
+/// `U` must have the size and alignment of `T`, and the caller must write valid `U` that are valid `T` too.
 unsafe fn open<T, U>(column: &mut [T]) -> &mut [MaybeUninit<U>] {
     // SAFETY: the caller's promise; length and lifetime are the slice's own.
     unsafe { std::slice::from_raw_parts_mut(column.as_mut_ptr().cast(), column.len()) }

@@ -28,7 +28,7 @@ pub struct DatagramInfo {
 
 /// Decodes the datagrams of one sender (address and port).
 ///
-/// It speaks version 1 until its first intact datagram of version 2. From then on what is of version 1 is refused and counted, until
+/// A sender uses version 1 until its first intact datagram of version 2. From then on datagrams of version 1 are refused and counted, until
 /// [`Self::expect`], or a second of nothing but whole words of version 1, says that the board changed. Time goes on over a
 /// change by the host's clock.
 #[derive(Debug, Clone)]
@@ -48,7 +48,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// A receiver of a sender that speaks `version` at first; `one` decodes what is of version 1, and has the array.
+    /// A receiver of a sender that uses `version` at first; `one` decodes what is of version 1, and has the array.
     #[must_use]
     pub fn new(one: Decoder, version: u8) -> Self {
         let array = one.array().clone();
@@ -56,7 +56,7 @@ impl Receiver {
         Self { array, version, one, two, offset: Some(0), latest: None, whole_since: None, refused: 0, changes: 0 }
     }
 
-    /// The version that the sender speaks.
+    /// The version that the sender uses.
     #[must_use]
     pub fn version(&self) -> u8 {
         self.version
@@ -86,7 +86,7 @@ impl Receiver {
         self.one.counts()
     }
 
-    /// Bytes of version 1 that were refused because the sender speaks version 2.
+    /// Bytes of version 1 that were refused because the sender uses version 2.
     #[must_use]
     pub fn refused(&self) -> u64 {
         self.refused
@@ -107,7 +107,7 @@ impl Receiver {
 
     /// Takes a datagram; appends its events.
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> DatagramInfo {
-        let (before, heard) = (self.version, out.len());
+        let (before, rows) = (self.version, out.len());
         let mut info = DatagramInfo::default();
         let second = datagram.first() == Some(&v2::MAGIC) && (self.version == 2 || Header::read(datagram).is_ok());
         if second {
@@ -130,7 +130,7 @@ impl Receiver {
             self.one.end_of_datagram_into(out);
             self.carry(rows, markers, arrived, out);
         }
-        if let Some(&t) = out.t[heard..].last() {
+        if let Some(&t) = out.t[rows..].last() {
             let latest = self.latest.map_or(t, |(latest, _)| latest.max(t));
             self.latest = Some((latest, arrived));
         }
@@ -166,8 +166,8 @@ impl Receiver {
         self.changes += 1;
         if version == 1 {
             self.offset = None;
-        } else if let Some((latest, heard)) = self.latest {
-            self.two.go_on_from(latest, heard);
+        } else if let Some((latest, then)) = self.latest {
+            self.two.go_on_from(latest, then);
         }
     }
 
@@ -176,8 +176,8 @@ impl Receiver {
         let first = out.t.get(rows).copied().or_else(|| out.markers.get(markers).map(|m| m.t));
         let Some(first) = first else { return };
         let offset = *self.offset.get_or_insert_with(|| match self.latest {
-            Some((latest, heard)) => {
-                let passed = arrived.zip(heard).map_or(0, |(now, then)| silence(then, now));
+            Some((latest, then)) => {
+                let passed = arrived.zip(then).map_or(0, |(now, then)| silence(then, now));
                 latest + passed - first
             }
             None => 0,
@@ -294,12 +294,12 @@ mod tests {
         assert_eq!((receiver.version(), receiver.changes()), (2, 1));
         speak(&mut board, 1);
         receiver.expect(1, &mut events);
-        let heard = events.len();
+        let before = events.len();
         play(&mut board, 2, |datagram| {
             receiver.push(datagram, Some(400), &mut events);
         });
         assert_eq!((receiver.version(), receiver.refused()), (1, 0));
-        assert_eq!(events.len(), heard + 2 * 4096);
+        assert_eq!(events.len(), before + 2 * 4096);
     }
 
     #[test]

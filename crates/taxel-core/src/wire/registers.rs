@@ -88,7 +88,7 @@ impl Registers {
         Ok(Self { lines: preset.lines.min(array.columns), ..preset })
     }
 
-    /// These registers with a preset taken over, as a board of that array takes it: which version of the wire it speaks, and
+    /// These registers with a preset taken over, as a board of that array takes it: which version of the wire it sends, and
     /// whether a recording runs, no preset says; channels are the board's build, and a smaller array has fewer lines.
     #[must_use]
     pub fn with_preset(&self, preset: &Self, array: &Array) -> Self {
@@ -248,7 +248,7 @@ impl Registers {
         }
     }
 
-    /// What is allowed but hardly meant, one line each.
+    /// Warnings about values that are allowed but probably a mistake, one line each.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         rules::warned(self).into_iter().map(|(_, text)| text).collect()
