@@ -134,7 +134,7 @@ $(RTL)/.installed: rtl/requirements.txt
 	@$(RTL)/bin/python -m pip install --quiet --disable-pip-version-check -r rtl/requirements.txt
 	@touch $@
 
-.PHONY: rtl-tools rtl-registers rtl-lint rtl-quick rtl-test
+.PHONY: rtl-tools rtl-registers rtl-lint rtl-quick rtl-test rtl-slow
 rtl-tools: $(RTL)/.installed
 
 # The RTL's package of registers, from the registers' one source.
@@ -150,8 +150,14 @@ lint: rtl-lint
 rtl-test: $(RTL)/.installed released $(VENV)/.for-test rtl-lint
 	$(BIN)/python -m pytest -q rtl/tests -m "not slow"
 rtl-quick: released $(VENV)/.for-test
-	$(BIN)/python -m pytest -q rtl/tests -m "not slow" -k quick
+	$(BIN)/python -m pytest -q rtl/tests -m "not slow" -k "quick or 8-8-16"
 test: rtl-quick
+
+# Planted faults, and proofs without bound with planted faults of their own.
+rtl-slow: released $(VENV)/.for-test
+	$(BIN)/python -m pytest -q rtl/tests -m slow
+	$(BIN)/python rtl/tools/prove.py
+slow: rtl-slow
 
 # Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
 PEERS := .venv-peers

@@ -44,7 +44,7 @@ def missing(peers: Mapping[str, str]) -> dict[str, str]:
 
 
 def ask(script: str, *arguments: object, packages: str, limit: int, quick: bool) -> dict[str, Any]:
-    """Run `script` in one thread; return what it says as JSON in its last line, or how it ended.
+    """Run `script` in one thread; return the JSON of its last line of output, or how it ended.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _run(script: str, arguments: tuple[object, ...], limit: int) -> dict[str, An
     def cap() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
 
-    said = subprocess.run(
+    ran = subprocess.run(
         [sys.executable, script, *map(str, arguments)],
         preexec_fn=cap,
         capture_output=True,
@@ -107,9 +107,9 @@ def _run(script: str, arguments: tuple[object, ...], limit: int) -> dict[str, An
         env=os.environ | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1"),
         cwd=Path(script).parent,
     )
-    if said.returncode == 0:
-        found: dict[str, Any] = json.loads(said.stdout.splitlines()[-1])
+    if ran.returncode == 0:
+        found: dict[str, Any] = json.loads(ran.stdout.splitlines()[-1])
         return found
-    if said.returncode in (-9, -24):
+    if ran.returncode in (-9, -24):
         return {"stopped": f"after {limit} s of CPU, without a verdict", "limit_s": limit}
-    return {"failed": said.stderr.strip().splitlines()[-1:] or [f"exit status {said.returncode}"]}
+    return {"failed": ran.stderr.strip().splitlines()[-1:] or [f"exit status {ran.returncode}"]}

@@ -50,7 +50,7 @@ def filter_of(encoder: SA1 | SA2 | FA2, x: Any) -> Callable[[Any], Any]:
 
 def numpy_afferents(encoder: SA1 | SA2 | FA2, frames: Frames) -> list[Any]:
     """Return (t, taxel) of all spikes."""
-    said, period = [], encoder.period_ms
+    spikes, period = [], encoder.period_ms
     x = np.maximum(frames.values[0], 0).astype(np.float64).ravel() / encoder.range
     step = filter_of(encoder, x)
     u = 0 * x if isinstance(encoder, FA2) else (1 - encoder.loss) * x
@@ -67,8 +67,8 @@ def numpy_afferents(encoder: SA1 | SA2 | FA2, frames: Frames) -> list[Any]:
         wait = np.maximum(wait - period, 0)
         raised[fired] += encoder.jump * np.exp(-since / encoder.recovery_ms)
         wait[fired] = np.maximum(encoder.refractory_ms - since, 0)
-        said += [(t, taxel) for taxel in fired.tolist()]
-    return said
+        spikes += [(t, taxel) for taxel in fired.tolist()]
+    return spikes
 
 
 def benchmark(about: str | None, name: str, encoder: SA1 | SA2 | FA2, *, quick: bool) -> dict[str, Any]:

@@ -76,7 +76,7 @@ def stamp(*packages: str) -> dict[str, Any]:
     """Return machine, versions and commit; `taxel bench` writes a result only where that is all that ran."""
     versions = {"python": platform.python_version()}
     versions |= {package: version(package) for package in ("taxel", "numpy", *packages)}
-    said = subprocess.run(
+    ran = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"],
         capture_output=True,
         text=True,
@@ -91,7 +91,7 @@ def stamp(*packages: str) -> dict[str, Any]:
             "system": platform.platform(),
         },
         "versions": versions,
-        "commit": said.stdout.strip() or "unknown",
+        "commit": ran.stdout.strip() or "unknown",
     }
 
 

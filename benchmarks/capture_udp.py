@@ -156,18 +156,18 @@ def faery(rate: float, seconds: float, port: int) -> dict[str, Any]:
         check=True,
     )
     try:
-        said, _ = receiver.communicate(timeout=10 + seconds)
+        printed, _ = receiver.communicate(timeout=10 + seconds)
     except subprocess.TimeoutExpired:
         receiver.kill()
         receiver.communicate()
         return {"asked_events_per_s": rate, "failed": "its receiver never got the end mark"}
-    sent, heard = json.loads(sender.stdout)["events"], json.loads(said.splitlines()[-1])
+    sent, received = json.loads(sender.stdout)["events"], json.loads(printed.splitlines()[-1])
     return {
         "asked_events_per_s": rate,
         "sent_events_per_s": sent / seconds,
-        "arrived": heard["events"] / max(sent, 1),
-        "cores": heard["cpu_s"] / seconds,
-        "latency": {"p50": heard["p50_us"], "p99": heard["p99_us"], "max": heard["max_us"]},
+        "arrived": received["events"] / max(sent, 1),
+        "cores": received["cpu_s"] / seconds,
+        "latency": {"p50": received["p50_us"], "p99": received["p99_us"], "max": received["max_us"]},
     }
 
 

@@ -2,7 +2,7 @@
 
 Both solve the same layer of 64 x 64 taxels, called from Python. *A frame of a footprint*: a ball goes up and down at
 100 mm/s, a frame at 5208 Hz; ours begins where the last two frames led, as in a scene. ContactMechanics (PyPI, 530 MB
-with what it needs; left out where it is not installed) solves each anew, as it does unless told otherwise, and, apart,
+with what it needs; left out where it is not installed) solves each anew, as it does by default, and, apart,
 begun from the last frame's forces. *From nothing* is the deepest frame alone; *the whole array* is a sole, from
 nothing. Each has its own tolerances: `furthest off` is the worst pressure off ours to 1e-8, as a share of the largest.
 The base stress, which ContactMechanics does not know, is in our time. Scenes are played whole, board and decoding too:
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from taxel.simulate import Layer, Scene, Silence, play, truth
 from taxel.wire import FRAME_US
 
-#: A frame of a footprint, by the issue that asked for it.
+#: The goal: how many times faster than the peer a frame of a footprint is.
 GOALS = {"a frame of a footprint / ContactMechanics": 100.0}
 
 FOAM = {"modulus_kpa": 60.0, "poisson": 0.0, "yield_strain": 0.9, "densification_strain": 0.99}

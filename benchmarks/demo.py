@@ -26,8 +26,10 @@ def run(*, quick: bool) -> dict[str, Any]:
         )
     ratios = {}
     for touch in ("first impact", "bounce, 0.4 m/s and more"):
-        for said in ("contact", "lift"):
-            ours, rule = (values[way]["classes"][touch][said] for way in ("neuron", "plain_rule"))
-            ratios[f"{touch}, {said}: found, of {ours['touches']}"] = ours["found"]
-            ratios[f"{touch}, {said}: plain rule's delay over ours"] = rule["known_ms"]["p50"] / ours["known_ms"]["p50"]
+        for label in ("contact", "lift"):
+            ours, rule = (values[way]["classes"][touch][label] for way in ("neuron", "plain_rule"))
+            ratios[f"{touch}, {label}: found, of {ours['touches']}"] = ours["found"]
+            ratios[f"{touch}, {label}: plain rule's delay over ours"] = (
+                rule["known_ms"]["p50"] / ours["known_ms"]["p50"]
+            )
     return stamp() | values | {"ratios": ratios}

@@ -47,14 +47,14 @@ def all_of_them(count, taus):
         for gram in spatial_grams(spikes, PERIOD_MS, tau, kernels, [SAMPLES]):
             matrices += len(distances_of(gram[0])) == count
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    asked = len(TAUS_MS) * len(SIGMAS_MM)
+    searched = len(TAUS_MS) * len(SIGMAS_MM)
     return {
         "patterns": count,
         "matrices": matrices,
-        "of": asked,
+        "of": searched,
         "wall_s": wall,
         "cpu_s": cpu,
-        "cpu_s of all": cpu * asked / matrices,
+        "cpu_s of all": cpu * searched / matrices,
     }
 
 
@@ -62,20 +62,20 @@ def beside_metrics(count):
     """Compare a few patterns' distances, and what a pair costs."""
     spikes = patterns(count, 2)
     as_trains, kernel, array = trains(spikes), smoothed(REGION, PITCH_MM, 2.0), Array(REGION, REGION, pitch_mm=PITCH_MM)
-    said = {}
+    distances = {}
 
     def ours():
-        said["ours"] = distances_of(spatial_grams(spikes, PERIOD_MS, 0.4, [kernel], [SAMPLES])[0][0])
+        distances["ours"] = distances_of(spatial_grams(spikes, PERIOD_MS, 0.4, [kernel], [SAMPLES])[0][0])
 
     def theirs():
-        said["theirs"] = pairwise(
+        distances["theirs"] = pairwise(
             "van_rossum_spatial", as_trains, array=array, tau=0.4, sigma=2.0, normalisation="none"
         )
 
     results = measure(
         {"by samples": ours, "taxel.metrics.pairwise": theirs}, rounds=1, clock=time.CLOCK_PROCESS_CPUTIME_ID
     )
-    off = np.abs(said["ours"] - said["theirs"]).max() / said["theirs"].max()
+    off = np.abs(distances["ours"] - distances["theirs"]).max() / distances["theirs"].max()
     return {"patterns": count, "results": results, "largest difference": float(off)}
 
 

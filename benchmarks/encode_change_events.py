@@ -13,14 +13,14 @@ from taxel.encode import ChangeEvents
 
 def numpy_change(frames: Frames) -> list[Any]:
     """Return (t, taxel, rise or fall) of changes above the floor since the last sent value."""
-    said, last = [], frames.values[0].copy()
+    spikes, last = [], frames.values[0].copy()
     for t, picture in zip(frames.t[1:], frames.values[1:], strict=True):
         moved = picture - last
         there = np.abs(moved) > FLOOR
         if there.any():
-            said += [(t, taxel_, np.sign(moved.ravel()[taxel_])) for taxel_ in np.flatnonzero(there)]
+            spikes += [(t, taxel_, np.sign(moved.ravel()[taxel_])) for taxel_ in np.flatnonzero(there)]
             last[there] = picture[there]
-    return said
+    return spikes
 
 
 def run(*, quick: bool) -> dict[str, Any]:

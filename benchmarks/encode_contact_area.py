@@ -15,15 +15,15 @@ LEVELS = (2, 4, 8, 16, 32)
 
 def numpy_area(frames: Frames, tare: Tare) -> list[Any]:
     """Return (t, train) of rises and falls of the number of loaded taxels with a loaded neighbour."""
-    said, before = [], 0
+    spikes, before = [], 0
     loaded_from = tare.rest + FLOOR + 0.5
     for t, picture in zip(frames.t, frames.values, strict=True):
         area = int(np.count_nonzero(loaded(picture, loaded_from)))
         if area != before:
-            said += [(t, k) for k, level in enumerate(LEVELS) if before < level <= area]
-            said += [(t, 5 + k) for k, level in enumerate(LEVELS) if area < level <= before]
+            spikes += [(t, k) for k, level in enumerate(LEVELS) if before < level <= area]
+            spikes += [(t, 5 + k) for k, level in enumerate(LEVELS) if area < level <= before]
             before = area
-    return said
+    return spikes
 
 
 def run(*, quick: bool) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from taxel.encode import FA1
 
 def numpy_fa1(frames: Frames, theta_0: float) -> list[Any]:
     """Return (t, taxel, polarity) by equations 5.1 to 5.5; T 0.192 ms."""
-    said = []
+    spikes = []
     jump, fall = 0.192 * 20 * theta_0, 0.05 * theta_0
     last = np.maximum(frames.values[0], 0).astype(np.float64) ** 0.7
     u, theta, fired = np.zeros((64, 64)), np.full((64, 64), theta_0), np.zeros((64, 64), bool)
@@ -25,8 +25,8 @@ def numpy_fa1(frames: Frames, theta_0: float) -> list[Any]:
         s = np.where(u > theta, 1, np.where(u < -theta, -1, 0))
         fired = s != 0
         u[fired] = 0
-        said += [(t, taxel_, s.ravel()[taxel_]) for taxel_ in np.flatnonzero(fired)]
-    return said
+        spikes += [(t, taxel_, s.ravel()[taxel_]) for taxel_ in np.flatnonzero(fired)]
+    return spikes
 
 
 def run(*, quick: bool) -> dict[str, Any]:

@@ -21,7 +21,7 @@ def numpy_moments(frames: Frames, tare: Tare) -> list[Any]:
     levels = np.concatenate([*spaced, -spaced[3], spaced[3], -spaced[3]])
     loaded_from, pitch = tare.rest + FLOOR + 0.5, frames.array.pitch_mm
     y, x = np.mgrid[: frames.array.rows, : frames.array.columns]
-    said, before, origin = [], None, None
+    spikes, before, origin = [], None, None
     for t, picture in zip(frames.t, frames.values, strict=True):
         there = loaded(picture, loaded_from)
         moments = np.zeros(5)
@@ -35,9 +35,9 @@ def numpy_moments(frames: Frames, tare: Tare) -> list[Any]:
             origin = None
         reached = np.where(levels > 0, moments[which] >= levels, moments[which] <= levels)
         if before is not None and (reached != before).any():
-            said += [(t, level) for level in np.flatnonzero(reached != before)]
+            spikes += [(t, level) for level in np.flatnonzero(reached != before)]
         before = reached
-    return said
+    return spikes
 
 
 def run(*, quick: bool) -> dict[str, Any]:

@@ -50,6 +50,6 @@ def run(*, quick: bool) -> dict[str, Any]:
         return []
 
     ours = {"skin, events": lambda: encoder.encode(events), "skin, noisy frames": lambda: encoder.encode(ticks)}
-    said = compare(__doc__, seconds, ours, {}, quick=quick, goals=dict.fromkeys(ours, 20), afferents=len(afferents))
+    result = compare(__doc__, seconds, ours, {}, quick=quick, goals=dict.fromkeys(ours, 20), afferents=len(afferents))
     fields = measure({"numpy, fields of a twentieth": numpy_fields}, rounds=2, work=seconds / 20)
-    return said | {"fields alone, numpy": fields}
+    return result | {"fields alone, numpy": fields}

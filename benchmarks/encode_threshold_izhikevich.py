@@ -16,7 +16,7 @@ from taxel.encode import ThresholdIzhikevich
 
 def numpy_izhikevich(frames: Frames) -> list[Any]:
     """Return (step, neuron) of a pair a channel; first all ON neurons, then all OFF neurons."""
-    said, steps = [], 20
+    spikes, steps = [], 20
     a, b, c, d, gain, dt = 0.005, 0.25, -65.0, 6.0, 0.6, 0.1
     values = frames.values.reshape(len(frames), -1)
     first = gain * np.concatenate([values[0] >= 0.5, values[0] < 0.5])
@@ -29,10 +29,10 @@ def numpy_izhikevich(frames: Frames) -> list[Any]:
             v, u = v + dt * (0.04 * v * v + 5.0 * v + 140.0 - u + current), u + dt * a * (b * v - u)
             fired = v >= 30
             if fired.any():
-                said += [(k * steps + step, neuron) for neuron in np.flatnonzero(fired)]
+                spikes += [(k * steps + step, neuron) for neuron in np.flatnonzero(fired)]
                 v[fired] = c
                 u[fired] += d
-    return said
+    return spikes
 
 
 def gait(seconds: float, rng: np.random.Generator) -> Frames:

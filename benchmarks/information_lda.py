@@ -2,9 +2,9 @@
 
 15 000 trials of 1000 ternary features, 300 classes: our ten folds, beside scikit-learn's ``svd`` of one fold (it trains
 each anew, so ten cost ten times that). Once of spikes drawn one by one, whose scatter has its full rank, and once of
-rasters as an array gives them, in which features tell each other exactly. Predictions of that fold are compared, trial
-by trial. Then 150 000 x 5000, ten folds, once, with the time and the largest memory. CPU time of the process: both use
-all cores.
+rasters as an array gives them, in which features determine each other exactly. Predictions of that fold are compared,
+trial by trial. Then 150 000 x 5000, ten folds, once, with the time and the largest memory. CPU time of the process:
+both use all cores.
 """
 
 import resource
@@ -44,7 +44,7 @@ def touches(trials, features, classes, seed):
     """Return FA-1's spikes of touches, sampled every 2 ms, and the labels.
 
     A class is a place, width, depth and rise of pressure; a trial begins within a sample, up to a tenth more or less
-    deep. What presses is symmetric about the second column, so the first and the third say the same.
+    deep. What presses is symmetric about the second column, so the first and the third are equal.
     """
     random = np.random.default_rng(seed)
     labels, samples = np.arange(trials) % classes, features // (ROWS * COLUMNS)

@@ -1,9 +1,10 @@
 """How long after the last byte of what shows a touch a detection is called back: at rest and on a loaded machine.
 
 A patch of 5 x 5 taxels is touched at random moments and places, for 4 ms each, 80 times a second. A frame sees it in
-the lines that are scanned after its moment; contact area crosses 10 taxels, and one neuron says so at once. Beside it
-nothing moves, or a tenth of the taxels, or all of them: they fall and rise in every frame below what counts as loaded.
-The frames' datagrams are made beforehand, and a process of its own sends each frame when the board would, at its end.
+the lines that are scanned after its moment; contact area crosses 10 taxels, and one neuron detects that at once.
+Beside it nothing moves, or a tenth of the taxels, or all of them: they fall and rise in every frame below what counts
+as loaded. The frames' datagrams are made beforehand, and a process of its own sends each frame when the board would,
+at its end.
 
 Callback is what `Live(say=...)` calls, in Python, from the thread that made the detection. Times by the host's clock:
 
@@ -161,8 +162,8 @@ def readout(array: Array) -> tuple[Readout, Tare]:
     return Readout(encoder, {"contact": (Neuron(tau=1.0, refractory=5.0), [30.0, 0.0])}, array=array), Tare.take(rest)
 
 
-def heard(way: Way, seconds: float, scratch: Path) -> dict[str, Any]:
-    """Send what is simulated, and say how long each detection took."""
+def measured(way: Way, seconds: float, scratch: Path) -> dict[str, Any]:
+    """Send what is simulated, and return the delay of each detection."""
     frames, touches = simulated(way, seconds * way.share)
     array = Array(way.side, way.side)
     judge, tare = readout(array)
@@ -235,7 +236,7 @@ def run(*, quick: bool) -> dict[str, Any]:
             if state == "at rest":
                 end(crowd)
             try:
-                rows[state] = {way.name: heard(way, seconds, Path(folder)) for way in WAYS}
+                rows[state] = {way.name: measured(way, seconds, Path(folder)) for way in WAYS}
             finally:
                 end(crowd)
     calm = rows["at rest"]

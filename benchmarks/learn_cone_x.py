@@ -213,7 +213,7 @@ def by_piqp(n, p):
 
 
 def peer(name, n, p):
-    """Run one peer; say what it took and found."""
+    """Run one peer; return its time and result."""
     warnings.simplefilter("ignore")
     run = {
         "Clarabel": lambda: by_clarabel(n, p),

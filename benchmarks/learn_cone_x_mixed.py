@@ -41,7 +41,7 @@ def rows(spikes, times):
 
 
 def peer(trains, patterns, lambdas):
-    """Solve 6.11 with CVXPY and Clarabel; say what it took and found."""
+    """Solve 6.11 with CVXPY and Clarabel; return time and result."""
     import cvxpy as cp  # noqa: PLC0415  a peer need not be there
 
     spikes, targets = draw(trains, patterns)

@@ -61,7 +61,7 @@ def compared(parameters, footfalls, steps):
     """Stream the footfalls; over the last steps, a fit from nothing beside each."""
     parameters = {**parameters, "tolerance": 5e-7}
     online = OnlineConeR(window=WINDOW, **parameters)
-    kept, rows = [], []
+    rows = []
     first = len(footfalls) - steps
     start = max(0, first - WINDOW)
     online.fit(*zip(*footfalls[start:first], strict=True))

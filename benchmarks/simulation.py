@@ -1,9 +1,9 @@
-"""How long 10 000 neurons take to hear 1000 inputs of 20 Hz for a second: on a grid, and exact in continuous time.
+"""How long 10 000 neurons take for 1000 inputs of 20 Hz and a second: on a grid, and exact in continuous time.
 
 All are connected to all: 2e8 synaptic events. The neuron is the one that every peer has: SRM0 with alpha kernel (two
 leaky integrators of 15 ms in a row), a fixed threshold of 0.3 mV, everything back to 0 at a spike. The peers step a
 grid, so an input acts from the next point on; NumPy is the obvious loop: each step adds the weights of the inputs that
-came. `continuous` has no grid: it says each crossing to rounding, which no peer does. The neurons of the thesis
+came. `continuous` has no grid: it computes each crossing to rounding, which no peer does. The neurons of the thesis
 (refractory time, threshold rise, inputs kept) stand beside it, with what they cost more. One thread, CPU time.
 """
 
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 import taxel
 from taxel import Neuron, SpikeTrains
 
-#: At most as long as the peer, by the issue that asked for it.
+#: The goal: at most as long as the peer.
 GOALS = {"taxel, grid / numpy, 1 ms": 1.0, "taxel, continuous / brian2, 1 ms": 1.0}
 
 TAU_MS, THETA, LENGTH_MS = 15.0, 0.3, 1000.0

@@ -1,17 +1,17 @@
 """How large version 2 of the wire is, and how fast it is decoded, beside version 1 with the same events.
 
 Bytes an event: the same trip times go through a board of each version at 5208 frames/s (kind S, values included).
-What a board of version 2 says beside events (heartbeats, states, totals) is counted apart. Scenes: every taxel in
+What a board of version 2 sends beside events (heartbeats, states, totals) is counted apart. Scenes: every taxel in
 every frame; a footfall, which is a picture that rolls from heel to toe, drawn by a seed (no recording); a ball
 dropped and pressed (the demo's scene of that seed), tared away from the noise.
 
 Decoding: checksums included, beside version 1's pairs of change and intensity; an event is a pair. Version 2 is always
 decoded a datagram at a time, each with its length before it; version 1 as one stream without datagrams, and a datagram
-at a time as a host hears it, with a list of their lengths. In scenes a datagram has few events, so the second is what
+at a time as a host receives it, with a list of lengths. In scenes a datagram has few events, so the second is what
 compares. Each is one call for all datagrams, which fills the same columns in place, as live pipelines use theirs again
 and again; beside it into new memory each time, where the kernel's first touch of each page is the larger part of few
 events. Heartbeats, which version 1 does not know, are left out of what is decoded (in the drop 94 of 100 datagrams
-are empty): their numbers are then missing, which costs version 2 something, most in the drop. What they cost is said
+are empty): their numbers are then missing, which costs version 2 something, most in the drop. What they cost is stated
 beside.
 """
 
@@ -50,7 +50,7 @@ def full() -> Frames:
 
 
 def felt(acts: list[Any]) -> Frames:
-    """Return what the taxels hold frame by frame, from the start marker on, as a board of version 1 tells it."""
+    """Return what the taxels hold frame by frame, from the start marker on, as a board of version 1 sends it."""
     events = play([Silence(TARE_MS + 50.0), *acts], seed=SEED, tare_ms=TARE_MS).events
     start, stop = (t for t, _ in events.markers)
     held = np.zeros(4096, np.uint16)
@@ -95,7 +95,7 @@ def sizes(frames: Frames) -> dict[str, Any]:
     """Return bytes an event: of version 1, and of version 2 by what they are for."""
     one = sent(frames, Registers())
     changes = sum(map(len, one)) // 10
-    said: dict[str, Any] = {"events": changes, "frames": len(frames) - 1, "version 1": 10.0}
+    found: dict[str, Any] = {"events": changes, "frames": len(frames) - 1, "version 1": 10.0}
     for name, hold in (("at once", 0), ("hold 1 ms", 1000)):
         two = sent(frames, Registers(wire_version=2), hold_us=hold)
         kinds = {"events": 0, "heartbeats": 0, "states": 0, "totals": 0}
@@ -103,9 +103,9 @@ def sizes(frames: Frames) -> dict[str, Any]:
             kind = datagram[1] & 15
             what = "totals" if kind == 4 else "states" if kind in (6, 7) else "events"
             kinds["heartbeats" if len(datagram) == EMPTY else what] += len(datagram)
-        said[name] = {what: total / changes for what, total in kinds.items()}
-        said[name]["events against version 1"] = kinds["events"] / changes / 10.0
-    return said
+        found[name] = {what: total / changes for what, total in kinds.items()}
+        found[name]["events against version 1"] = kinds["events"] / changes / 10.0
+    return found
 
 
 @dataclass(frozen=True)
@@ -164,9 +164,9 @@ def run(*, quick: bool) -> dict[str, Any]:
     empty["heartbeats of the drop"]["rate"] *= len(silent) // (EMPTY + 2)
     results |= empty
     ratios: dict[str, Any] = {}
-    for name, said in bytes_an_event.items():
+    for name, found in bytes_an_event.items():
         for how, goal in zip(("at once", "hold 1 ms"), GOALS[name], strict=True):
-            against = said[how]["events against version 1"]
+            against = found[how]["events against version 1"]
             ratios[f"bytes an event, {name}, {how} / version 1" + (f" (goal {goal})" if goal else "")] = against
     for name in scenes:
         ours = f"version 2, {name}"

@@ -89,7 +89,8 @@ def study(section: dict[str, Any]) -> list[str]:
     ]
     parts = changed(section)
     if parts:
-        lines += ["", f"**Stale**: made by other code than this one; changed since: {literal(', '.join(parts))}.", ""]
+        first = ", ".join(parts[:3]) + ("" if len(parts) <= 3 else f" and {len(parts) - 3} more")
+        lines += ["", f"**Stale**: made by other code than this one; changed since: {literal(first)}.", ""]
     for picture in section["pictures"]:
         lines += ["", f".. image:: {where}/{picture}", f"   :alt: {name}: {section['title']}", "   :width: 100%", ""]
     rows = [[s["says"], s["published"], s["ours"], VERDICTS[s["holds"]], s["why"]] for s in section["statements"]]

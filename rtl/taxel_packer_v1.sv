@@ -1,11 +1,12 @@
-// Datagrams of version 1 of the wire: an event becomes one or two words of five bytes, at most 280 words a datagram.
+// Datagrams of version 1 of the wire: an event becomes one or two words of five bytes, at most `MOST` words a datagram.
 //
 // A datagram ends with its frame, or before an event whose words would not fit. So the last byte of an event waits until it is
 // known what comes next: the next event, or that its frame has no more.
 module taxel_packer_v1
   import taxel_types::*;
 #(
-    parameter bit VALUED = 1'b1  // a change is followed by its intensity
+    parameter bit VALUED = 1'b1,  // a change is followed by its intensity
+    parameter int MOST = 280      // words of a datagram
 ) (
     input  logic       clk,
     input  logic       reset,
@@ -19,8 +20,6 @@ module taxel_packer_v1
     input  logic       tready,
     output logic       tlast
 );
-
-  localparam logic [8:0] MOST = 9'd280;
 
   event_t now;
   logic busy, second, advance, word_over, event_over, known, ends, over;
@@ -36,7 +35,7 @@ module taxel_packer_v1
   assign event_over = word_over && (now.marker || !VALUED || second);
   // Once it is known that its frame has no more, that stays so: what waits is not withdrawn.
   assign known      = ready || over || (empty && frame != now.frame);
-  assign ends       = ready ? oldest.frame != now.frame || after + more > MOST : 1'b1;
+  assign ends       = ready ? oldest.frame != now.frame || after + more > 9'(MOST) : 1'b1;
 
   assign field  = second ? now.value : now.stamp;
   assign tvalid = busy && (!event_over || known);

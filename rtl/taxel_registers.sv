@@ -29,7 +29,7 @@ package taxel_registers;
     logic [15:0] threshold_rest;
     // FA-1: by how much a quiet frame lowers the threshold, B of Table 5.3.
     logic [7:0] threshold_decay;
-    // Smallest difference that makes no event.
+    // Largest difference that makes no event.
     logic [7:0] noise_floor;
     // Driven lines (the register holds one less; the manual's field has 6 bits, read: 8). The bits hold 1 less.
     logic [7:0] lines;

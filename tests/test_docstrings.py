@@ -19,12 +19,8 @@ import taxel
 
 #: Rooms whose docstrings are not whole yet.
 NOT_YET = {
-    # device
-    "taxel.device",
     # encode
     "taxel.encode",
-    # live
-    "taxel.live",
     # wire
     "taxel.wire",
 }

@@ -5,19 +5,22 @@ nonsense. A callable without a sound call fails the first test, so that nothing 
 """
 
 import inspect
+import json
 import math
 import re
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import pytest
-from sound import LEFT_OUT, SOUND
+from sound import LEFT_OUT, RESULTS, SOUND
 from sound.calibration import CALIBRATION
 from sound.detect import READOUT
 from sound.things import EVENTS, FOUND, TARE, TICKS, TRAINS
 
 import taxel
+from taxel import _core
 
 mpl.use("Agg")
 
@@ -64,7 +67,7 @@ NONSENSE: dict[str, Any] = {
 NONSENSE["a list that holds itself"].append(NONSENSE["a list that holds itself"])
 
 #: Functions to be called: a function of another kind is the caller's to blame, and its own error comes out.
-CALLED = {"answer", "progress", "say", "watch"}
+CALLED = {"answer", "begun", "progress", "say", "touched", "watch"}
 
 
 def modules() -> list[Any]:
@@ -90,7 +93,7 @@ def public() -> dict[str, Any]:
                     held = member.__func__ if isinstance(member, classmethod | staticmethod) else member
                     if not part.startswith("_") and part != "plot" and inspect.isfunction(held):
                         found[f"{full}.{part}"] = held
-    return {name: value for name, value in found.items() if takes(value) or name in SOUND or name in LEFT_OUT}
+    return {name: value for name, value in found.items() if takes(value) or name in SOUND}
 
 
 def takes(value: Any) -> set[str]:
@@ -105,9 +108,10 @@ def takes(value: Any) -> set[str]:
 
 def test_every_public_callable_has_a_sound_call() -> None:
     there = public()
-    untried = sorted(set(there) - set(SOUND) - set(LEFT_OUT))
-    gone = sorted((set(SOUND) | set(LEFT_OUT)) - set(there))
-    assert (untried, gone) == ([], []), "add a sound call to SOUND, or a reason to LEFT_OUT; take out what is gone"
+    known = {**SOUND, **RESULTS, **LEFT_OUT}
+    assert len(known) == len(SOUND) + len(RESULTS) + len(LEFT_OUT)
+    untried, gone = sorted(set(there) - set(known)), sorted(set(known) - set(there))
+    assert (untried, gone) == ([], []), "add a sound call to SOUND, of a result to RESULTS; take out what is gone"
 
 
 @pytest.mark.usefixtures("somewhere")
@@ -115,6 +119,26 @@ def test_every_argument_of_a_sound_call_is_there_to_be_tried() -> None:
     there = public()
     for name, sound in SOUND.items():
         assert takes(there[name]) <= set(sound()[1]), name
+
+
+SCENE_FILE = """
+[[bodies]]
+shape.sphere.radius_mm = 15
+x_mm = 80
+y_mm = 80
+mass_g = 40
+motion.dropped.height_mm = 120
+"""
+
+
+def write_clock(path: Path) -> None:
+    """Write a recording with arrival times, a change of the board and a zeroed taxel."""
+    writer = _core.RecordingWriter(path, json.dumps({"array": EVENTS.array._geometry()}), "none", True)
+    for k, t in enumerate(EVENTS.t.tolist()):
+        writer.datagram(10**18 + t * 1000, k, taxel.wire.encode(EVENTS[EVENTS.t == t]))
+    writer.board_change(10**18, json.dumps({"t_us": 200, "change": "reset"}))
+    writer.zeroing(10**18, 200, 1, 1, 5.0, None)
+    writer.finish("{}")
 
 
 @pytest.fixture
@@ -131,6 +155,8 @@ def somewhere(tmp_path, monkeypatch):
     taxel.convert(EVENTS, "here_events.npz")
     (tmp_path / "here.toml").write_text('[encoder]\nname = "fa1"\n')
     taxel.convert(EVENTS, tmp_path / "here_panel.mcap")
+    write_clock(tmp_path / "here_clock.mcap")
+    (tmp_path / "here_scene.toml").write_text(SCENE_FILE)
     (tmp_path / "here_labels.csv").write_text("label,t_us\na,5\n")
     (tmp_path / "here_trials.csv").write_text("recording,t_us,label\nhere_events,0,a\n")
     (tmp_path / "pdb").mkdir()
@@ -144,6 +170,12 @@ def somewhere(tmp_path, monkeypatch):
 def test_a_sound_call_is_sound(name: str) -> None:
     function, arguments = SOUND[name]()
     function(**arguments)
+
+
+@pytest.mark.usefixtures("somewhere")
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_result_is_what_a_sound_call_returns(name: str) -> None:
+    assert isinstance(RESULTS[name](), public()[name])
 
 
 @pytest.mark.usefixtures("somewhere")

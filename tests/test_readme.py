@@ -46,7 +46,7 @@ CASES = [(page, line) for page in PAGES for line in [*shell_lines(page), *inline
 def test_a_line_to_type_names_a_command_and_options_that_exist(page: Path, line: str) -> None:
     program, *arguments = shlex.split(line.split(" | ", maxsplit=1)[0])
     if program == "make":
-        targets = re.findall(r"^([a-z0-9]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+        targets = re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
         assert {argument for argument in arguments if "=" not in argument} <= set(targets), page
     elif program.endswith("taxel"):
         check(typer.main.get_command(app), arguments, in_full=line in shell_lines(page))

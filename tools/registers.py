@@ -370,7 +370,7 @@ def javascript(source: Table) -> str:
                     said += f"${{{written}}}{words}"
             condition = broken(parsed(rule["holds"]), equal="===")
             lines.append(
-                f"  if ({condition}) said.push({{ rule: {rule['number']}, text: `{said} (rule {rule['number']})` }});"
+                f"  if ({condition}) broken.push({{ rule: {rule['number']}, text: `{said} (rule {rule['number']})` }});"
             )
         named = ", ".join(used(source, warns=warns))
         return f"  const {{ {named} }} = v;\n" + "\n".join(lines)
@@ -393,7 +393,7 @@ def javascript(source: Table) -> str:
  * @property {{string}} text
  *
  * @typedef {{Record<string, number>}} Values every field by name, in its unit, with steps, driven_lines and sense_lines
- * @typedef {{{{ rule: number, text: string }}}} Said
+ * @typedef {{{{ rule: number, text: string }}}} BrokenRule
  */
 
 /** @type {{readonly Field[]}} */
@@ -414,32 +414,32 @@ export const PRESETS = [
 const us = (units) => (units / 100).toFixed(2);
 
 /**
- * Every rule that refuses these registers, in the order in which the board tries them; it says the first.
+ * All rules that these registers break, in the order in which the board checks them; the board reports the first.
  * @param {{Values}} v
- * @returns {{Said[]}}
+ * @returns {{BrokenRule[]}}
  */
 export function refused(v) {{
-  /** @type {{Said[]}} */
-  const said = [];
+  /** @type {{BrokenRule[]}} */
+  const broken = [];
   for (const {{ name, least, greatest, unit }} of FIELDS) {{
     if (unit !== "flag" && (v[name] < least || v[name] > greatest)) {{
-      said.push({{ rule: 4, text: `${{name}} ${{v[name]}} does not fit: must be ${{least}} to ${{greatest}} (rule 4)` }});
+      broken.push({{ rule: 4, text: `${{name}} ${{v[name]}} does not fit: must be ${{least}} to ${{greatest}} (rule 4)` }});
     }}
   }}
 {rules(warns=False)}
-  return said;
+  return broken;
 }}
 
 /**
- * What is allowed but hardly meant.
+ * Rules that only warn: settings that are allowed but hardly intended.
  * @param {{Values}} v
- * @returns {{Said[]}}
+ * @returns {{BrokenRule[]}}
  */
 export function warned(v) {{
-  /** @type {{Said[]}} */
-  const said = [];
+  /** @type {{BrokenRule[]}} */
+  const broken = [];
 {rules(warns=True)}
-  return said;
+  return broken;
 }}
 """
 

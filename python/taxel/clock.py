@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.arguments import shown
 from taxel._core import ProblemError
 
 __all__ = ["Clock"]
@@ -80,14 +81,14 @@ class Clock:
 
         Raises
         ------
-        ProblemError : no datagrams, so that nothing is known of the clock
+        ProblemError : no whole numbers; no datagrams, so that nothing is known of the clock
 
         Examples
         --------
         >>> Clock(np.array([0, 1000]), np.array([10**15, 10**15 + 10**6])).host_ns([500])
         array([1000000000500000])
         """
-        t = np.asarray(board_us, np.int64)
+        t = _whole("board_us", board_us, "us")
         own, host = self._knots
         k = np.clip(np.searchsorted(own, t, side="right") - 1, 0, len(own) - 2)
         since = t - own[k]
@@ -113,20 +114,20 @@ class Clock:
 
         Raises
         ------
-        ProblemError : no datagrams, so that nothing is known of the clock
+        ProblemError : no whole numbers; no datagrams, so that nothing is known of the clock
 
         Examples
         --------
         >>> Clock(np.array([0, 1000]), np.array([10**15, 10**15 + 10**6])).board_us_at([10**15 + 500_000])
         array([500])
         """
-        wanted = np.asarray(host_ns, np.int64)
+        wanted = _whole("host_ns", host_ns, "ns")
         own, host = self._knots
         t = own[0] + (wanted - host[0]) // 1000
         for _ in range(4):
             # What is off shrinks by the drift each time, 1e-4 or less.
             t = t + np.rint((wanted - self.host_ns(t)) / 1000.0).astype(np.int64)
-        return t if np.ndim(host_ns) else int(t)
+        return t if np.ndim(wanted) else int(t)
 
     @property
     def delay_us(self) -> NDArray[np.float64]:
@@ -139,6 +140,17 @@ class Clock:
             return "Clock(no datagram holds a time)"
         late = np.percentile(self.delay_us, [50, 99])
         return f"Clock(drift {self.drift_ppm:+.1f} ppm, delays {late[0]:.0f} us median, {late[1]:.0f} us 99 %)"
+
+
+def _whole(name: str, given: Any, unit: str) -> NDArray[np.int64]:
+    """Return one time or several as int64; refuse what is no whole number."""
+    try:
+        times = np.asarray(given)
+    except (ValueError, TypeError, OverflowError):
+        times = np.array(None)
+    if times.size and (times.dtype.kind not in "iu" or times.max() > np.iinfo(np.int64).max):
+        raise ProblemError(f"{name} is {shown(given)}: must be whole {unit}")
+    return times.astype(np.int64)
 
 
 def _at(line: tuple[int, int, int, float], own_us: int) -> int:

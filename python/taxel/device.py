@@ -1,4 +1,4 @@
-"""The board on its serial line: found, set by name, read back, and found again when the cable was pulled."""
+"""The board on its serial line: sets registers by name, reads them back, and reconnects after the cable was pulled."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ __all__ = ["Cable", "Device", "Greeting", "Port", "ports"]
 
 T = TypeVar("T")
 
-#: How long to wait between two tries to open a line again, s.
+#: Interval between attempts to reopen a line, s.
 _AGAIN_S = 0.05
 #: Start and stop of a recording: REG7[16] (Table 5.5).
 _RECORD = 1 << 16
 #: Lines that are stored for `Cable.said`.
-_KEPT = 256
+_RECENT = 256
 
-#: Where the noise floor stands: REG5[15:8] (Table 5.5).
+#: The noise floor: REG5[15:8] (Table 5.5).
 _FLOOR_REGISTER, _FLOOR_MASK = 5, 0xFF00
 
-#: The line that a board sends at its reset, and when it is asked for it.
+#: The line that a board sends at its reset, and on request.
 _GREETING = re.compile(r"taxel-board v(\d) (\d+)x(\d+) (\d+)ch")
 
 _SPEEDS = {
@@ -57,7 +57,7 @@ class Port:
     Parameters
     ----------
     place : str
-        As "/dev/ttyUSB0": what `Cable` and `Device` take.
+        As "/dev/ttyUSB0", for `Cable` and `Device`.
     kind : {"usb", "pci", "bluetooth", "other"}
     product, maker, serial : str or None
         The description of a USB device.
@@ -76,11 +76,16 @@ class Port:
 def ports() -> list[Port]:
     """Return the serial ports of the system, USB devices first.
 
-    Pseudo-terminals, as `taxel emulate --line` makes, are not among them: give their name.
+    Pseudo-terminals, as `taxel emulate --line` makes, are not among them.
 
     Raises
     ------
-    OSError : the system cannot be asked
+    OSError : the system does not list its ports
+
+    Examples
+    --------
+    >>> all(port.place for port in ports())
+    True
     """
     found = json.loads(_core.serial_ports())
     return [Port(**{**port, "usb": None if port["usb"] is None else tuple(port["usb"])}) for port in found]
@@ -92,12 +97,17 @@ class Greeting:
 
     Parameters
     ----------
-    wire_version : int
-        The version of the wire that it speaks.
-    rows, columns : int
+    wire_version : int, from 1 to 2
+        The version of the wire.
+    rows, columns : int, lines
         Sense lines and driven lines of its array.
-    channels : int
-        Of its converter.
+    channels : int, 1 or more
+        Channels of its converter.
+
+    Examples
+    --------
+    >>> Greeting(2, 64, 64, 4).rows
+    64
     """
 
     wire_version: int
@@ -113,22 +123,22 @@ class Cable:
     ----------
     place : str
         A serial device ("/dev/ttyUSB0"), or host:port of a serial server or an emulated board.
-    baud : int
-        Of a serial device, 8 data bits, no parity, 1 stop bit (reading: the manual gives no settings).
-    timeout : float, s
+    baud : int, bits/s, from 9600 to 460800
+        Baud rate of a serial device; 8 data bits, no parity, 1 stop bit (reading: the manual gives no settings).
+    timeout : float, s, above 0
         How long the board may take to answer.
 
     Attributes
     ----------
     faults : dict
-        How often each fault has come, as far as its line was received.
+        Number of faults by name, as far as their lines were received.
     resets : int
-        How often the board greeted without being asked, as far as its line was received: at a reset, and on connecting.
+        Number of greetings that were not requested, as far as they were received: at a reset, and on connecting.
 
     Raises
     ------
     OSError : the device or the server cannot be opened
-    ProblemError : a place that is neither, or a speed that is none
+    ProblemError : a place or baud rate that makes no sense
 
     Examples
     --------
@@ -146,7 +156,7 @@ class Cable:
             raise ProblemError(f"baud is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
         self.faults: dict[str, int] = {}
         self.resets = 0
-        self._said: deque[str] = deque(maxlen=_KEPT)
+        self._recent: deque[str] = deque(maxlen=_RECENT)
         self.baud, self._file = baud, -1
         self._open()
 
@@ -175,7 +185,11 @@ class Cable:
         os.set_blocking(self._file, False)
 
     def command(self, command: Command) -> int:
-        """Write a register and return the value that the board reports; the board's other lines are skipped.
+        """Write a register and return the value that the board reports; other lines of the board are skipped.
+
+        Parameters
+        ----------
+        command : Command
 
         Raises
         ------
@@ -189,27 +203,27 @@ class Cable:
             if answer and int(answer[1]) == register:
                 return int(answer[2], 16)
             if line.startswith(f"bad REG{command.register} "):
-                said = f"REG{command.register} = 0x{command.value:08X}"
-                raise DeviceError(f"{self.place}: the board refuses {said} ({line[4:]} of its registers)")
+                write = f"REG{command.register} = 0x{command.value:08X}"
+                raise DeviceError(f"{self.place}: the board refuses {write} ({line[4:]} of its registers)")
         raise self._silence()
 
     def greeting(self) -> Greeting:
-        """Ask the board what it is (a write of 8 to REG6), as its line at reset may not have been received.
+        """Request the greeting of the board (a write of 8 to REG6), as its line at reset may not have been received.
 
         Raises
         ------
         DeviceError : the board does not answer
         """
         for line in self._answers(Command(6, 8)):
-            said = _GREETING.fullmatch(line)
-            if said:
-                # It was asked for.
+            greeting = _GREETING.fullmatch(line)
+            if greeting:
+                # It was requested, so it shows no reset.
                 self.resets -= 1
-                return Greeting(*(int(part) for part in said.groups()))
+                return Greeting(*(int(part) for part in greeting.groups()))
         raise self._silence()
 
     def listen(self) -> dict[str, int]:
-        """Read the lines that have come meanwhile, and return how often each fault has come so far ("queue": 3).
+        """Read the lines that have arrived, and return the number of faults so far by name ("queue": 3).
 
         Raises
         ------
@@ -220,23 +234,28 @@ class Cable:
         return dict(self.faults)
 
     def said(self) -> list[str]:
-        """Return the board's lines since this was asked last, answers to commands included; the last 256 of them.
+        """Return the lines of the board since the last call, answers to commands included; at most the last 256.
 
         Raises
         ------
-        DeviceError : the board has hung up
+        DeviceError : the board has disconnected
         """
         self.listen()
-        said = list(self._said)
-        self._said.clear()
-        return said
+        lines = list(self._recent)
+        self._recent.clear()
+        return lines
 
     def reopen(self, within: float = 2.0) -> Greeting:
-        """Open the line again, as often as it takes, until the board greets; what was known of its faults is forgotten.
+        """Reopen the line until the board answers with its greeting; the fault counts begin again at 0.
+
+        Parameters
+        ----------
+        within : float, s
+            How long to try.
 
         Raises
         ------
-        DeviceError : no board is there within so many seconds
+        DeviceError : no board answers within that time
         """
         until, why = time.monotonic() + number("within", within), ""
         patience, self.timeout = self.timeout, min(self.timeout, 0.25)
@@ -256,7 +275,11 @@ class Cable:
             self.timeout = patience
 
     def read(self, register: int) -> int:
-        """Return what a register holds (a write of REG6 with its number).
+        """Return the value of a register (a write of REG6 with its number).
+
+        Parameters
+        ----------
+        register : int, from 0 to 7
 
         Raises
         ------
@@ -266,7 +289,11 @@ class Cable:
 
     @contextlib.contextmanager
     def floor(self, ticks: int) -> Iterator[None]:
-        """Set the noise floor for a while, as for a tare; the old one comes back at the end.
+        """Set the noise floor within a context, as for a tare; the previous one is restored at its end.
+
+        Parameters
+        ----------
+        ticks : int, ticks, from 0 to 255
 
         Raises
         ------
@@ -281,7 +308,7 @@ class Cable:
             self.command(Command(_FLOOR_REGISTER, before))
 
     def close(self) -> None:
-        """Let go of the line."""
+        """Close the line."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
@@ -298,7 +325,7 @@ class Cable:
         return f"Cable({self.place})"
 
     def _answers(self, command: Command) -> Iterator[str]:
-        """Send a command; yield the lines that the board sends then."""
+        """Send a command; yield the lines that the board sends after it."""
         self._require()
         os.write(self._file, command.to_bytes())
         return self._lines(self.timeout)
@@ -311,21 +338,21 @@ class Cable:
         return DeviceError(f"{self.place}: no answer within {self.timeout:g} s: is this the board's serial line?")
 
     def _lines(self, seconds: float) -> Iterator[str]:
-        """Yield the board's lines until none has come for too long; record faults among them."""
+        """Yield the lines of the board until none has arrived for `seconds`; count faults among them."""
         self._require()
         until = time.monotonic() + seconds
         while True:
             line, end, rest = self._waiting.partition(b"\n")
             if end:
                 self._waiting = rest
-                said = line.decode("ascii", "replace").strip()
-                self._said.append(said)
-                self.resets += _GREETING.fullmatch(said) is not None
-                fault = re.fullmatch(r"fault (\w+) (\d+)", said)
+                received = line.decode("ascii", "replace").strip()
+                self._recent.append(received)
+                self.resets += _GREETING.fullmatch(received) is not None
+                fault = re.fullmatch(r"fault (\w+) (\d+)", received)
                 if fault:
                     self.faults[fault[1]] = int(fault[2])
                 else:
-                    yield said
+                    yield received
                 continue
             if not select.select([self._file], [], [], max(0.0, until - time.monotonic()))[0]:
                 return
@@ -338,20 +365,21 @@ class Cable:
 class Device:
     """Set a board by its registers' names, with their units; a context manager.
 
-    What is set is read back. Where the cable was pulled, what is asked next finds the board again, and sets what was
-    set before where the board has forgotten it.
+    Registers are read back after they are set. After the cable was pulled, the next call reconnects, and sets the
+    registers again where the board was reset.
 
     Parameters
     ----------
     place : str
         A serial device (`ports` finds them), or host:port.
     array : Array, optional
-        The sensor; of the size that the board reports where it is left out.
-    baud : int
-    timeout : float, s
+        The sensor. Default: one of the size that the board reports.
+    baud : int, bits/s, from 9600 to 460800
+        Baud rate of a serial device.
+    timeout : float, s, above 0
         How long the board may take to answer.
     patience : float, s
-        How long it is looked for once the cable was pulled.
+        How long to try to reconnect after the cable was pulled.
 
     Raises
     ------
@@ -392,19 +420,24 @@ class Device:
 
     @property
     def registers(self) -> Registers:
-        """What the board's registers hold, read now.
+        """The contents of the board's registers, read now.
 
         Raises
         ------
-        DeviceError : the board does not answer, or holds what breaks a rule
+        DeviceError : the board does not answer, or its registers break a rule
         """
         return self._try(self._read)
 
     def apply(self, registers: Registers | str) -> Registers:
-        """Set all registers but `record`, or a preset by its name; return what the board holds then.
+        """Set all registers but `record`, or a preset by its name; return the contents of the registers afterwards.
 
-        Each write on the way leaves the board with a set that keeps the rules. A preset leaves the version of the wire
-        that the board speaks (`Registers.with_preset`).
+        After each write the registers satisfy the rules. A preset does not change the version of the wire
+        (`Registers.with_preset`).
+
+        Parameters
+        ----------
+        registers : Registers or str
+            The registers, or the name of a preset.
 
         Raises
         ------
@@ -416,7 +449,12 @@ class Device:
         return self._try(lambda: self._write(self._read().with_preset(preset)))
 
     def set(self, **fields: float) -> Registers:
-        """Set some registers by name, times in us; return what the board holds then.
+        """Set some registers by name, times in us; return the contents of the registers afterwards.
+
+        Parameters
+        ----------
+        **fields : float
+            Values by the names of `Registers`, in their units.
 
         Raises
         ------
@@ -435,6 +473,11 @@ class Device:
     def record(self, start: bool) -> Registers:
         """Start or stop a recording: a marker event, and an edge on the sync pin.
 
+        Parameters
+        ----------
+        start : bool
+            Start (true) or stop.
+
         Raises
         ------
         DeviceError : the board does not answer
@@ -444,11 +487,11 @@ class Device:
 
     @property
     def faults(self) -> dict[str, int]:
-        """How often each fault has come since the board was found, by its lines: "queue", "comparator", "command"."""
+        """Number of faults by name since the board was connected: "queue", "comparator", "command"."""
         return self._try(self.cable.listen)
 
     def close(self) -> None:
-        """Let go of the line; the board goes on."""
+        """Close the line; the board continues."""
         self.cable.close()
 
     def __enter__(self) -> Self:
@@ -464,7 +507,7 @@ class Device:
         return f"Device({self.cable.place}, {g.rows} x {g.columns} taxels, {g.channels} channels)"
 
     def _try(self, work: Callable[[], T]) -> T:
-        """Do something; once more where the cable was pulled meanwhile."""
+        """Call a function, a second time where the cable was pulled during the first call."""
         try:
             return work()
         except OSError:
@@ -495,8 +538,8 @@ class Device:
         now = self._read()
         if now.replace(record=target.record) != target:
             wrong = [n for n, (a, b) in enumerate(zip(now.words, target.words, strict=True)) if a != b and n != 7]
-            said = ", ".join(f"REG{n} is 0x{now.words[n]:08X}, not 0x{target.words[n]:08X}" for n in wrong)
-            raise DeviceError(f"{self.cable.place}: the board holds something else than was written: {said}")
+            differing = ", ".join(f"REG{n} is 0x{now.words[n]:08X}, not 0x{target.words[n]:08X}" for n in wrong)
+            raise DeviceError(f"{self.cable.place}: the board holds something else than was written: {differing}")
         self._set = target
         return now
 

@@ -123,24 +123,11 @@ class Frames(Columns):
                 f"shorter stretch or a period longer than {period} us"
             )
         t = np.arange(pictures, dtype=np.int64) * period + first
-        values = _zeros(len(t), array)
-        there = np.flatnonzero(events.present)
-        order = there[np.argsort(events.t[there], kind="stable")]
-        index = array.index(events.x[order], events.y[order])
-        place = np.searchsorted(t, events.t[order], side="left")
-        now = np.zeros(array.rows * array.columns, np.float32)
-        if held is not None:
-            begins = kept_numbers("held", held, np.float32)
-            if begins.shape != array.shape:
-                raise ProblemError(f"held has shape {begins.shape}: must have the array's, {array.shape}")
-            now[:] = begins.reshape(-1)
-        bounds = np.searchsorted(place, np.arange(len(t) + 1), side="left")
-        for k in range(len(t)):
-            new = slice(bounds[k], bounds[k + 1])
-            now[index[new]] = events.intensity[order[new]]
-            values[k] = now
-        pictures_of = frozen(values).reshape(len(t), array.rows, array.columns)
-        return cls(pictures_of, frozen(t), unit="ticks", array=array)
+        begins = None if held is None else kept_numbers("held", held, np.float32)
+        if begins is not None and begins.shape != array.shape:
+            raise ProblemError(f"held has shape {begins.shape}: must have the array's, {array.shape}")
+        values = _core.HeldValues(events._parts(), None, None if begins is None else begins.reshape(-1)).at(t)
+        return cls(frozen(values).reshape(len(t), *array.shape), frozen(t), unit="ticks", array=array)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -256,6 +243,11 @@ class Frames(Columns):
         np.divide(moments * self.array.pitch_mm, total, out=centre, where=total > 0)
         return centre
 
+    def _above(self, rest: NDArray[np.float64]) -> Frames:
+        """Return what the pictures read above the rest of each taxel, which is infinite where it is not known."""
+        above = _core.above_rest(np.ascontiguousarray(self.values).reshape(-1), np.ascontiguousarray(rest).reshape(-1))
+        return Frames(above.reshape(self.values.shape), self.t, unit=self.unit, array=self.array)
+
     def _loaded(self, above: float) -> NDArray[np.bool_]:
         threshold = number("above", above)
         if math.isnan(threshold):
@@ -304,10 +296,3 @@ class Frames(Columns):
     def __repr__(self) -> str:
         time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
         return f"Frames({len(self)} pictures of {self.array.rows} x {self.array.columns} taxels, {time}, {self.unit})"
-
-
-def _zeros(pictures: int, array: Array) -> NDArray[np.float32]:
-    try:
-        return np.zeros((pictures, array.rows * array.columns), np.float32)
-    except MemoryError as error:
-        raise ProblemError(f"{pictures} pictures of {array!r} do not fit the memory ({error})") from None

@@ -8,6 +8,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel.clock import Clock
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
@@ -63,14 +64,11 @@ def _begun(events: Events, held: NDArray[np.float32] | None) -> Events:
     """Return events that begin with what the taxels held then: values told again, which are no changes."""
     if held is None or events.intensity is None or events.present is None or not len(events):
         return events
-    y, x = np.nonzero(~np.isnan(held))
-    if not len(x):
+    ticks = np.where(np.isnan(held), _core.UNKNOWN, held).astype(np.uint16).reshape(-1)
+    if (ticks == _core.UNKNOWN).all():
         return events
-    now = np.full(len(x), events.t.min())
-    told = Events(
-        now, x, y, np.ones(len(x), bool), array=events.array, intensity=held[y, x], repaired=np.ones(len(x), bool)
-    )
-    both = (told, events)
+    first = _core.held_as_events(ticks, int(events.t.min()), events.array._parts())
+    both = (Events._from_parts(first, events.array), events)
     names = ("t", "x", "y", "p", "intensity", "present")
     columns: list[Any] = [np.concatenate([getattr(e, name) for e in both]) for name in names]
     t, x, y, p, ticks, present = columns

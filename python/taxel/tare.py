@@ -107,9 +107,7 @@ class Tare:
         if frames.array.shape != self.array.shape:
             (rows, columns), (of_rows, of_columns) = frames.array.shape, self.array.shape
             raise ProblemError(f"pictures of {rows} x {columns} taxels: the tare is of {of_rows} x {of_columns}")
-        rest = np.where(np.isnan(self.rest), np.inf, self.rest)
-        values = np.maximum(frames.values - rest, 0.0)
-        return Frames(values.astype(np.float32), frames.t, unit=frames.unit, array=frames.array)
+        return frames._above(np.where(np.isnan(self.rest), np.inf, self.rest))
 
     @classmethod
     def from_json(cls, text: str) -> Tare:

@@ -46,7 +46,7 @@ module fifo_proof (
       assert (!ready || level != 0);
       assert (level <= 4'(DEPTH + 2));
       // It refuses only where it is full, and what it holds comes out.
-      assert (!full || level >= 4'(DEPTH));
+      assert (!full || level == 4'(DEPTH + 2));
       assert (idle <= 2'd2);
       // Order and value.
       if (marked && !gone) assert (ahead < level);

@@ -12,6 +12,8 @@ module packer_proof
     input logic   tready
 );
 
+  localparam int MOST = 5;  // words of a datagram, here
+
   logic begun = 1'b0;
   logic push, pop, full, empty, ready, frame, tvalid, tlast;
   logic [7:0] tdata;
@@ -30,7 +32,7 @@ module packer_proof
       .clk, .reset(!begun), .push, .entered, .full, .empty, .ready, .oldest, .pop
   );
 
-  taxel_packer_v1 packer (
+  taxel_packer_v1 #(.MOST(MOST)) packer (
       .clk, .reset(!begun), .ready, .oldest, .pop, .empty, .frame, .tdata, .tvalid, .tready, .tlast
   );
 
@@ -105,9 +107,9 @@ module packer_proof
     if (begun && tvalid) begin
       assert (tdata[7] == (at == 3'd0));
       assert (level != 0);
-      // A datagram ends with an event, holds at most 280 words, and events of one frame.
+      // A datagram ends with an event, holds at most MOST words, and events of one frame.
       assert (!tlast || event_over);
-      assert (words < 9'd280);
+      assert (words < 9'(MOST));
       if (at == 3'd2 && !second && opened) assert (tdata[0] == first_frame);
       if (marked && !gone && ahead == 0) assert (tdata == wanted);
     end
@@ -116,7 +118,7 @@ module packer_proof
     if (begun && marked && !gone) assert (ahead < level);
     if (begun) begin
       cover (gone && tlast && moves);
-      cover (moves && tlast && words == 9'd3);
+      cover (moves && tlast && words == 9'(MOST - 1));
       cover (moves && marker && event_over && !tlast);
     end
   end

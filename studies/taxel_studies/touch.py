@@ -54,8 +54,8 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 
-#: What a loaded taxel reads above rest, ticks: the board's noise floor and half a tick.
-ABOVE = 3.5
+#: What a loaded taxel reads above rest at least, ticks.
+ABOVE = ContactArea().above
 #: The two spheres, as labels.
 KINDS = ("small", "large")
 EVENTS = ("contact", "lift")

@@ -57,7 +57,7 @@ def process_number(_params: dict, _seed: int) -> dict:
 def _forget(monkeypatch):
     CALLS.clear()
     # A cluster's processes import these functions by name, as they would an installed package.
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)
 
 
 @pytest.mark.parametrize("backend", ["here", "loky", "dask", "ray"])

@@ -77,7 +77,7 @@ def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path):
     )  # fmt: skip
     assert far.place() == "zenoh:there:1/left"
     now = time.time_ns()
-    feed.meet()
+    feed.begin_session()
     feed.compare(now, now, now, now)
     emulate("{}:{}".format(*near.address), [Silence(200.0)], tare_ms=20.0, wire=2)
     sent = near.stop().counters

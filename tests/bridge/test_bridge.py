@@ -83,7 +83,7 @@ def test_the_sensor_and_its_registers_are_told(place):
 
 def test_nobody_there_and_the_wrong_name_are_said(place):
     with pytest.raises(
-        taxel.DeviceError, match=f"zenoh:{place}: that computer is reached, but nobody listens at this port; begin"
+        taxel.DeviceError, match=f"zenoh:{place}: that computer is reached, but no program listens at this port; begin"
     ):
         Remote(f"zenoh:{place}", timeout=0.2)
     with Live(0, host="127.0.0.1") as near, Bridge(near, name="left", listen=place):

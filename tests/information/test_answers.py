@@ -376,4 +376,4 @@ def test_what_is_told_plainly_bears_no_warning():
     found = asked(pulsed(touches), taxels=[])
     assert found.full.found.bits == 1.0
     assert found.warnings == ()
-    assert str(found.zero).endswith("0 of 19 reach what was found")
+    assert str(found.zero).endswith("0 of 19 reach the measured bits")

@@ -16,7 +16,7 @@ from taxel.encode import ChangeEvents
 from taxel.live import Live, Panel, PanelClient
 from taxel.live.client import Curves, Picture, Spikes
 
-from .test_live import LOOPBACK, SMALL, play, presses, touch, wait_for
+from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 from .test_viewer import SOON, above_rest, force, spikes_of
 
 pytest.importorskip("websockets", reason="the test extra brings websockets")

@@ -10,7 +10,7 @@ import pytest
 import taxel
 from taxel.live import Live
 
-from .test_live import LOOPBACK, SMALL, play, presses, touch, wait_for
+from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 
 pytestmark = [
     pytest.mark.skipif(os.environ.get("TAXEL_LSL") != "1", reason="listens on all addresses: give TAXEL_LSL=1"),

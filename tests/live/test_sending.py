@@ -14,7 +14,7 @@ import pytest
 import taxel
 from taxel.live import Live
 
-from .test_live import LOOPBACK, SMALL, command, free_port, play, presses, touch, wait_for
+from .boards import LOOPBACK, SMALL, command, free_port, play, presses, touch, wait_for
 
 LONG_BEFORE_ANY = {"guard_frames": 1e6}
 KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "said_us", "said_ns"}

@@ -26,7 +26,7 @@ from taxel.live import Live, Panel, Viewer
 from taxel.live._viewer_process import MOST_OTHERS, MOST_PICTURES, BoundedQueue
 from taxel.live.client import Picture, Subject
 
-from .test_live import LOOPBACK, SMALL, play, presses, touch, wait_for
+from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 
 client = pytest.importorskip("websockets.sync.client", reason="the test extra brings websockets")
 

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tests.panel.browser import Process, free_port, running
-from tests.panel.test_server import Client
+from tests.panel.protocol import Client
 
 import taxel
 

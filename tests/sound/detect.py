@@ -1,6 +1,7 @@
 """Sound calls of `taxel.detect`."""
 
-import inspect
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,11 @@ EXAMPLE = taxel.detect.Example(taxel.Frames(np.eye(4)[:, :, None] * np.ones(4), 
 
 def read_out() -> taxel.detect.ReadoutStream:
     return READOUT.stream()
+
+
+def judged(folds: Any) -> taxel.detect.Judged:
+    folds = folds if isinstance(folds, int) else [folds]
+    return taxel.detect.judge([EXAMPLE, EXAMPLE], RECIPE, folds)
 
 
 #: A sound call of everything public that takes anything, by its full name.
@@ -45,11 +51,6 @@ SOUND: dict[str, Sound] = {
     ),
     "taxel.detect.score": plain(taxel.detect.score, found=FOUND, truth={"a": [10], "b": [25]}, window_ms=50.0),
     "taxel.detect.Spread.of": plain(taxel.detect.Spread.of, values=[1.0, 2.0]),
-    "taxel.detect.Part": plain(taxel.detect.Part, **dict.fromkeys(inspect.signature(taxel.detect.Part).parameters)),
-    "taxel.detect.Fold": plain(taxel.detect.Fold, **dict.fromkeys(inspect.signature(taxel.detect.Fold).parameters)),
-    "taxel.detect.Trained": plain(
-        taxel.detect.Trained, **dict.fromkeys(inspect.signature(taxel.detect.Trained).parameters)
-    ),
     "taxel.detect.Recipe": plain(
         taxel.detect.Recipe,
         encoder=LEVELS,
@@ -85,18 +86,40 @@ SOUND: dict[str, Sound] = {
         progress=lambda _: None,
     ),
     "taxel.detect.train": plain(taxel.detect.train, examples=[EXAMPLE], recipe=RECIPE, progress=lambda _: None),
+    "taxel.detect.Part": plain(
+        lambda **given: judged(taxel.detect.Fold([taxel.detect.Part(0)], [taxel.detect.Part(**given)])),
+        example=1,
+        start=0.0,
+        stop=30_000.0,
+    ),
+    "taxel.detect.Fold": plain(
+        lambda **given: judged(taxel.detect.Fold(**given)),
+        train=[taxel.detect.Part(0)],
+        test=[taxel.detect.Part(1)],
+        inner=[],
+    ),
+    "taxel.detect.Example": plain(
+        lambda **given: taxel.detect.train([taxel.detect.Example(**given)], RECIPE),
+        source=EXAMPLE.source,
+        labels={"a": [9000]},
+        tare=None,
+    ),
+    "taxel.detect.TrainedNeuron": plain(
+        lambda **given: taxel.Readout(LEVELS, {"a": taxel.detect.TrainedNeuron(**given)}, array=ARRAY),
+        neuron=taxel.Neuron(tau=2.0),
+        weights=[0.5] * 32,
+        delay_ms=1.0,
+    ),
+}
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.detect.Judged": lambda: judged(2),
+    "taxel.detect.Trained": lambda: judged(2).trained[0],
+    "taxel.detect.Score": lambda: taxel.detect.score(FOUND, {"a": [10], "b": [25]}),
+    "taxel.detect.Spread": lambda: taxel.detect.Spread.of([1.0, 2.0]),
+    "taxel.detect.Outcome": lambda: taxel.detect.Outcome("walk", EXAMPLE, FOUND),
 }
 
 #: What is not tried, and why.
-LEFT_OUT: dict[str, str] = {
-    "taxel.detect.Judged": "of judge",
-    "taxel.detect.Trained": "of judge",
-    "taxel.detect.Fold": "checked by judge",
-    "taxel.detect.Part": "checked by judge",
-    "taxel.detect.Score": "a result",
-    "taxel.detect.Spread": "a result",
-    "taxel.detect.Example": "checked by train",
-    "taxel.detect.Outcome": "a result",
-    "taxel.detect.TrainedNeuron": "checked by Readout",
-    "taxel.detect.Learner": "a protocol",
-}
+LEFT_OUT: dict[str, str] = {}

@@ -1,9 +1,15 @@
 """Sound calls of `taxel.device`."""
 
+from collections.abc import Callable
+from typing import Any
+
 from sound.things import Sound
 
 #: A sound call of everything public that takes anything, by its full name.
 SOUND: dict[str, Sound] = {}
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {}
 
 #: What is not tried, and why.
 LEFT_OUT: dict[str, str] = {

@@ -1,5 +1,8 @@
 """Sound calls of `taxel.information`."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 import taxel
@@ -18,6 +21,11 @@ PRESSES = taxel.Events(
     np.arange(8) * 10_000 + 1000, np.arange(8) % 2, [0] * 8, [True] * 8, array=ARRAY, intensity=np.arange(8) * 50 + 50
 )
 TOUCHES = [taxel.information.LabelledTrial(PRESSES, "ab"[k % 2], k * 10_000) for k in range(8)]
+
+
+def answer() -> taxel.information.Answer:
+    return taxel.information.answer(TOUCHES, window_ms=5.0, draws=1, folds=2, shuffles=1)
+
 
 #: A sound call of everything public that takes anything, by its full name.
 SOUND: dict[str, Sound] = {
@@ -193,14 +201,17 @@ SOUND: dict[str, Sound] = {
     ),
 }
 
-#: What is not tried, and why.
-LEFT_OUT: dict[str, str] = {
-    "taxel.information.Code": "abstract: its kinds are tried",
-    "taxel.information.Answer": "a result",
-    "taxel.information.Control": "a result",
-    "taxel.information.Estimate": "a result",
-    "taxel.information.Nested": "a result",
-    "taxel.information.Point": "a result",
-    "taxel.information.Verdict": "a result",
-    "taxel.information.ZeroTest": "a result",
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.information.Answer": answer,
+    "taxel.information.Code": lambda: taxel.information.RankOrder(window_ms=10.0),
+    "taxel.information.Control": lambda: answer().controls[0],
+    "taxel.information.Estimate": lambda: FOUND_BITS,
+    "taxel.information.Nested": lambda: NESTED,
+    "taxel.information.Point": lambda: answer().full,
+    "taxel.information.Verdict": lambda: taxel.information.keeps(FOUND_BITS, FOUND_BITS),
+    "taxel.information.ZeroTest": lambda: answer().zero,
 }
+
+#: What is not tried, and why.
+LEFT_OUT: dict[str, str] = {}

@@ -1,5 +1,8 @@
 """Sound calls of `taxel.metrics`."""
 
+from collections.abc import Callable
+from typing import Any
+
 import taxel
 from sound.things import UNSIGNED, Sound, plain
 from taxel import _core
@@ -52,10 +55,13 @@ SOUND: dict[str, Sound] = {
     ),
 }
 
-#: What is not tried, and why.
-LEFT_OUT: dict[str, str] = {
-    "taxel.metrics.Matching": "a result",
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.metrics.Matching": lambda: taxel.metrics.matching([[1.0]], [[1.5]], window_ms=5.0),
 }
+
+#: What is not tried, and why.
+LEFT_OUT: dict[str, str] = {}
 
 for metric in _core.metric_names():
     # A sound call of each metric that has no required parameters: its defaults are tried.

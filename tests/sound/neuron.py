@@ -1,5 +1,8 @@
 """Sound calls of `taxel.neuron`."""
 
+from collections.abc import Callable
+from typing import Any
+
 import taxel
 from sound.things import UNSIGNED, Sound, method, plain
 
@@ -27,6 +30,9 @@ SOUND: dict[str, Sound] = {
         taxel.Neuron(), "potential", weights=[1.0] * 2, trains=UNSIGNED, times=[1.0, 5.0], spikes=[2.0]
     ),
 }
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {}
 
 #: What is not tried, and why.
 LEFT_OUT: dict[str, str] = {}

@@ -1,5 +1,8 @@
 """Sound calls of `taxel.plot`."""
 
+from collections.abc import Callable
+from typing import Any
+
 from matplotlib.figure import Figure
 
 import taxel
@@ -22,6 +25,9 @@ SOUND: dict[str, Sound] = {
     "taxel.plot.pressure_map": plain(taxel.plot.pressure_map, frames=FRAMES, at=200, ax=AXES),
     "taxel.plot.raster": plain(taxel.plot.raster, trains=TRAINS, ax=AXES),
 }
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {}
 
 #: What is not tried, and why.
 LEFT_OUT: dict[str, str] = {}

@@ -1,5 +1,8 @@
 """Sound calls of recordings."""
 
+from collections.abc import Callable
+from typing import Any
+
 import taxel
 from sound.things import ARRAY, EVENTS, TARE, Sound, plain
 
@@ -37,15 +40,21 @@ SOUND: dict[str, Sound] = {
         taxel.convert, source=EVENTS, target="there.npz", frames_hz=1000.0, compression="none", overwrite=True
     ),
     "taxel.health": plain(taxel.health, recorded=EVENTS),
+    "taxel.Note": lambda: (
+        lambda **given: taxel.open("here_events.npz").with_notes([taxel.Note(**given)]),
+        {"text": "heel", "t": 100, "at_ns": 0, "recording": ""},
+    ),
+    "taxel.Recording": lambda: (taxel.Recording, {"contents": taxel.open("here_events.npz")._contents}),
+    "taxel.Recording.on_clock": lambda: (taxel.open("here_clock.mcap").on_clock, {"name": "host"}),
+}
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.BoardChange": lambda: taxel.open("here_clock.mcap").board_changes[0],
+    "taxel.Datagrams": lambda: taxel.open("here_clock.mcap").datagrams(),
+    "taxel.Health": lambda: taxel.health(EVENTS),
+    "taxel.Zeroing": lambda: taxel.open("here_clock.mcap").zeroings[0],
 }
 
 #: What is not tried, and why.
-LEFT_OUT: dict[str, str] = {
-    "taxel.BoardChange": "of a recording",
-    "taxel.Datagrams": "of a recording",
-    "taxel.Health": "a result",
-    "taxel.Note": "of a recording",
-    "taxel.Zeroing": "of a recording",
-    "taxel.Recording": "made by taxel.open",
-    "taxel.Recording.on_clock": "needs a recording of several sources; tried in tests/recording",
-}
+LEFT_OUT: dict[str, str] = {}

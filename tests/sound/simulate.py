@@ -1,5 +1,9 @@
 """Sound calls of `taxel.simulate`."""
 
+import os
+from collections.abc import Callable
+from typing import IO, Any
+
 import numpy as np
 
 import taxel
@@ -8,6 +12,46 @@ from sound.things import ARRAY, EVENTS, REGISTERS, Sound, fresh, method, plain
 SCENE = taxel.simulate.Scene.draw(1)
 LAYER = taxel.simulate.Layer(array=ARRAY)
 CIRCUIT = taxel.simulate.circuit
+
+MOTION = SCENE.motion()
+EMULATED: dict[str, Any] = {
+    "to": "127.0.0.1:9",
+    "touch": [taxel.simulate.Silence(3.0)],
+    "seed": 1,
+    "preset": None,
+    "registers": None,
+    "tare_ms": 1.0,
+    "array": None,
+    "sensor": {},
+    "wire": 2,
+    "previous": "last_sent",
+    "intensity": "value",
+    "version_2": None,
+    "circuit": None,
+    "asynchronous": False,
+    "flaws": None,
+    "faults": None,
+    "reset_every_s": None,
+    "drift_ppm": 0.0,
+    "control": None,
+    "line": None,
+    "baud": 115_200,
+    "sync": None,
+    "overwrite": True,
+    "source_port": 0,
+    "begun": lambda _: None,
+    "watch": lambda _: None,
+    "touched": lambda _: None,
+}
+
+
+def pipe() -> IO[bytes]:
+    """A pipe with the line that describes frames, and no frame."""
+    read, write = os.pipe()
+    with os.fdopen(write, "wb") as end:
+        end.write(b'{"rows": 4, "columns": 4, "rate": 100, "bits": 8}\n')
+    return os.fdopen(read, "rb")
+
 
 #: A sound call of everything public that takes anything, by its full name.
 SOUND: dict[str, Sound] = {
@@ -132,21 +176,24 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.Silence": plain(
         lambda **given: taxel.simulate.play([taxel.simulate.Silence(**given)], seed=1, tare_ms=3.0), ms=10.0
     ),
+    "taxel.simulate.SceneFile.open": plain(taxel.simulate.SceneFile.open, path="here_scene.toml"),
+    "taxel.simulate.Pipe": lambda: (taxel.simulate.Pipe, {"source": pipe(), "noise_floor": 3}),
+    "taxel.simulate.Pipe.registers": lambda: (taxel.simulate.Pipe(pipe()).registers, {"preset": None}),
+    "taxel.simulate.emulate": lambda: (taxel.simulate.emulate, EMULATED),
+}
+
+#: How a call returns one of each type that taxel alone makes.
+RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.simulate.Contact": lambda: MOTION.contacts[0],
+    "taxel.simulate.EmulatorReport": lambda: taxel.simulate.emulate("127.0.0.1:9", [taxel.simulate.Silence(1.0)]),
+    "taxel.simulate.Motion": lambda: MOTION,
+    "taxel.simulate.Played": lambda: taxel.simulate.play([taxel.simulate.Silence(10.0)], seed=1, tare_ms=3.0),
+    "taxel.simulate.Pressed": lambda: LAYER.press(np.full((4, 4), 0.5)),
+    "taxel.simulate.SceneFile": lambda: taxel.simulate.SceneFile.open("here_scene.toml"),
+    "taxel.simulate.Track": lambda: MOTION.tracks[0],
+    "taxel.simulate.circuit.Converted": lambda: CIRCUIT.AdaptiveRamp().convert(np.full((9, 4, 8), 1.5), period_us=20.0),
+    "taxel.simulate.circuit.Trace": lambda: CIRCUIT.Converter().trace([1.4, 1.5, 2.0, 2.5], every_us=0.1, stop_us=6.0),
 }
 
 #: What is not tried, and why.
-LEFT_OUT: dict[str, str] = {
-    "taxel.simulate.Track": "what Scene.motion returns",
-    "taxel.simulate.SceneFile": "what SceneFile.open returns",
-    "taxel.simulate.SceneFile.open": "reads files; tried in tests/simulate/test_scene_files.py",
-    "taxel.simulate.Pressed": "what Layer.press returns",
-    "taxel.simulate.Pipe": "needs a pipe; tried in tests/simulate/test_emulate.py",
-    "taxel.simulate.Pipe.registers": "of a pipe",
-    "taxel.simulate.circuit.Converted": "a result",
-    "taxel.simulate.circuit.Trace": "a result",
-    "taxel.simulate.Contact": "a result",
-    "taxel.simulate.Motion": "a result",
-    "taxel.simulate.Played": "a result",
-    "taxel.simulate.EmulatorReport": "a result",
-    "taxel.simulate.emulate": "plays in real time; its arguments are those of play, tried there",
-}
+LEFT_OUT: dict[str, str] = {}

@@ -24,17 +24,17 @@ BYTES = taxel.wire.encode(EVENTS)
 Sound = Callable[[], tuple[Callable[..., Any], dict[str, Any]]]
 
 
-def method(instance: Any, name: str, **arguments: Any) -> Sound:
+def method(instance: Any, name: str, /, **arguments: Any) -> Sound:
     """A call of a method of something that calls do not change."""
     return lambda: (getattr(instance, name), arguments)
 
 
-def fresh(make: Callable[[], Any], name: str, **arguments: Any) -> Sound:
+def fresh(make: Callable[[], Any], name: str, /, **arguments: Any) -> Sound:
     """A call of a method of something that each call gets anew."""
     return lambda: (getattr(make(), name), arguments)
 
 
-def plain(function: Callable[..., Any], **arguments: Any) -> Sound:
+def plain(function: Callable[..., Any], /, **arguments: Any) -> Sound:
     return lambda: (function, arguments)
 
 

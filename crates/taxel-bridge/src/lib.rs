@@ -1,7 +1,7 @@
 //! Datagrams to and from other computers, over Zenoh.
 //!
-//! Carries what taxel packs, as it is. It knows nothing of it but where a parcel's base time stands, so that trials can set
-//! the clock of this computer off. Explicit endpoints, no multicast, no gossip: nobody is looked for.
+//! Transports the parcels of taxel unchanged. Of their format it knows only the position of the base time, so that tests can offset
+//! the clock of this computer. Endpoints are explicit: no multicast, no gossip, no discovery.
 
 mod keys;
 mod publisher;

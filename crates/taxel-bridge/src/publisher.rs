@@ -1,4 +1,4 @@
-//! The computer that the board sends to.
+//! Publisher: the computer that the board sends to.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
@@ -16,10 +16,10 @@ use crate::keys::{self, is_name, key};
 use crate::session::{first_line, open};
 use crate::skew::Skew;
 
-/// Parcels that wait for a lane at most: 64 MiB.
+/// Largest number of parcels in the queue of a lane: 64 MiB.
 const WAITING: usize = 1 << 8;
 
-/// What is sent to those who asked for it in one way.
+/// The queue and thread for one kind of subscriber (recorders or viewers).
 struct Lane {
     parcels: Option<channel::Sender<ZBytes>>,
     sent: Arc<AtomicU64>,
@@ -37,10 +37,10 @@ impl Lane {
         let (parcels, waiting) = channel::bounded::<ZBytes>(WAITING);
         let sent = Arc::new(AtomicU64::new(0));
         let counted = Arc::clone(&sent);
-        // A lane that waits for somebody slow holds up neither the other nor the one who hands parcels in.
+        // A lane that waits for a slow subscriber blocks neither the other lane nor the caller.
         let thread = std::thread::Builder::new().name("taxel-lane".to_owned()).spawn(move || {
             for parcel in waiting {
-                // What cannot be sent shows in the numbers of the parcels that follow.
+                // Lost parcels show in the numbers of later ones.
                 if publisher.put(parcel).wait().is_ok() {
                     counted.fetch_add(1, Ordering::Relaxed);
                 }
@@ -49,13 +49,13 @@ impl Lane {
         Ok(Self { parcels: Some(parcels), sent, dropped: 0, listened, thread: Some(thread) })
     }
 
-    /// Whether somebody listens.
-    fn heard(&self) -> bool {
+    /// Whether there is a subscriber.
+    fn has_subscriber(&self) -> bool {
         self.listened.matching_status().wait().is_ok_and(|status| status.matching())
     }
 
     fn put(&mut self, parcel: &ZBytes) {
-        if self.heard()
+        if self.has_subscriber()
             && let Some(parcels) = &self.parcels
             && parcels.try_send(parcel.clone()).is_err()
         {
@@ -98,8 +98,8 @@ impl Publisher {
 
 #[pymethods]
 impl Publisher {
-    /// Begins to publish as `name`: listens at and connects to HOST:PORT. `about` is what askers are told of the sensor.
-    /// For trials the clock is set off: ahead by `ahead_ns`, and running faster by `drift_ppm`.
+    /// Begins to publish as `name`: listens at and connects to HOST:PORT. `about` describes the sensor, for queries.
+    /// For tests the published clock is ahead by `ahead_ns`, and runs faster by `drift_ppm`.
     #[new]
     #[pyo3(signature = (name, listen, connect, about, ahead_ns = 0, drift_ppm = 0.0))]
     fn new(
@@ -115,15 +115,15 @@ impl Publisher {
             return Err(PyValueError::new_err(format!("name is {name:?}: must be 1 to 64 letters, digits, - _ or .")));
         }
         let (about, skew) = (Arc::new(RwLock::new(about)), Skew::new(ahead_ns, drift_ppm));
-        let told = Arc::clone(&about);
+        let described = Arc::clone(&about);
         let open = py.detach(|| {
             let session = open(&listen, &connect)?;
-            begin(session, name, told, skew).map_err(|e| PyConnectionError::new_err(first_line(&e)))
+            begin(session, name, described, skew).map_err(|e| PyConnectionError::new_err(first_line(&e)))
         })?;
         Ok(Self { open: Mutex::new(Some(open)), about, skew })
     }
 
-    /// Sends a parcel to those who listen; never waits.
+    /// Sends a parcel to the subscribers; never waits.
     fn parcel(&self, py: Python<'_>, parcel: Vec<u8>) -> PyResult<()> {
         self.with(py, |open| {
             let mut parcel = parcel;
@@ -145,17 +145,16 @@ impl Publisher {
         self.with(py, |open| open.detections.put(line).wait())
     }
 
-    /// What askers are told from here on.
+    /// Replaces the description of the sensor.
     fn tell(&self, about: String) {
         *self.about.write().unwrap_or_else(PoisonError::into_inner) = about;
     }
 
-    /// Parcels sent and dropped for want of room, to those who must have all and to those who look on; whether somebody of
-    /// either kind listens.
+    /// For recorders and viewers: parcels sent, parcels dropped because the queue was full, whether there is a subscriber.
     #[allow(clippy::type_complexity)]
     fn counts(&self, py: Python<'_>) -> PyResult<((u64, u64, bool), (u64, u64, bool))> {
         self.with(py, |open| {
-            let of = |lane: &Lane| (lane.sent.load(Ordering::Relaxed), lane.dropped, lane.heard());
+            let of = |lane: &Lane| (lane.sent.load(Ordering::Relaxed), lane.dropped, lane.has_subscriber());
             Ok((of(&open.block), of(&open.drop)))
         })
     }
@@ -176,14 +175,14 @@ fn begin(session: Session, name: &str, about: Arc<RwLock<String>>, skew: Skew) -
         let came = skew.now_ns();
         let mut answer = came.to_le_bytes().to_vec();
         answer.extend_from_slice(&skew.now_ns().to_le_bytes());
-        // Who asked may have gone.
+        // The client that queried may have disconnected.
         let _ = query.reply(query.key_expr().clone(), answer).express(true).wait();
     };
     session.declare_queryable(key(name, keys::CLOCK)).callback(clock).background().wait()?;
-    let told = key(name, keys::ABOUT);
+    let about_key = key(name, keys::ABOUT);
     let tell = move |query: Query| {
         let about = about.read().unwrap_or_else(PoisonError::into_inner).clone();
-        let _ = query.reply(told.clone(), about).wait();
+        let _ = query.reply(about_key.clone(), about).wait();
     };
     session.declare_queryable(key(name, keys::ABOUT)).callback(tell).background().wait()?;
     let block = Lane::begin(&session, key(name, keys::BLOCK), CongestionControl::Block, Priority::Data)?;

@@ -1,4 +1,4 @@
-//! A Zenoh session: explicit endpoints over TCP, nobody looked for.
+//! A Zenoh session: explicit endpoints over TCP, no discovery.
 
 use std::fmt::Write as _;
 
@@ -6,19 +6,19 @@ use pyo3::exceptions::{PyConnectionError, PyValueError};
 use pyo3::prelude::*;
 use zenoh::{Config, Session, Wait};
 
-/// A link on which nothing is heard is given up after this, ms; four times in it something is sent.
+/// Lease of a link, ms: it is closed after this time without any message; keep-alives are sent four times within it.
 const LEASE_MS: u64 = 1500;
 
-/// Who takes nothing while something must not be lost is waited for so long, then cut off, us.
+/// A subscriber that reads nothing while messages must not be lost is disconnected after this, us.
 const PATIENCE_US: u64 = 1_500_000;
 
-/// Between two tries to connect, ms: at first, and at most.
+/// Interval between attempts to connect, ms: the first, and the longest.
 const RETRY_MS: (u64, u64) = (200, 1000);
 
-/// No message is longer, bytes: what is is dropped before it takes memory.
+/// Largest message, bytes: a longer one is dropped before it is buffered.
 const LONGEST: usize = 1 << 20;
 
-/// Opens a session. It listens where told to and connects where told to, again and again where nobody answers.
+/// Opens a session that listens on and connects to these endpoints; connecting is retried.
 pub(crate) fn open(listen: &[String], connect: &[String]) -> PyResult<Session> {
     let config = Config::from_json5(&config(listen, connect)?).map_err(|e| PyValueError::new_err(e.to_string()))?;
     zenoh::open(config).wait().map_err(|e| PyConnectionError::new_err(first_line(&e)))
@@ -52,7 +52,7 @@ fn config(listen: &[String], connect: &[String]) -> PyResult<String> {
 fn places(places: &[String]) -> PyResult<String> {
     let mut said = vec![];
     for place in places {
-        // Nothing that could end the text that it is put into.
+        // No character that could end the JSON text around it.
         if !place.chars().all(|c| c.is_ascii_alphanumeric() || "-_.:[]%".contains(c)) || !place.contains(':') {
             return Err(PyValueError::new_err(format!("{place:?}: must be HOST:PORT")));
         }

@@ -1,4 +1,4 @@
-//! The computer that listens.
+//! Subscriber: the computer that receives a board of another one.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -17,10 +17,10 @@ use crate::keys::{self, is_name, key, name_of, of_all};
 use crate::session::{first_line, open};
 use crate::skew::now_ns;
 
-/// Parcels that wait for the one who takes, at most: 16 MiB. Then the way back is held up, and the sender blocks or drops.
+/// Largest number of parcels in the queue: 16 MiB. A full queue blocks the link, and the publisher blocks or drops.
 const WAITING: usize = 1 << 6;
 
-/// A round trip that takes longer says nothing of the clocks.
+/// Timeout of a round trip; a longer one does not constrain the clocks.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 struct Listening {
@@ -28,7 +28,7 @@ struct Listening {
     _subscriber: pubsub::Subscriber<()>,
 }
 
-/// Hears what another computer publishes.
+/// Receives what another computer publishes.
 #[pyclass(frozen)]
 pub(crate) struct Subscriber {
     session: Session,
@@ -36,9 +36,9 @@ pub(crate) struct Subscriber {
 }
 
 impl Subscriber {
-    /// The answer to the clock's question: all four times, ns.
+    /// Queries the clock: all four times of the round trip, ns.
     fn ask_clock(&self, name: &str) -> zenoh::Result<Option<(i64, i64, i64, i64)>> {
-        let (say, said) = channel::bounded(1);
+        let (sender, receiver) = channel::bounded(1);
         let asked = now_ns();
         self.session
             .get(key(name, keys::CLOCK))
@@ -47,13 +47,13 @@ impl Subscriber {
             .express(true)
             .timeout(PATIENCE)
             .callback(move |reply: Reply| {
-                // Stamped where it comes in, before any other thread has to wake.
+                // Stamped in the callback, before any other thread has to wake.
                 let back = now_ns();
                 let answer = reply.result().ok().map(|sample| sample.payload().to_bytes().into_owned());
-                let _ = say.try_send((answer, back));
+                let _ = sender.try_send((answer, back));
             })
             .wait()?;
-        let Ok((Some(answer), back)) = said.recv_timeout(PATIENCE) else { return Ok(None) };
+        let Ok((Some(answer), back)) = receiver.recv_timeout(PATIENCE) else { return Ok(None) };
         let Some((came, answered)) = answer.split_first_chunk::<8>() else { return Ok(None) };
         let Ok(answered) = answered.try_into().map(i64::from_le_bytes) else { return Ok(None) };
         Ok(Some((asked, i64::from_le_bytes(*came), answered, back)))
@@ -62,14 +62,14 @@ impl Subscriber {
 
 #[pymethods]
 impl Subscriber {
-    /// Connects to HOST:PORT, again and again where nobody answers.
+    /// Connects to HOST:PORT; connecting is retried.
     #[new]
     fn new(py: Python<'_>, connect: Vec<String>) -> PyResult<Self> {
         let session = py.detach(|| open(&[], &connect))?;
         Ok(Self { session, listening: Mutex::new(None) })
     }
 
-    /// What publishes, and what each says of its sensor; those who answer within `timeout` s.
+    /// Names and descriptions of the boards whose publishers answer within `timeout` s.
     fn names(&self, py: Python<'_>, timeout: f64) -> PyResult<Vec<(String, String)>> {
         let timeout = Duration::try_from_secs_f64(timeout).map_err(|e| PyValueError::new_err(e.to_string()))?;
         let found = py.detach(|| {
@@ -88,7 +88,7 @@ impl Subscriber {
         found.map_err(|e| PyConnectionError::new_err(first_line(&e)))
     }
 
-    /// Listens to `name` from here on: to "block", "drop", "picture" or "detection".
+    /// Subscribes to `name`: to "block", "drop", "picture" or "detection".
     fn listen(&self, py: Python<'_>, name: &str, what: &str) -> PyResult<()> {
         if !is_name(name) {
             return Err(PyValueError::new_err(format!("name is {name:?}: must be 1 to 64 letters, digits, - _ or .")));
@@ -106,7 +106,7 @@ impl Subscriber {
                 .session
                 .declare_subscriber(key(name, what))
                 .callback(move |sample| {
-                    // Waits where there is no room; who takes no more lets it go.
+                    // Waits while the queue is full; the end of the reader ends the wait.
                     let _ = give.send(sample);
                 })
                 .wait();
@@ -130,15 +130,15 @@ impl Subscriber {
         Ok(message.map(|sample| PyBytes::new(py, &sample.payload().to_bytes())))
     }
 
-    /// A round trip to the clock of `name`: asked, came, answered, back, ns since 1970; None where none answers.
+    /// A round trip to the clock of `name`: asked, came, answered, back, ns since 1970; None without an answer.
     fn compare(&self, py: Python<'_>, name: &str) -> PyResult<Option<(i64, i64, i64, i64)>> {
         py.detach(|| self.ask_clock(name)).map_err(|e| PyConnectionError::new_err(first_line(&e)))
     }
 
-    /// Ends.
+    /// Closes the session.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| {
-            // First, so that nothing waits for room; who takes ends by the time-out.
+            // First, so that no callback waits for a full queue; a reader ends by its timeout.
             *self.listening.lock().unwrap_or_else(PoisonError::into_inner) = None;
             self.session.close().wait().map_err(|e| PyConnectionError::new_err(first_line(&e)))
         })

@@ -20,6 +20,8 @@ pub mod vectors;
 pub mod array;
 pub mod events;
 pub mod frames;
+pub mod held;
+pub mod rest;
 pub mod spikes;
 
 pub mod circuit;

@@ -17,6 +17,6 @@ pub use columns::{Columns, Filled, Room};
 pub use command::{Command, CommandReader};
 pub use cut::{Cut, cut};
 pub use decoder::{Counts, Decoder, Pairing, decode, most_rows};
-pub use receiver::{Receiver, Took};
+pub use receiver::{DatagramInfo, Receiver};
 pub use registers::{Refusal, Registers};
 pub use v1::{STAMP_US, WORD_BYTES, Word, encode};

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use taxel_core::board::{Board, Faults, Network, Version2};
-use taxel_core::wire::v2::{self, Header, Heard};
+use taxel_core::wire::v2::{self, Header, Outcome};
 use taxel_core::wire::{self, Decoder, Pairing, Registers, WORD_BYTES, Word};
 use taxel_core::{Array, Events};
 
@@ -73,9 +73,9 @@ fn of_version_2_every_intact_datagram_is_decoded_once_and_all_counts_close() {
         let mut refused = 0;
         for datagram in &arrived {
             match decoder.push(datagram, None, &mut events) {
-                Heard::Intact { .. } => *decoded.entry(Header::read(datagram).unwrap().0.sequence).or_default() += 1,
-                Heard::Repeated => assert!(decoded.contains_key(&Header::read(datagram).unwrap().0.sequence)),
-                Heard::Refused(_) => refused += 1,
+                Outcome::Intact { .. } => *decoded.entry(Header::read(datagram).unwrap().0.sequence).or_default() += 1,
+                Outcome::Repeated => assert!(decoded.contains_key(&Header::read(datagram).unwrap().0.sequence)),
+                Outcome::Refused(_) => refused += 1,
             }
         }
         // Which arrived whole is known here by comparing bytes, not by any checksum.

@@ -1,29 +1,29 @@
-//! What came over a bridge from another computer, and what did not.
+//! Counts of what a bridge delivered from another computer, and of what it lost.
 
 use serde::{Deserialize, Serialize};
 
 use crate::host_clock::HostOffset;
 
-/// What came over a bridge, and what was lost on the way.
+/// Counts of what a bridge delivered and lost.
 ///
-/// Between the first and the last parcel of a session, datagrams that the other computer received = those that came +
+/// Between the first and the last parcel of a session, datagrams that the other computer received = delivered ones +
 /// [`Bridged::missing`] + [`Bridged::dropped`].
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Bridged {
-    /// Parcels that came, empty ones, which only report that the bridge runs, included.
+    /// Delivered parcels, including empty ones, which report that the bridge runs.
     pub parcels: u64,
-    /// Datagrams that were sent over the bridge and never came.
+    /// Datagrams that were sent over the bridge and not delivered.
     pub missing: u64,
     /// Datagrams that the other computer dropped, its queues being full.
     pub dropped: u64,
     /// Messages that the other computer's kernel dropped.
     pub dropped_by_kernel: u64,
-    /// Parcels that came again; they were left out.
+    /// Parcels that were delivered again, and ignored.
     pub repeated: u64,
     /// Parcels that could not be read.
     pub refused: u64,
-    /// How often the bridge was begun anew while it was listened to.
+    /// How often the bridge was restarted during the subscription.
     pub restarts: u64,
     /// How often nothing was received for a second or more.
     pub silences: u64,
@@ -36,7 +36,7 @@ pub struct Bridged {
 }
 
 impl Bridged {
-    /// What came and was lost since an earlier time.
+    /// The difference from earlier counts.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {

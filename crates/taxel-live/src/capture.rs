@@ -1,14 +1,14 @@
-//! UDP datagrams in, counted: received by the caller, or by a thread of its own between the socket and a bounded queue; or by
-//! another computer ([`Feed`]), into the same queue.
+//! Receives and counts UDP datagrams: in the caller's thread, or in a thread of its own between the socket and a bounded queue; or from
+//! another computer ([`Feed`]), through the same queue.
 //!
-//! A caller who takes datagrams receives them in its own thread, which saves a wake-up and a copy. A caller that a disk may hold up
-//! asks for a thread ([`Receiver::apart`]), which receives meanwhile.
+//! By default the caller receives in its own thread, which saves a wake-up and a copy. A caller that may wait for a disk requests a
+//! separate thread ([`Receiver::apart`]), which receives in the meantime.
 //!
-//! The sums close. At the socket: messages that came = [`Counts::messages`] + [`Counts::dropped_by_kernel`]. Behind it:
-//! [`Counts::datagrams`] = those taken + those waiting + [`Counts::dropped_by_queue`].
+//! All datagrams are accounted for. At the socket: arrived messages = [`Counts::messages`] + [`Counts::dropped_by_kernel`]. Behind it:
+//! [`Counts::datagrams`] = datagrams read + datagrams waiting + [`Counts::dropped_by_queue`].
 //!
-//! A *message* is what one receive call gives: a datagram, or, with `UDP_GRO`, a train of datagrams that travelled as
-//! one. The kernel counts its drops in messages, so a datagram-exact count of what it dropped needs `gro` off.
+//! A *message* is what one receive call returns: a datagram, or, with `UDP_GRO`, a train of datagrams that the kernel
+//! merged. The kernel counts its drops in messages, so a datagram-exact count of what it dropped needs `gro` off.
 
 mod counts;
 mod feed;
@@ -40,7 +40,7 @@ use socket::Socket;
 /// How often the thread checks whether it is to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// What is received at once at most, bytes.
+/// Largest amount received at a time, bytes.
 const AT_ONCE: usize = 4 * socket::LARGEST;
 
 /// Where datagrams come from.
@@ -48,7 +48,7 @@ const AT_ONCE: usize = 4 * socket::LARGEST;
 pub enum Origin {
     /// A board sends to this address.
     Udp(SocketAddr),
-    /// Another computer receives them, and bridges them to this one: its address and the board's name there.
+    /// Another computer receives them, and a bridge sends them to this one: its address, and the board's name there.
     Bridge(String),
 }
 
@@ -71,13 +71,13 @@ pub struct Receiver {
 
 #[derive(Debug)]
 enum From {
-    /// The socket as long as no thread has it, locked by the caller who takes datagrams while it waits; and the thread.
+    /// The socket, unless the thread has it, locked by a caller while it waits for datagrams; and the thread.
     Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
     Feed(Feed),
 }
 
 impl Receiver {
-    /// Opens `address`; from then on the kernel keeps what comes.
+    /// Opens `address`; from then on the kernel queues what arrives.
     ///
     /// # Errors
     ///
@@ -102,8 +102,8 @@ impl Receiver {
         Ok(Self { queue, place: Origin::Udp(address), from })
     }
 
-    /// From now on a thread of its own receives, until the end; a feed has one anyway. Where no readout waits for events it may
-    /// `gather` for so long after each time: fewer wake-ups, the kernel keeps and stamps what comes meanwhile.
+    /// Receives in a thread of its own from now on; a feed always has one. Where no readout waits for events, the thread pauses for
+    /// `gather` after each message: this saves wake-ups, and the kernel queues and stamps what arrives in the meantime.
     ///
     /// # Errors
     ///
@@ -116,7 +116,7 @@ impl Receiver {
             .name("taxel-receive".to_owned())
             .spawn(move || receive(socket, &queue, gather))
             .map_err(|error| {
-                // The socket went with the thread that did not begin: nothing can come any more.
+                // The socket was moved into the thread that did not begin: nothing can be received any more.
                 self.queue.close(None);
                 Error::socket(&self.place)(error)
             })?;
@@ -124,7 +124,7 @@ impl Receiver {
         Ok(())
     }
 
-    /// Receives what another computer received; parcels go into the [`Feed`].
+    /// Receives datagrams of another computer; the caller passes its parcels to the [`Feed`].
     #[must_use]
     pub fn fed(name: &str, options: ReceiverOptions) -> (Self, Feed) {
         let queue = Arc::new(Queue::new(options.queue_bytes, Counts::default()));
@@ -132,7 +132,7 @@ impl Receiver {
         (Self { queue, place: Origin::Bridge(name.to_owned()), from: From::Feed(feed.clone()) }, feed)
     }
 
-    /// Where datagrams come from, with the port that was found where 0 was asked for.
+    /// Where datagrams come from, with the actual port where 0 was requested.
     #[must_use]
     pub fn place(&self) -> &Origin {
         &self.place
@@ -147,7 +147,7 @@ impl Receiver {
         }
     }
 
-    /// What came over the bridge, where it is one.
+    /// Counts of the bridge, where datagrams come over one.
     #[must_use]
     pub fn bridged(&self) -> Option<Bridged> {
         match &self.from {
@@ -156,7 +156,7 @@ impl Receiver {
         }
     }
 
-    /// While nothing waits: all that arrived before this was taken, ns of this computer's clock.
+    /// While the queue is empty: everything that arrived before this time was read, ns of this computer's clock.
     #[must_use]
     pub fn silent_until(&self) -> Option<i64> {
         match &self.from {
@@ -165,8 +165,8 @@ impl Receiver {
         }
     }
 
-    /// Waits until something is there and takes it into `batch`, whose memory is reused; false after `timeout` with nothing,
-    /// or at once when everything was taken after [`Receiver::stop`].
+    /// Waits for datagrams and moves them into `batch`, whose memory is reused; false after `timeout` without any, or at once
+    /// when everything was read after [`Receiver::stop`].
     ///
     /// # Errors
     ///
@@ -179,7 +179,7 @@ impl Receiver {
                     Some(own) => {
                         let taken = self.receive(own, batch, timeout);
                         if self.queue.is_done() {
-                            // The address is free for the next one, also while the counts are still read.
+                            // Another receiver can bind the address while the counts are still read.
                             *socket = None;
                         }
                         taken
@@ -209,19 +209,19 @@ impl Receiver {
         filled.map(|messages| messages > 0)
     }
 
-    /// What came and what was lost.
+    /// Counts of what arrived and what was lost.
     #[must_use]
     pub fn counts(&self) -> Counts {
         self.queue.counts()
     }
 
-    /// Whether receiving has ended and everything was taken.
+    /// Whether receiving has ended and everything was read.
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.queue.is_done()
     }
 
-    /// Asks for the end: what has come by now is received, then nothing more.
+    /// Requests the end: what has arrived by now is received, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
         if let From::Feed(_) = self.from {
@@ -255,7 +255,7 @@ fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
                 if ended {
                     break Ok(());
                 }
-                // Of a full batch the rest waits already.
+                // After a full batch more messages are waiting already.
                 if messages > 0 && !full && stopped_ns.is_none() && !gather.is_zero() {
                     std::thread::sleep(gather);
                 }

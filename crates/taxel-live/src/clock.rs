@@ -1,13 +1,13 @@
 //! A board's clock as the host sees it: offset and drift, from arrival times alone.
 //!
-//! Something comes late by whatever the way costs. So the points *arrival less own time* lie above the line that is the offset
-//! between the clocks (plus the shortest way, which cannot be told from it), and what came quickly lies near it.
+//! Each datagram arrives with the delay of its transmission. So the points *arrival time minus board time* lie above a line, the
+//! offset between the clocks plus the shortest delay (which cannot be separated from it); fast datagrams lie near that line.
 //!
-//! The very quickest are no measure: one in a thousand is stamped 10 to 20 us sooner than the others ever are, as a core was
-//! just awake or a timer just fired, and a line below all points hangs on two of those. So one in a hundred may lie below. Of
-//! all such lines it is the one that lies nearest to the points above it: the line of quantile regression, along which those
-//! below are balanced about the mean time. Of fewer than a hundred points none lies below, and it is the edge of the lower
-//! convex hull above the mean time.
+//! The fastest datagrams are outliers: one in a thousand is stamped 10 to 20 us earlier than all others, because a core was
+//! already awake or a timer had just fired, and a line below all points would depend on two of those. So one point in a hundred
+//! may lie below the line. It is the line of quantile regression for that quantile: of all such lines the nearest to the points
+//! above it; the points below it are balanced about the mean time. With fewer than a hundred points none lies below, and the
+//! line is the edge of the lower convex hull above the mean time.
 
 mod offset;
 mod points;
@@ -15,45 +15,45 @@ mod stretch;
 
 use std::collections::VecDeque;
 
-use taxel_core::wire::{Took, WORD_BYTES};
+use taxel_core::wire::{DatagramInfo, WORD_BYTES};
 
 pub use offset::Offset;
 use points::Points;
 use stretch::{Point, Stretch};
 
-/// The hull is kept in stretches of this length, us of the board's clock ...
+/// Points are stored in stretches of this length, us of the board's clock ...
 const STRETCH_US: i64 = 250_000;
-/// ... of which so many are looked at: 64 s, within which a quartz keeps its rate.
+/// ... of which the line uses this many: 64 s, within which the rate of a quartz is constant.
 const STRETCHES: usize = 256;
-/// Of stretches that are over longer than so many, only those are kept which a line can still pass near.
+/// Of stretches older than this many, only the points near the line are stored.
 const NEW: usize = 8;
 
-/// While a clock is new its line is drawn each stretch, later each so many: it hardly moves any more.
-const DRAWN_EACH: usize = 4;
+/// The line of a new clock is fitted after each stretch, later after this many, because it hardly changes any more.
+const FITTED_EACH: usize = 4;
 
-/// A second of points that lie this far from what was expected is another clock: a board that was reset, a host whose clock
-/// was set; ns. A pause allows for more, as a drift was known no better than that.
+/// Points of one second that lie this far from the line belong to another clock: the board was reset, or the host's clock was
+/// set; ns. After a pause the limit is larger, by the uncertainty of the drift.
 const ANOTHER_CLOCK: f64 = 100e6;
-/// How many stretches in a row must lie there.
+/// Number of consecutive stretches that must lie there.
 const ANOTHER: usize = 4;
 
-/// The drift of a quartz, ppm: what is believed at most of a short time, in which a late arrival looks like a drift.
+/// Largest drift of a quartz, ppm: the limit of the slope over a short time, in which a late arrival looks like a drift.
 const QUARTZ: f64 = 200.0;
-/// That of a clock that is no quartz, ppm: a ceramic resonator has 5000.
+/// Largest drift of any clock, ppm: a ceramic resonator has 5000.
 const ANY: f64 = 20_000.0;
-/// From so long on more than [`QUARTZ`] is believed, us.
+/// Duration from which on a slope beyond [`QUARTZ`] is accepted, us.
 const LONG_US: i64 = 10_000_000;
 
-/// The largest datagram of a board of version 1, which closes a frame with a shorter one: 280 events.
+/// The largest datagram of a board of version 1, bytes: 280 events. A shorter one ends a frame.
 const FULL: usize = 280 * WORD_BYTES;
 
-/// When a datagram could leave the board at the earliest, us: what of its time can be compared with its arrival. `last` is
-/// the time of its last event, `bytes` its length.
+/// The earliest time at which the board could send a datagram, us, to be compared with its arrival. `last` is the time of its last
+/// event, `bytes` its length.
 #[must_use]
-pub fn leaves(took: &Took, last: Option<i64>, bytes: usize, frame_us: i64) -> Option<i64> {
-    match took.version {
-        2 => took.until,
-        // What a frame saw leaves at its end, but for a full datagram, which leaves as soon as it is full.
+pub fn leaves(info: &DatagramInfo, last: Option<i64>, bytes: usize, frame_us: i64) -> Option<i64> {
+    match info.version {
+        2 => info.until,
+        // The events of a frame are sent at its end, but a full datagram is sent as soon as it is full.
         _ => last.filter(|_| bytes < FULL).map(|t| t + frame_us),
     }
 }
@@ -61,19 +61,19 @@ pub fn leaves(took: &Took, last: Option<i64>, bytes: usize, frame_us: i64) -> Op
 /// Estimates the [`Offset`] as datagrams come.
 #[derive(Debug, Clone, Default)]
 pub struct BoardClock {
-    /// Stretches that are over, the oldest first.
+    /// Completed stretches, the oldest first.
     stretches: VecDeque<Stretch>,
-    /// The one that runs.
+    /// The current stretch.
     running: Stretch,
-    /// Stretches in a row that lie far from what was expected.
+    /// Number of consecutive stretches that lie far from the line.
     far: usize,
-    /// Stretches since the line was drawn.
-    undrawn: usize,
+    /// Number of stretches since the line was fitted.
+    unfitted: usize,
     offset: Option<Offset>,
 }
 
 impl BoardClock {
-    /// Lines through many datagrams, each from the board's time on that stands beside it, us: one for each 32 s.
+    /// Lines through many datagrams, one for each 32 s, each with the board's time from which on it holds, us.
     #[must_use]
     pub fn offsets_of(board_us: &[i64], arrived_ns: &[i64]) -> Vec<(i64, Offset)> {
         let (mut clock, mut lines) = (Self::default(), vec![]);
@@ -83,7 +83,7 @@ impl BoardClock {
                 since += 1;
                 if since == STRETCHES / 2 {
                     since = 0;
-                    clock.draw();
+                    clock.fit();
                     lines.extend(clock.offset().map(|offset| (clock.middle(), offset)));
                 }
             }
@@ -94,15 +94,15 @@ impl BoardClock {
         lines
     }
 
-    /// Notes that something which could leave the board at `board_us` at the earliest arrived at `arrived_ns`; gives whether
-    /// a stretch ended.
+    /// Adds a datagram that the board could send at `board_us` at the earliest and that arrived at `arrived_ns`; returns whether a
+    /// stretch ended.
     pub fn note(&mut self, board_us: i64, arrived_ns: i64) -> bool {
         let point = (board_us, arrived_ns - board_us * 1000);
         let mut ended = false;
         if self.running.points > 0 {
             let (now, then) = (board_us.div_euclid(STRETCH_US), self.running.last.div_euclid(STRETCH_US));
             if now < then {
-                // A step back over the edge of a stretch.
+                // A late datagram of a stretch that has ended.
                 return false;
             }
             if now > then {
@@ -113,10 +113,10 @@ impl BoardClock {
         self.running.push(point);
         match &mut self.offset {
             None => self.offset = Some(Offset { board_us, host_ns: arrived_ns, drift_ppm: 0.0 }),
-            // Until there is a line nothing is known but the quickest.
+            // Before the first line the offset is that of the fastest datagram.
             Some(offset) if self.stretches.is_empty() => {
                 let early = (arrived_ns - offset.host_ns(board_us)).min(0);
-                // So early only where the host's clock was set: then more must say so.
+                // A point this early means that the host's clock was set, which several stretches must confirm.
                 #[allow(clippy::cast_precision_loss)]
                 if early as f64 > -ANOTHER_CLOCK {
                     offset.host_ns += early;
@@ -127,18 +127,18 @@ impl BoardClock {
         ended
     }
 
-    /// The estimate, once something came.
+    /// The estimate, once a datagram arrived.
     #[must_use]
     pub fn offset(&self) -> Option<Offset> {
         self.offset
     }
 
-    /// The estimate when nothing comes any more.
+    /// The estimate from all datagrams, when no more arrive.
     fn finish(&mut self) -> Option<Offset> {
         if self.running.points > 0 {
             self.end_stretch();
         }
-        self.draw();
+        self.fit();
         self.offset
     }
 
@@ -155,22 +155,22 @@ impl BoardClock {
             self.stretches.drain(..self.stretches.len() - ANOTHER);
             self.far = 0;
         } else if self.far > 0 {
-            // Not yet: it may be late only, or too early for us to believe.
+            // The stretch may only be delayed: the line stays until more of them confirm another clock.
             return;
         }
         while self.stretches.len() > STRETCHES {
             self.stretches.pop_front();
         }
-        self.undrawn += 1;
-        if self.stretches.len() < DRAWN_EACH * NEW || self.undrawn >= DRAWN_EACH {
-            self.draw();
+        self.unfitted += 1;
+        if self.stretches.len() < FITTED_EACH * NEW || self.unfitted >= FITTED_EACH {
+            self.fit();
         }
         if let (Some(k), Some(line)) = (self.stretches.len().checked_sub(NEW + 1), self.offset) {
             self.stretches[k].thin(line);
         }
     }
 
-    /// The mean time of the points looked at, us.
+    /// The mean time of the stored points, us.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
     fn middle(&self) -> i64 {
         let Some(origin) = self.stretches.front().map(|stretch| stretch.first) else { return 0 };
@@ -180,10 +180,10 @@ impl BoardClock {
         origin + (sum / points.max(1) as f64) as i64
     }
 
-    /// Draws the line that one in a hundred points may lie below; where it is too steep, the steepest believed one.
+    /// Fits the line, below which one point in a hundred may lie; its slope is limited to that of a plausible clock.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
-    fn draw(&mut self) {
-        self.undrawn = 0;
+    fn fit(&mut self) {
+        self.unfitted = 0;
         let (Some(first), Some(last)) = (self.stretches.front(), self.stretches.back()) else { return };
         let (Some(zero), origin) = (last.lowest(), last.last) else { return };
         let most = if origin - first.first >= LONG_US { ANY } else { QUARTZ } * 1e-3;
@@ -209,7 +209,7 @@ mod tests {
 
     /// Arrivals each `every_us`, of a host clock that starts at `start_ns` and drifts, delayed at random: by 5 us, more of some,
     /// and by 5 ms of `spikes` of them.
-    struct Way {
+    struct Link {
         start_ns: i64,
         drift_ppm: f64,
         every_us: i64,
@@ -217,7 +217,7 @@ mod tests {
         random: StdRng,
     }
 
-    impl Way {
+    impl Link {
         fn new(seed: u64, drift_ppm: f64, every_us: i64) -> Self {
             let random = StdRng::seed_from_u64(seed);
             Self { start_ns: 1_700_000_000_000_000_000, drift_ppm, every_us, spikes: 0.01, random }
@@ -227,10 +227,10 @@ mod tests {
             self.start_ns + board_us * 1000 + (board_us as f64 * self.drift_ppm * 1e-3) as i64
         }
 
-        fn hear(&mut self, clock: &mut BoardClock, from_us: i64, to_us: i64) {
+        fn send(&mut self, clock: &mut BoardClock, from_us: i64, to_us: i64) {
             let mut board_us = from_us;
             while board_us < to_us {
-                // Jitter of a machine that has other work: exponential, 60 us in the mean, and the way itself.
+                // Jitter of a machine that has other work: exponential, 60 us in the mean, and the link itself.
                 let mut late_ns = 5_000.0 - 60_000.0 * self.random.random_range(1e-9..1.0_f64).ln();
                 if self.random.random_bool(self.spikes) {
                     late_ns += 5e6;
@@ -240,7 +240,7 @@ mod tests {
             }
         }
 
-        /// How far the line is from the truth at a time, the shortest way taken off, us.
+        /// How far the line is from the truth at a time, the shortest link taken off, us.
         fn off(&self, clock: &BoardClock, board_us: i64) -> f64 {
             let offset = clock.offset().expect("something came");
             (offset.host_ns(board_us) - self.truth(board_us) - 5_000) as f64 * 1e-3
@@ -250,12 +250,12 @@ mod tests {
     #[test]
     fn a_thousand_datagrams_a_second_give_the_offset_within_10_us_after_1_s_and_5_us_after_10_s() {
         for (seed, drift_ppm) in [50.0, -30.0, 0.0, 199.0, -199.0].into_iter().enumerate() {
-            let mut way = Way::new(seed as u64, drift_ppm, 1000);
+            let mut link = Link::new(seed as u64, drift_ppm, 1000);
             let mut clock = BoardClock::default();
-            way.hear(&mut clock, 0, 1_010_000);
-            assert!(way.off(&clock, 1_000_000).abs() < 10.0, "{drift_ppm}: {} us", way.off(&clock, 1_000_000));
-            way.hear(&mut clock, 1_010_000, 10_010_000);
-            assert!(way.off(&clock, 10_000_000).abs() < 5.0, "{drift_ppm}: {} us", way.off(&clock, 10_000_000));
+            link.send(&mut clock, 0, 1_010_000);
+            assert!(link.off(&clock, 1_000_000).abs() < 10.0, "{drift_ppm}: {} us", link.off(&clock, 1_000_000));
+            link.send(&mut clock, 1_010_000, 10_010_000);
+            assert!(link.off(&clock, 10_000_000).abs() < 5.0, "{drift_ppm}: {} us", link.off(&clock, 10_000_000));
         }
     }
 
@@ -265,14 +265,14 @@ mod tests {
         for seed in 0..40 {
             let drift_ppm = random.random_range(-200.0..200.0);
             let every_us = [192, 500, 1000, 5000][seed as usize % 4];
-            let mut way = Way::new(seed, drift_ppm, every_us);
-            way.start_ns = random.random_range(0..2_000_000_000_000_000_000);
+            let mut link = Link::new(seed, drift_ppm, every_us);
+            link.start_ns = random.random_range(0..2_000_000_000_000_000_000);
             let begin = random.random_range(-1_000_000_000_000..1_000_000_000_000);
             let mut clock = BoardClock::default();
-            way.hear(&mut clock, begin, begin + 60_000_000);
+            link.send(&mut clock, begin, begin + 60_000_000);
             let offset = clock.offset().expect("something came");
             assert!((offset.drift_ppm - drift_ppm).abs() < 1.0, "{drift_ppm}, each {every_us} us: {offset:?}");
-            assert!(way.off(&clock, begin + 60_000_000).abs() < 20.0, "{drift_ppm}, each {every_us} us");
+            assert!(link.off(&clock, begin + 60_000_000).abs() < 20.0, "{drift_ppm}, each {every_us} us");
             assert!((offset.board_us(offset.host_ns(begin)) - begin).abs() <= 1);
         }
     }
@@ -283,16 +283,16 @@ mod tests {
         let mut random = StdRng::seed_from_u64(seed);
         let mut off = [[0.0; 2]; 2];
         for (off, drift_ppm) in off.iter_mut().zip([-50.0, 30.0]) {
-            let (way, mut clock) = (Way::new(seed, drift_ppm, 500), BoardClock::default());
+            let (link, mut clock) = (Link::new(seed, drift_ppm, 500), BoardClock::default());
             for board_us in (500..10_010_000).step_by(500) {
                 let mut late = late_us(board_us, &mut random);
                 if random.random_bool(0.01) {
                     late += 5000.0;
                 }
-                clock.note(board_us, way.truth(board_us) + (late * 1e3) as i64);
+                clock.note(board_us, link.truth(board_us) + (late * 1e3) as i64);
                 match board_us {
-                    1_009_500 => off[0] = way.off(&clock, 1_000_000),
-                    10_009_500 => off[1] = way.off(&clock, 10_000_000),
+                    1_009_500 => off[0] = link.off(&clock, 1_000_000),
+                    10_009_500 => off[1] = link.off(&clock, 10_000_000),
                     _ => {}
                 }
             }
@@ -347,13 +347,13 @@ mod tests {
     #[test]
     fn a_few_datagrams_a_second_with_late_ones_among_them_do_not_look_like_a_drift() {
         for seed in 0..20 {
-            let mut way = Way::new(seed, 10.0, 200_000);
-            way.spikes = 0.3;
+            let mut link = Link::new(seed, 10.0, 200_000);
+            link.spikes = 0.3;
             let mut clock = BoardClock::default();
             for second in 0..60 {
-                way.hear(&mut clock, second * 1_000_000, (second + 1) * 1_000_000);
+                link.send(&mut clock, second * 1_000_000, (second + 1) * 1_000_000);
                 let most = if second < 10 { 1500.0 } else { 300.0 };
-                assert!(way.off(&clock, second * 1_000_000).abs() < most, "{second} s: {clock:?}");
+                assert!(link.off(&clock, second * 1_000_000).abs() < most, "{second} s: {clock:?}");
             }
         }
     }
@@ -361,11 +361,11 @@ mod tests {
     #[test]
     fn after_a_pause_of_an_hour_the_line_still_holds_and_is_better_than_before() {
         for (seed, drift_ppm) in [200.0, -200.0, 35.0].into_iter().enumerate() {
-            let mut way = Way::new(seed as u64, drift_ppm, 1000);
+            let mut link = Link::new(seed as u64, drift_ppm, 1000);
             let mut clock = BoardClock::default();
-            way.hear(&mut clock, 0, 20_000_000);
-            way.hear(&mut clock, 3_620_000_000, 3_622_000_000);
-            assert!(way.off(&clock, 3_622_000_000).abs() < 10.0, "{drift_ppm}: {}", way.off(&clock, 3_622_000_000));
+            link.send(&mut clock, 0, 20_000_000);
+            link.send(&mut clock, 3_620_000_000, 3_622_000_000);
+            assert!(link.off(&clock, 3_622_000_000).abs() < 10.0, "{drift_ppm}: {}", link.off(&clock, 3_622_000_000));
             let found = clock.offset().expect("something came").drift_ppm;
             assert!((found - drift_ppm).abs() < 0.1, "{drift_ppm}: {found}");
         }
@@ -373,11 +373,11 @@ mod tests {
 
     #[test]
     fn a_clock_that_is_no_quartz_is_believed_after_ten_seconds() {
-        let mut way = Way::new(3, 5000.0, 1000);
+        let mut link = Link::new(3, 5000.0, 1000);
         let mut clock = BoardClock::default();
-        way.hear(&mut clock, 0, 12_000_000);
+        link.send(&mut clock, 0, 12_000_000);
         assert!((clock.offset().expect("something came").drift_ppm - 5000.0).abs() < 5.0);
-        assert!(way.off(&clock, 12_000_000).abs() < 20.0);
+        assert!(link.off(&clock, 12_000_000).abs() < 20.0);
     }
 
     #[test]

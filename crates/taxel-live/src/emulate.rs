@@ -28,15 +28,15 @@ pub use replay::Replay;
 pub use scenes::Scenes;
 use sync::Sync;
 
-/// How often [`Emulator::run`] looks for commands, asks whether to stop, and reports.
+/// How often [`Emulator::run`] reads commands, checks whether to stop, and reports.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 const REPORT_EVERY: Duration = Duration::from_millis(100);
 
-/// Before a frame is due this is waited awake at most, and by so much that time is moved.
+/// Longest busy wait before a frame is due, and the step by which it is adapted.
 const MOST_AWAKE: Duration = Duration::from_micros(30);
 const STEP: Duration = Duration::from_nanos(100);
 
-/// How often two clocks are read until both were read at once, as near as that comes.
+/// How often two clocks are read; the pair read within the shortest time counts.
 const READINGS: usize = 16;
 
 /// The touch that an emulated board scans: a scene, a recording played again, noise.
@@ -46,7 +46,7 @@ pub trait Touch: Send {
     ///
     /// # Errors
     ///
-    /// Where what is played cannot be; then the board stops too.
+    /// Where the touch cannot be played; then the board stops too.
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool>;
 
     /// Whether the next frame can be written now, or there is none any more; waits for it some milliseconds at most, so
@@ -104,7 +104,7 @@ pub struct EmulatorOptions {
     pub circuit: Option<Chain>,
     /// What is wrong with the taxels.
     pub flaws: Option<Flaws>,
-    /// The board is reset so often, s of its time.
+    /// Interval between resets of the board, s of its time.
     pub reset_every_s: Option<f64>,
     /// How much faster the board's clock runs than the host's, parts per million.
     pub drift_ppm: f64,
@@ -145,7 +145,7 @@ pub struct Report {
     pub sent: SendCounts,
     /// What the network did to it, where it was asked to.
     pub network: Option<NetworkCounts>,
-    /// How often the board was reset.
+    /// Number of resets of the board.
     pub resets: u64,
     /// How long after its end each frame was sent; nothing where frames go as fast as they can.
     pub late: Quantiles,
@@ -159,7 +159,7 @@ pub struct Report {
     pub seconds: f64,
 }
 
-/// An emulated board that sends what it feels.
+/// An emulated board that scans a touch and sends its datagrams.
 #[derive(Debug)]
 pub struct Emulator {
     board: Board,
@@ -209,7 +209,7 @@ impl Emulator {
 
     /// Plays `touch` to its end, or until `stop`, which is no error; `watch` gets a report ten times a second.
     ///
-    /// A frame's datagrams leave when it ends. A frame that comes late does not move the ones after it.
+    /// The datagrams of a frame are sent at its end. A late frame does not delay later ones.
     ///
     /// # Errors
     ///
@@ -237,7 +237,7 @@ impl Emulator {
         let mut due = begun;
         // The board's time since its start, us: a reset sets the board's own clock back to 0.
         let mut before_reset_us = -started_us;
-        let (mut looked, mut told) = (begun, begun);
+        let (mut polled, mut reported) = (begun, begun);
         let mut last = false;
         while !last {
             while !stop.asked() && !touch.is_there()? {
@@ -270,7 +270,7 @@ impl Emulator {
                 && !last
             {
                 match crossed.read(self.board.registers(), &mut ticks, stop) {
-                    // Being asked to stop is no error here; the loop sees it.
+                    // A request to stop is no error here; the loop checks for it.
                     Err(taxel_core::Error::Interrupted) => continue,
                     read => read?,
                 }
@@ -304,12 +304,12 @@ impl Emulator {
                 late.note(i64::try_from(behind.as_nanos()).unwrap_or(i64::MAX));
                 report.late_frames += u64::from(behind > due - before);
             }
-            if now.duration_since(looked) >= LOOK_EVERY {
-                looked = now;
+            if now.duration_since(polled) >= LOOK_EVERY {
+                polled = now;
                 self.control.serve(&mut self.board);
             }
-            if now.duration_since(told) >= REPORT_EVERY {
-                told = now;
+            if now.duration_since(reported) >= REPORT_EVERY {
+                reported = now;
                 self.complete(&mut report, &late, begun, started_us + before_reset_us + self.board.time_us());
                 watch(&report, touch);
             }
@@ -343,7 +343,7 @@ impl Emulator {
     }
 }
 
-/// What leaves when the frame ends, not sooner: a train of datagrams goes as soon as one of another length follows.
+/// Datagrams that are sent when the frame ends, not earlier: a train is sent as soon as a datagram of another length follows.
 #[derive(Default)]
 struct Leaving {
     bytes: Vec<u8>,
@@ -381,8 +381,8 @@ fn now_by_both() -> (Instant, i64) {
     (before + took / 2, now_ns)
 }
 
-/// Waits for frames to be due. A sleeper wakes some 10 us late, more on an idle core than on a busy one, and a board does not: so
-/// the sleep ends so much sooner, and what is left is waited for awake.
+/// Waits until frames are due. A sleeping thread wakes some 10 us late, later on an idle core than on a busy one. So the sleep ends
+/// earlier by that much, and the rest is a busy wait.
 #[derive(Debug, Default)]
 struct Pace {
     sooner: Duration,
@@ -398,7 +398,7 @@ impl Pace {
         {
             std::thread::sleep(sleep);
             let woken = Instant::now();
-            // Nine in ten wake in time; a later one had a busy core, which no waiting mends.
+            // Nine in ten wake in time; a later one had a busy core, which a longer busy wait does not help.
             self.sooner = if woken.saturating_duration_since(now + sleep) > self.sooner {
                 (self.sooner + 9 * STEP).min(MOST_AWAKE)
             } else {
@@ -433,7 +433,7 @@ mod tests {
             assert!(pace.wait_until(due) >= due);
             assert!(pace.sooner <= MOST_AWAKE);
         }
-        // What is due already is not waited for.
+        // A frame that is already due is not waited for.
         let now = pace.wait_until(due);
         assert!(now >= due);
     }

@@ -13,7 +13,7 @@ pub enum Error {
     File {
         /// Which.
         path: PathBuf,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// A detection that could not be handed on.
@@ -24,7 +24,7 @@ pub enum Error {
     Socket {
         /// Which address.
         place: String,
-        /// What the operating system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }

@@ -19,11 +19,11 @@ const STRETCHES: usize = 64;
 const NEWEST: usize = 16;
 /// ... once there are so many; before, the newest alone counts.
 const BELIEVED: usize = 4;
-/// Quartz is good for 100 ppm, so two of them for 200: what is beyond is no drift.
+/// A quartz is accurate to 100 ppm, two of them to 200: a larger slope is no drift.
 const MOST_DRIFT: f64 = 200e-6;
-/// An exchange that contradicts what was expected by more than this ...
+/// An exchange that contradicts the estimate by more than this ...
 const ASTRAY_NS: i64 = 5_000_000;
-/// ... so often in a row means that a clock was set.
+/// ... this many times in a row means that a clock was set.
 const ASTRAY: u32 = 4;
 /// A longer round trip is ignored, ns.
 const LONGEST_NS: i64 = 2_000_000_000;
@@ -37,7 +37,7 @@ pub struct HostOffset {
     pub ahead_ns: i64,
     /// How much faster the other's clock runs, parts per million.
     pub drift_ppm: f64,
-    /// Half of what the shortest round trips leave open, ns.
+    /// Half the width of the interval that the shortest round trips allow, ns.
     pub within_ns: i64,
 }
 
@@ -66,7 +66,7 @@ pub struct RoundTrip {
     pub back: i64,
 }
 
-/// What a round trip allows.
+/// The offsets that a round trip allows.
 #[derive(Debug, Clone, Copy)]
 struct Allowed {
     here: i64,
@@ -96,7 +96,7 @@ pub struct HostClock {
 }
 
 impl HostClock {
-    /// Takes a round trip; one whose times cannot be true, or that took too long, is left out.
+    /// Adds a round trip; one with contradictory times, or that took too long, is ignored.
     pub fn note(&mut self, trip: RoundTrip) {
         let (Some(most), Some(least)) = (trip.came.checked_sub(trip.asked), trip.answered.checked_sub(trip.back))
         else {
@@ -206,7 +206,7 @@ mod tests {
         }
 
         /// Four times a second for `seconds`; each way takes 100 us and, now and then, up to 20 ms more.
-        fn heard(&self, clock: &mut HostClock, from: i64, seconds: i64, chance: &mut Chance) -> i64 {
+        fn exchanged(&self, clock: &mut HostClock, from: i64, seconds: i64, chance: &mut Chance) -> i64 {
             for k in 0..seconds * 4 {
                 let mut way = || 100_000 + (chance.next().powi(8) * 20e6) as i64;
                 let asked = HERE + from * 1_000_000_000 + k * 250_000_000;
@@ -223,7 +223,7 @@ mod tests {
     fn offset_and_drift_come_out_whatever_the_delays() {
         for (ahead_ns, drift) in [(0, 0.0), (3_700_000_000, 50e-6), (-86_400_000_000_000, -120e-6)] {
             let (mut clock, other) = (HostClock::default(), Other { ahead_ns, drift });
-            let now = other.heard(&mut clock, 0, 30, &mut Chance(7));
+            let now = other.exchanged(&mut clock, 0, 30, &mut Chance(7));
             let offset = clock.offset().expect("something came");
             assert!((offset.drift_ppm - drift * 1e6).abs() < 1.0, "{offset:?}");
             assert!((offset.here_ns(other.there(now)) - now).abs() < 20_000, "{offset:?}");
@@ -246,13 +246,13 @@ mod tests {
     fn a_clock_that_was_set_is_followed_and_one_late_answer_is_not() {
         let (mut clock, mut chance) = (HostClock::default(), Chance(3));
         let other = Other { ahead_ns: 1_000_000_000, drift: 0.0 };
-        other.heard(&mut clock, 0, 10, &mut chance);
+        other.exchanged(&mut clock, 0, 10, &mut chance);
         let before = clock.offset().expect("some came").ahead_ns;
         let set = Other { ahead_ns: -5_000_000_000, drift: 0.0 };
         let mut one = clock.clone();
-        set.heard(&mut one, 10, 0, &mut chance);
+        set.exchanged(&mut one, 10, 0, &mut chance);
         assert_eq!(one.offset().expect("some came").ahead_ns, before);
-        set.heard(&mut clock, 10, 2, &mut chance);
+        set.exchanged(&mut clock, 10, 2, &mut chance);
         assert!((clock.offset().expect("some came").ahead_ns + 5_000_000_000).abs() < 100_000);
     }
 

@@ -1,4 +1,4 @@
-//! How long things took: a histogram of fixed size.
+//! A histogram of durations, of fixed size.
 
 use serde::Serialize;
 

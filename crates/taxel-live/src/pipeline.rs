@@ -1,8 +1,8 @@
-//! Datagrams to detections, as they come.
+//! Datagrams to detections, as they arrive.
 //!
 //! The stages are *receive*, *decode*, *record* and *read out* (`stages`). One thread runs them all, and gives them to another
 //! one before it calls a sink (`threads`). While something is recorded, which a disk may hold up, receiving ([`crate::capture`]),
-//! decoding with recording, and reading out have a thread each; reading out also has one where it is slower than what comes. The
+//! decoding with recording, and reading out have a thread each; reading out also has one where it is slower than what arrives. The
 //! queues between them are bounded, and what finds no room is counted where it was lost. Viewers get copies ([`Live::counters`],
 //! [`Live::picture`]) and cannot slow the pipeline.
 
@@ -11,26 +11,26 @@ mod copies;
 mod counters;
 mod decode;
 mod handle;
-mod handover;
 mod observers;
 mod options;
 mod output;
+mod picture_buffer;
 mod read_out;
 mod reader;
+mod readout_queue;
 mod receive;
 mod record;
 mod recorder;
 mod recordings;
 mod rest;
-mod said;
 mod sending;
 mod shared;
+mod sink;
 mod source;
 mod sources;
 mod stages;
-mod stills;
-mod tap;
 mod threads;
+mod viewer_queue;
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -50,33 +50,33 @@ use crate::{Error, Result};
 pub use copies::{Copied, Copies};
 pub use counters::{Counters, SourceCounts, Summary};
 pub use handle::Handle;
-use handover::Handover;
 pub use options::{LiveOptions, Record};
 use output::DetectionOutput;
 pub use reader::Listener;
 use reader::Reader;
+use readout_queue::ReadoutQueue;
 use recorder::{Part, Recorder};
 use recordings::Recordings;
-pub use said::{Lines, Said, Sink};
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{Published, Shared};
+pub use sink::{Lines, OutputDetection, Sink};
 pub use source::{Place, Source, SourceKind};
 use sources::Others;
 use stages::Stages;
-pub use tap::{Change, Outlet, Piece, UNKNOWN};
 use threads::Threads;
+pub use viewer_queue::{Change, Piece, ViewerEvents};
 
 /// How long a wait lasts before the caller is asked whether to stop.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
+const CHECK_EVERY: Duration = Duration::from_millis(50);
 
 /// How many detections wait for [`Live::next`]; more are lost to it, and counted, but not lost to the sinks.
-const SAID_WAITING: usize = 1 << 14;
+const OUTPUT_WAITING: usize = 1 << 14;
 
 /// Datagrams to detections, from [`Live::start`] until [`Live::stop`].
 pub struct Live {
     shared: Arc<Shared>,
-    said: channel::Receiver<Said>,
+    detections: channel::Receiver<OutputDetection>,
     threads: Vec<JoinHandle<()>>,
     others: Mutex<Others<Live>>,
     recordings: Arc<Recordings>,
@@ -152,7 +152,7 @@ impl Live {
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
         if let (Listener::None, Some(to)) = (&listener, options.send.first()) {
-            return Err(taxel_core::problem!("send to {to} without a readout: nothing would be said").into());
+            return Err(taxel_core::problem!("send to {to} without a readout: nothing would be detected").into());
         }
         match &listener {
             Listener::Taring(stretch_us, _) if *stretch_us <= 0 => {
@@ -171,7 +171,7 @@ impl Live {
         let published = Published { picture: vec![0; options.array.len()], ..Published::default() };
         let shared = Arc::new(Shared {
             receiver,
-            handover: Handover::new(&options.array, options.readout_events),
+            readout_queue: ReadoutQueue::new(&options.array, options.readout_events),
             published: Mutex::new(published),
             recorder: Mutex::new(recorder),
             broken: Mutex::default(),
@@ -187,14 +187,14 @@ impl Live {
             expected: AtomicU8::new(0),
             ended: AtomicBool::new(false),
         });
-        let (queue, said) = channel::bounded(SAID_WAITING);
+        let (queue, detections) = channel::bounded(OUTPUT_WAITING);
         let reads_out = !matches!(listener, Listener::None);
         let board = |address, own: LiveOptions, part| {
             let capture = own.capture;
             Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Listener::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
-            // Nothing came: a new file is not left behind.
+            // Nothing arrived: a new file is not left behind.
             let recorder = lock(&shared.recorder).take();
             drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
         })?;
@@ -202,7 +202,7 @@ impl Live {
         let recordings = Recordings::new(Arc::clone(&shared), boards.collect(), others.numbers.clone());
         let others = Mutex::new(others);
         let mut live =
-            Self { shared: Arc::clone(&shared), said, threads: vec![], others, recordings: Arc::new(recordings) };
+            Self { shared: Arc::clone(&shared), detections, threads: vec![], others, recordings: Arc::new(recordings) };
         // A device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
@@ -246,10 +246,10 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// The error that ended the pipeline early: the disk is full, the socket failed, the encoder cannot use what comes.
-    pub fn next(&self, timeout: Duration) -> Result<Option<Said>> {
-        match self.said.recv_timeout(timeout) {
-            Ok(said) => Ok(Some(said)),
+    /// The error that ended the pipeline early: the disk is full, the socket failed, the encoder cannot use what arrives.
+    pub fn next(&self, timeout: Duration) -> Result<Option<OutputDetection>> {
+        match self.detections.recv_timeout(timeout) {
+            Ok(output) => Ok(Some(output)),
             Err(channel::RecvTimeoutError::Timeout) => self.check().map(|()| None),
             Err(channel::RecvTimeoutError::Disconnected) => {
                 self.check()?;
@@ -267,15 +267,15 @@ impl Live {
     /// # Errors
     ///
     /// As [`Live::next`].
-    pub fn wait(&self, timeout: Duration, stop: Stop<'_>) -> Result<Option<Said>> {
+    pub fn wait(&self, timeout: Duration, stop: Stop<'_>) -> Result<Option<OutputDetection>> {
         let until = Instant::now().checked_add(timeout);
         loop {
-            let left = until.map_or(LOOK_EVERY, |t| t.saturating_duration_since(Instant::now()));
+            let left = until.map_or(CHECK_EVERY, |t| t.saturating_duration_since(Instant::now()));
             // Before `next`: an error that ended the pipeline is then known, and `next` returns it.
             let over = self.is_over();
-            let said = self.next(left.min(LOOK_EVERY))?;
-            if said.is_some() || over || left.is_zero() || stop.asked() {
-                return Ok(said);
+            let output = self.next(left.min(CHECK_EVERY))?;
+            if output.is_some() || over || left.is_zero() || stop.asked() {
+                return Ok(output);
             }
         }
     }
@@ -290,7 +290,7 @@ impl Live {
         self.shared.ended.load(Ordering::Acquire)
     }
 
-    /// What came, what became of it and what was lost, up to now.
+    /// What arrived, what became of it and what was lost, up to now.
     #[must_use]
     pub fn counters(&self) -> Counters {
         let others = lock(&self.others);
@@ -305,7 +305,7 @@ impl Live {
         lock(&self.others).boards.iter().find(|(known, _)| known == name).map(|(_, board)| board.address())
     }
 
-    /// Records numbers of a source whose values a program gives, one for each of its columns, which came at `arrived_ns` (ns since
+    /// Records numbers of a source whose values a program gives, one for each of its columns, which arrived at `arrived_ns` (ns since
     /// 1970).
     ///
     /// # Errors
@@ -331,13 +331,13 @@ impl Live {
         self.shared.published().tare.clone()
     }
 
-    /// The starts and stops that came since the last call.
+    /// The starts and stops that arrived since the last call.
     #[must_use]
     pub fn take_markers(&self) -> Vec<Marker> {
         std::mem::take(&mut self.shared.published().markers)
     }
 
-    /// Writes a note into the recording, with the time of now.
+    /// Writes a note into the recording, with the current time.
     ///
     /// # Errors
     ///
@@ -346,7 +346,7 @@ impl Live {
         self.shared.note(text, true)
     }
 
-    /// Announces that the host told the board to speak this version of the wire (a write of REG0): datagrams of it are decoded at
+    /// Announces that the host set the board to this version of the wire (a write of REG0): datagrams of it are decoded at
     /// once, not after a second.
     ///
     /// # Errors
@@ -360,8 +360,8 @@ impl Live {
         Ok(())
     }
 
-    /// Records what comes from here on, of all sources, beginning with the registers and the values that the taxels hold. A recording
-    /// that runs ends with what came before, and is returned: each datagram, and each line, belongs to one of them.
+    /// Records what arrives from now on, of all sources, beginning with the registers and the values that the taxels hold. A recording
+    /// that runs ends with what arrived before, and is returned: each datagram, and each line, belongs to one of them.
     ///
     /// # Errors
     ///
@@ -374,7 +374,7 @@ impl Live {
         self.handle().record(record)
     }
 
-    /// Lets the recording that runs begin anew, where no source has given anything; returns whether it does.
+    /// Lets the recording that runs restart, where no source has given anything; returns whether it does.
     #[must_use]
     pub fn record_again(&self) -> bool {
         // Before the recorder is locked: counting and recording must not wait for each other.
@@ -397,12 +397,12 @@ impl Live {
         self.handle().records()
     }
 
-    /// Asks all threads to end once they have processed what came; [`Live::stop`] waits for them.
+    /// Asks all threads to end once they have processed what arrived; [`Live::stop`] waits for them.
     pub fn end(&self) {
         self.shared.receiver.stop();
     }
 
-    /// Ends: processes what came, closes the file, and returns what was lost.
+    /// Ends: processes what arrived, closes the file, and returns what was lost.
     ///
     /// # Errors
     ///

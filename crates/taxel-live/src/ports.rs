@@ -30,12 +30,12 @@ pub struct Port {
 pub fn ports() -> Result<Vec<Port>> {
     let found = serialport::available_ports()
         .map_err(|error| Error::file(std::path::Path::new("/sys/class/tty"))(error.into()))?;
-    let mut ports: Vec<Port> = found.into_iter().map(|port| told(port.port_name, port.port_type)).collect();
+    let mut ports: Vec<Port> = found.into_iter().map(|port| described(port.port_name, port.port_type)).collect();
     ports.sort_by(|a, b| (a.kind != "usb", &a.place).cmp(&(b.kind != "usb", &b.place)));
     Ok(ports)
 }
 
-fn told(place: String, kind: SerialPortType) -> Port {
+fn described(place: String, kind: SerialPortType) -> Port {
     let port = |kind| Port { place, kind, product: None, maker: None, serial: None, usb: None };
     match kind {
         SerialPortType::UsbPort(usb) => Port {

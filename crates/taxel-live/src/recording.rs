@@ -1,7 +1,6 @@
-//! Files that survive: the live format (MCAP) and the manual's raw `.lsa`.
+//! Recording files, which stay readable after a crash: MCAP, and the raw `.lsa` of the manual.
 //!
-//! A recording holds what came, not what our decoder made of it: raw datagrams with the host's arrival time and our own
-//! arrival number. Beside them stand the board's registers, markers, notes, detections, counts of what was lost, and a
+//! A recording holds the datagrams as they arrived, not decoded events, with the host's arrival time and an arrival number. Beside them stand the board's registers, markers, notes, detections, counts of what was lost, and a
 //! low-rate picture in a standard schema, so that any MCAP viewer shows something.
 //!
 //! A file is readable at any moment: a chunk reaches it whole, at the latest [`FLUSH_EVERY`] after its first datagram,
@@ -68,10 +67,10 @@ pub struct Header {
     #[serde(default)]
     pub difference: bool,
     /// What is added to decoded times, us: whole turns of the board's 6.5536 s counter before the first stamp, where a
-    /// file was converted; 0 for what came from a board.
+    /// file was converted; 0 for what arrived from a board.
     #[serde(default)]
     pub origin_us: i64,
-    /// Where the datagrams came from: "udp 0.0.0.0:5208", a file's name ...
+    /// Where the datagrams arrived from: "udp 0.0.0.0:5208", a file's name ...
     #[serde(default)]
     pub source: String,
     /// The host's clock when the recording began, ns since 1970.
@@ -143,7 +142,7 @@ pub struct Counts {
     pub dropped_by_kernel: u64,
     /// Datagrams that taxel dropped, its own queue being full.
     pub dropped_by_queue: u64,
-    /// What the decoder could not use of the bytes that came, by cause; see [`damage`].
+    /// What the decoder could not use of the bytes that arrived, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
     /// What was lost between the computer that received and this one, where there are two.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -280,8 +279,8 @@ impl Counts {
                 bridged.silences, bridged.restarts
             );
         }
-        if let Some(said) = &self.converted {
-            line = format!("converted from a recording that says: {said}");
+        if let Some(verdict) = &self.converted {
+            line = format!("converted from a recording that says: {verdict}");
         }
         line
     }

@@ -92,7 +92,7 @@ fn bridged(
     let mut copies = source.handle().copy().expect("it runs");
     let (receiver, feed) = Receiver::fed("zenoh:there/left", ReceiverOptions::default());
     let live = Live::start_fed(receiver, far.options(), Listener::None, vec![]).expect("nothing to refuse");
-    feed.meet();
+    feed.begin_session();
     compare(&feed, since);
     let to = source.address();
     let sends = std::thread::spawn(move || {
@@ -115,7 +115,7 @@ fn bridged(
                 }
                 k += 1;
             }
-            Some(Copied::Picture(_) | Copied::Said(_)) => {}
+            Some(Copied::Picture(_) | Copied::Detection(_)) => {}
             None if copies.is_over() => break,
             None => {}
         }
@@ -193,7 +193,7 @@ fn a_bridge_that_is_begun_anew_is_met_anew_and_goes_on() {
             if let Some(Copied::Parcel(parcel)) = copies.next(Duration::from_millis(50)) {
                 while !feed.take(&parcel) {
                     met += 1;
-                    feed.meet();
+                    feed.begin_session();
                     let now = now_ns();
                     feed.compare(RoundTrip { asked: now, came: now, answered: now, back: now });
                 }

@@ -15,7 +15,7 @@ use taxel_core::wire::{Command, Decoder, Registers};
 use taxel_core::{Array, Events, Stop};
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{self, Emulator, Report, Touch};
-use taxel_live::pipeline::{Listener, Live, LiveOptions, Record, Said, Sink, Summary};
+use taxel_live::pipeline::{Listener, Live, LiveOptions, OutputDetection, Record, Sink, Summary};
 use taxel_live::recording::{Compression, Reader, Topic};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -154,7 +154,7 @@ fn a_recording_holds_the_events_that_the_board_sent() {
     let path = Scratch::new("events.mcap");
     let live = Live::start(ANY, options(Some(&path)), Listener::None, vec![]).expect("a port and a file");
     let report = emulate(live.address(), false, presses(3000, 3000));
-    let summary = live.stop().expect("a sound way");
+    let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     let expected = sent(3000, 3000);
     assert!(expected.len() > 4096);
@@ -170,7 +170,7 @@ fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
     let report = emulate(live.address(), false, presses(1000, 1000));
     wait_for(&live, |live| live.counters().wire.bytes == report.sent.bytes);
     assert!(!path.0.with_extension("lss").exists(), "not complete yet");
-    live.stop().expect("a sound way");
+    live.stop().expect("no error");
     let mut decoder = Decoder::new(Array::thesis());
     let mut events = decoder.push(&std::fs::read(&path.0).expect("the file"), None);
     decoder.finish_into(&mut events);
@@ -181,34 +181,34 @@ fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
 #[test]
 fn what_is_said_live_is_what_the_recording_says() {
     let path = Scratch::new("said.mcap");
-    let heard = Arc::new(Mutex::new(Vec::<Said>::new()));
+    let heard = Arc::new(Mutex::new(Vec::<OutputDetection>::new()));
     let sink = Arc::clone(&heard);
-    let sinks: Vec<Box<dyn Sink>> = vec![Box::new(move |said: &Said| {
-        sink.lock().expect("sound").push(said.clone());
+    let sinks: Vec<Box<dyn Sink>> = vec![Box::new(move |output: &OutputDetection| {
+        sink.lock().expect("not poisoned").push(output.clone());
         Ok(())
     })];
     let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), sinks).expect("a port and a file");
     let report = emulate(live.address(), true, presses(4000, 4000));
     let mut queued = vec![];
-    while let Some(said) = live.next(Duration::from_millis(500)).expect("a sound way") {
+    while let Some(said) = live.next(Duration::from_millis(500)).expect("no error") {
         queued.push(said);
     }
-    let summary = live.stop().expect("a sound way");
+    let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     assert_eq!(summary.counters.late, 0);
     assert_eq!(summary.counters.events, summary.counters.read_out);
-    let heard = heard.lock().expect("sound");
+    let heard = heard.lock().expect("not poisoned");
     assert_eq!(*heard, queued, "sink and queue hear the same");
     let live_said: Vec<Detection> = heard.iter().map(|s| s.detection.clone()).collect();
     let (events, said) = recorded(&path);
-    assert_eq!(said, live_said, "the recording keeps what was said");
+    assert_eq!(said, live_said, "the recording has the detections that were output");
     let mut again = readout(2.0).run_events(events.view(), 192.0, None, &[], Stop::never()).expect("a sound readout");
     // Nothing moved the time on after the last event, and what it would have led to was not said.
     again.retain(|d| Some(&d.t) < events.t.last());
     assert_eq!(again, live_said);
     assert!(again.len() > 5, "the presses are heard: {}", again.len());
     // By the host's clock less the offset no detection can be said before it was known, but for the clocks' estimate.
-    assert!(heard.iter().all(|s| s.said >= s.detection.known - 192), "{heard:?}");
+    assert!(heard.iter().all(|s| s.output_us >= s.detection.known - 192), "{heard:?}");
 }
 
 /// The board's times of a recording's pictures, us.
@@ -234,8 +234,8 @@ fn a_recording_has_pictures_around_detections_beside_ten_a_second() {
     let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), vec![]).expect("a port and a file");
     // A press begins each 40 ms; ten pictures a second would miss more than half of them.
     emulate(live.address(), true, presses(6000, 6000));
-    while live.next(Duration::from_millis(200)).expect("a sound way").is_some() {}
-    live.stop().expect("a sound way");
+    while live.next(Duration::from_millis(200)).expect("no error").is_some() {}
+    live.stop().expect("no error");
     let tenths = begun.elapsed().as_millis() / 100;
     let (times, said) = (pictured(&path), recorded(&path).1);
     assert!(said.len() > 20, "{}", said.len());
@@ -254,9 +254,9 @@ fn in_silence_time_moves_on_by_the_hosts_clock() {
         ticks[..40].fill(20 * frames);
         frames <= 2
     });
-    let said = live.next(Duration::from_secs(30)).expect("a sound way").expect("it is said though nothing follows");
+    let said = live.next(Duration::from_secs(30)).expect("no error").expect("it is output though no event follows");
     assert!(said.detection.t > 1000, "the kernel takes its time: {said:?}");
-    live.stop().expect("a sound way");
+    live.stop().expect("no error");
 }
 
 #[test]
@@ -292,7 +292,7 @@ fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
     let mut sender = Sender::open(live.address(), true).expect("a socket");
     datagrams.iter().for_each(|d| sender.push(d).expect("sent"));
     sender.flush().expect("sent");
-    let summary = live.stop().expect("a sound way");
+    let summary = live.stop().expect("no error");
     let (c, sent) = (summary.counters, sender.counts());
     assert_eq!((c.capture.datagrams, c.capture.bytes, c.decoded), (sent.datagrams, sent.bytes, sent.datagrams));
     assert_eq!(c.wire.bytes, sent.bytes);
@@ -309,14 +309,14 @@ fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
 #[test]
 fn a_slow_readout_loses_events_where_they_are_counted_and_the_recording_loses_none() {
     let path = Scratch::new("slow.mcap");
-    let slow: Box<dyn Sink> = Box::new(|_: &Said| {
+    let slow: Box<dyn Sink> = Box::new(|_: &OutputDetection| {
         std::thread::sleep(Duration::from_millis(50));
         Ok(())
     });
     let options = LiveOptions { readout_events: 1000, ..options(Some(&path)) };
     let live = Live::start(ANY, options, reading(&readout(20.0)), vec![slow]).expect("started");
     let report = emulate(live.address(), false, presses(3000, 3000));
-    let summary = live.stop().expect("a sound way");
+    let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     let c = &summary.counters;
     assert!(c.events_dropped > 0);
@@ -329,8 +329,8 @@ fn who_is_slow_to_listen_holds_up_neither_what_comes_nor_what_is_read_out() {
     let (free, held) = std::sync::mpsc::channel::<()>();
     let heard = Arc::new(Mutex::new(Vec::<Detection>::new()));
     let sink = Arc::clone(&heard);
-    let slow: Box<dyn Sink> = Box::new(move |said: &Said| {
-        sink.lock().expect("sound").push(said.detection.clone());
+    let slow: Box<dyn Sink> = Box::new(move |output: &OutputDetection| {
+        sink.lock().expect("not poisoned").push(output.detection.clone());
         // Until it is let go; then at once.
         let _ = held.recv();
         Ok(())
@@ -339,14 +339,14 @@ fn who_is_slow_to_listen_holds_up_neither_what_comes_nor_what_is_read_out() {
     let report = emulate(live.address(), true, presses(1500, 1500));
     let expected = sent(1500, 1500);
     wait_for(&live, |live| live.counters().read_out == expected.len() as u64);
-    assert_eq!((heard.lock().expect("sound").len(), live.counters().detections), (1, 0));
+    assert_eq!((heard.lock().expect("not poisoned").len(), live.counters().detections), (1, 0));
     drop(free);
-    let summary = live.stop().expect("a sound way");
+    let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     let mut again = readout(2.0).run_events(expected.view(), 192.0, None, &[], Stop::never()).expect("a sound readout");
     again.retain(|d| Some(&d.t) < expected.t.last());
     assert!(again.len() > 3, "the presses are heard: {}", again.len());
-    assert_eq!(*heard.lock().expect("sound"), again, "each once, in their order");
+    assert_eq!(*heard.lock().expect("not poisoned"), again, "each once, in their order");
     assert_eq!(summary.counters.detections, again.len() as u64);
 }
 
@@ -381,7 +381,7 @@ fn a_stop_ends_also_while_datagrams_pour_in() {
         }
     });
     wait_for(&live, |live| live.counters().decoded > 1000);
-    let summary = live.stop().expect("a sound way");
+    let summary = live.stop().expect("no error");
     done.store(true, std::sync::atomic::Ordering::Relaxed);
     pouring.join().expect("sent all along");
     let c = summary.counters;
@@ -410,14 +410,14 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_w
     };
     let report = emulator.run(&mut touch, |_, _| {}, Stop::never()).expect("sent");
     let mut said = vec![];
-    while let Some(next) = live.next(Duration::from_millis(500)).expect("a sound way") {
+    while let Some(next) = live.next(Duration::from_millis(500)).expect("no error") {
         said.push(next.detection);
     }
     let start = 260 * 192 / 100 * 100;
     assert_eq!(live.take_markers().iter().map(|m| (m.t, m.start)).collect::<Vec<_>>(), [(start, true)]);
     let tare = live.tare().expect("taken");
     assert!(!live.counters().taring);
-    let summary = live.stop().expect("a sound way");
+    let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     assert_eq!((tare.start_us, tare.stop_us), (0, start));
     assert!(tare.rest.iter().all(|&rest| rest == Some(20.0)));
@@ -456,5 +456,5 @@ fn the_board_takes_commands_and_answers() {
         let report = board.join().expect("no panic").expect("sent");
         assert_eq!(report.late.count, report.board.frames);
     });
-    live.stop().expect("a sound way");
+    live.stop().expect("no error");
 }

@@ -3,11 +3,12 @@
 //! The same for live events and for recordings: a state that was begun earlier and one that was begun from a keyframe are
 //! equal as soon as [`FORGET`] columns of time have passed.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
-use taxel_live::pipeline::{Change, UNKNOWN};
+use taxel_core::held::{Held, UNKNOWN};
+use taxel_core::rest::Rest;
+use taxel_live::pipeline::Change;
 
 /// Columns of [`COLUMN_US`] after which a change has decayed: 127, less a sixteenth per column, is then 0.
 pub const FORGET: i64 = 64;
@@ -34,12 +35,8 @@ pub struct ArrayState {
     /// Column and row of each taxel, looked up because a division per change would dominate the cost.
     places: Arc<[(u16, u16)]>,
     floor: u16,
-    held: Vec<u16>,
-    rest: Vec<u16>,
-    /// Whether the rest follows the lowest value so far; otherwise it was set.
-    rest_is_lowest: bool,
-    /// Taxels whose rest was set one by one: a lower value does not change it.
-    zeroed: BTreeSet<usize>,
+    held: Held,
+    rest: Rest<u16>,
     /// Number of changes of the rest.
     rests: u64,
     change: Vec<i8>,
@@ -72,10 +69,8 @@ impl ArrayState {
         let mut state = Self {
             places: (0..from.held.len()).map(place).collect(),
             floor,
-            held: from.held.clone(),
-            rest: from.rest.clone(),
-            rest_is_lowest: true,
-            zeroed: BTreeSet::new(),
+            held: from.held.clone().into(),
+            rest: Rest::lowest(from.rest.clone()),
             rests: 1,
             change: vec![0; from.held.len()],
             time_columns: TimeColumns::new(from.held.len() / columns, time_column_bytes),
@@ -101,23 +96,20 @@ impl ArrayState {
     /// A keyframe of the current state.
     #[must_use]
     pub fn keyframe(&self) -> Keyframe {
-        Keyframe { latest: self.latest, events: self.events, held: self.held.clone(), rest: self.rest.clone() }
+        Keyframe { latest: self.latest, events: self.events, held: self.held().to_vec(), rest: self.rest().to_vec() }
     }
 
     /// Computes the sums above rest from all taxels.
     fn sum_above_rest(&mut self) {
         (self.sum, self.sum_x, self.sum_y, self.area) = (0, 0, 0, 0);
-        for taxel in 0..self.held.len() {
+        for taxel in 0..self.places.len() {
             self.change_above_rest(taxel, 0, self.above(taxel));
         }
     }
 
     /// Ticks of a taxel above rest; 0 up to the noise floor.
     fn above(&self, taxel: usize) -> u16 {
-        let (held, rest) = (self.held[taxel], self.rest[taxel]);
-        let above = held.saturating_sub(rest);
-        // No branch: which taxels are pressed is unpredictable.
-        if (held != UNKNOWN) & (rest != UNKNOWN) & (above > self.floor) { above } else { 0 }
+        self.rest.above_noise(taxel, self.held.values()[taxel], self.floor)
     }
 
     /// Updates the sums for a taxel that was `before` ticks above rest and is `now`.
@@ -171,21 +163,15 @@ impl ArrayState {
             self.change[taxel] = self.change[taxel].saturating_add(size).max(-127);
             return;
         }
-        let before = self.held[taxel];
+        let above = self.above(taxel);
+        let before = self.held.set(taxel, change.ticks);
         // The first value of a taxel is not a change.
         let moved = if before == UNKNOWN { 0 } else { i32::from(change.ticks) - i32::from(before) };
         #[allow(clippy::cast_possible_truncation)]
         let size = moved.clamp(-127, 127) as i8;
         let largest = self.change[taxel];
         self.change[taxel] = if size.unsigned_abs() >= largest.unsigned_abs() { size } else { largest };
-        let above = self.above(taxel);
-        self.held[taxel] = change.ticks;
-        if (self.rest[taxel] == UNKNOWN || self.rest_is_lowest && change.ticks < self.rest[taxel])
-            && !self.zeroed.contains(&taxel)
-        {
-            self.rest[taxel] = change.ticks;
-            self.rests += 1;
-        }
+        self.rests += u64::from(self.rest.follow(taxel, change.ticks));
         self.change_above_rest(taxel, above, self.above(taxel));
     }
 
@@ -244,7 +230,7 @@ impl ArrayState {
 
     /// Clears all held values after a reset of the board: they are unknown until the next event of each taxel.
     pub fn clear(&mut self) {
-        self.held.fill(UNKNOWN);
+        self.held.clear();
         self.sum_above_rest();
         self.restarts += 1;
     }
@@ -257,14 +243,10 @@ impl ArrayState {
 
     /// Sets all held values where events are missing; `events` is the number of events up to now.
     pub fn set_held(&mut self, held: &[u16], events: u64) {
-        self.held.copy_from_slice(held);
+        self.held.values_mut().copy_from_slice(held);
         self.events = events;
-        for (taxel, (rest, &held)) in self.rest.iter_mut().zip(held).enumerate() {
-            let lower = *rest == UNKNOWN || self.rest_is_lowest && held < *rest;
-            if held != UNKNOWN && lower && !self.zeroed.contains(&taxel) {
-                *rest = held;
-                self.rests += 1;
-            }
+        for (taxel, &held) in held.iter().enumerate().filter(|(_, held)| **held != UNKNOWN) {
+            self.rests += u64::from(self.rest.follow(taxel, held));
         }
         self.sum_above_rest();
     }
@@ -272,25 +254,22 @@ impl ArrayState {
     /// Sets the rest of one taxel, until the rest of all taxels is set.
     pub fn zero(&mut self, taxel: usize, rest: u16) {
         let above = self.above(taxel);
-        self.rest[taxel] = rest;
-        self.zeroed.insert(taxel);
+        self.rest.set(taxel, rest);
         self.rests += 1;
         self.change_above_rest(taxel, above, self.above(taxel));
     }
 
     /// Sets the rest of all taxels to their held values.
     pub fn rest_now(&mut self) {
-        self.zeroed.clear();
-        self.rest.copy_from_slice(&self.held);
-        (self.rest_is_lowest, self.rests) = (false, self.rests + 1);
+        self.rest = Rest::measured(self.held().to_vec());
+        self.rests += 1;
         self.sum_above_rest();
     }
 
     /// Lets the rest of all taxels follow their lowest value from now on.
     pub fn rest_lowest(&mut self) {
-        self.zeroed.clear();
-        self.rest.copy_from_slice(&self.held);
-        (self.rest_is_lowest, self.rests) = (true, self.rests + 1);
+        self.rest = Rest::lowest(self.held().to_vec());
+        self.rests += 1;
         self.sum_above_rest();
     }
 
@@ -298,11 +277,9 @@ impl ArrayState {
     pub fn copy_rest(&mut self, other: &Self) {
         if self.floor != other.floor || self.rest != other.rest {
             self.floor = other.floor;
-            self.rest.copy_from_slice(&other.rest);
+            self.rest.clone_from(&other.rest);
             self.sum_above_rest();
         }
-        self.rest_is_lowest = other.rest_is_lowest;
-        self.zeroed.clone_from(&other.zeroed);
     }
 
     /// Sets the noise floor: ticks above rest that count as none.
@@ -314,13 +291,13 @@ impl ArrayState {
     /// Held value of each taxel.
     #[must_use]
     pub fn held(&self) -> &[u16] {
-        &self.held
+        self.held.values()
     }
 
     /// Value of each taxel at rest.
     #[must_use]
     pub fn rest(&self) -> &[u16] {
-        &self.rest
+        self.rest.values()
     }
 
     /// Number of changes of the rest.

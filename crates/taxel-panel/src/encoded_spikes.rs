@@ -8,8 +8,9 @@ use taxel_core::encode::{Encoder, Stream};
 use taxel_core::{Array, Events, Intensities, Spike, problem};
 
 use super::time_columns::{SPAN, column_of};
+use taxel_core::held::{UNKNOWN, as_events};
 use taxel_live::Result;
-use taxel_live::pipeline::{Change, UNKNOWN};
+use taxel_live::pipeline::Change;
 
 /// Maximum number of spikes in a message.
 const MOST: usize = 4096;
@@ -60,15 +61,7 @@ impl EncodedSpikes {
         };
         if let Some(t) = since {
             // The held values are where the encoder begins, and not changes.
-            let held = held.iter().enumerate().filter(|&(_, &ticks)| ticks != UNKNOWN);
-            // A sensor has 2^22 taxels at most (recording's limits).
-            #[allow(clippy::cast_possible_truncation)]
-            let held: Vec<_> = held
-                .map(|(taxel, &ticks)| Change { t, taxel: taxel as u32, ticks, up: true, repaired: false })
-                .collect();
-            let mut events = spikes.events(&held);
-            events.repaired = Some(vec![true; events.len()]);
-            spikes.push_events(&events);
+            spikes.push_events(&as_events(held, t, array));
             spikes.pending.clear();
             spikes.columns.clear();
         }

@@ -1,6 +1,6 @@
 //! The live panel: a server for browsers and other clients that show a board or recordings (docs/panel-protocol.md).
 //!
-//! One thread serves all clients. It works on copies of the events ([`taxel_live::pipeline::Outlet`]) and sends a picture
+//! One thread serves all clients. It works on copies of the events ([`taxel_live::pipeline::ViewerEvents`]) and sends a picture
 //! only when a client has asked for one, so that a client that reads slowly, or never, delays nothing but its own
 //! pictures. What takes long or belongs to other parts of the program (the board's serial line, cutting, label tables) is
 //! left to the program that started the panel, through [`RequestHandler`].

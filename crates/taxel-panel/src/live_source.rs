@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crossbeam_channel as channel;
 use taxel_core::Array;
+use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
 use taxel_live::clock::Offset;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Handle, Outlet, Said, UNKNOWN};
+use taxel_live::pipeline::{Handle, OutputDetection, ViewerEvents};
 use taxel_live::recording::now_ns;
 
 use super::array_state::{ArrayState, Keyframe};
@@ -26,12 +27,12 @@ const STALLED_US: i64 = 200_000;
 /// See the module.
 pub(super) struct LiveSource {
     pub(super) handle: Handle,
-    outlet: Mutex<Outlet>,
-    detections: channel::Receiver<Said>,
+    events: Mutex<ViewerEvents>,
+    detections: channel::Receiver<OutputDetection>,
     pub(super) state: Mutex<ArrayState>,
     pub(super) index: LiveIndex,
     pub(super) activity: Mutex<Activity>,
-    /// Events that the outlet had no room for.
+    /// Events that found no room in the queue from the pipeline.
     missing: AtomicU64,
     /// Number of zeroings that the state has applied.
     zeroings: AtomicU64,
@@ -57,7 +58,7 @@ pub(super) struct Received {
     /// Taxels were zeroed.
     pub(super) zeroed: bool,
     /// New detections.
-    pub(super) detections: Vec<Said>,
+    pub(super) detections: Vec<OutputDetection>,
 }
 
 impl LiveSource {
@@ -65,7 +66,7 @@ impl LiveSource {
     ///
     /// `Core(Problem)` where the source has ended.
     pub(super) fn new(handle: Handle, noise_floor: u8) -> Result<Self> {
-        let (detections, outlet) = (handle.hear(MOST_WAITING), handle.look()?);
+        let (detections, events) = (handle.detections(MOST_WAITING), handle.events()?);
         let array = handle.options().array.clone();
         let unknown = vec![UNKNOWN; array.len()];
         let blank = Keyframe { latest: None, events: 0, held: unknown.clone(), rest: unknown };
@@ -75,7 +76,7 @@ impl LiveSource {
             state: Mutex::new(ArrayState::new(array.columns, noise_floor.into(), &blank, COLUMN_US, bytes)),
             activity: Mutex::new(Activity::new(array.len())),
             index: LiveIndex::new(array, noise_floor.into()),
-            outlet: Mutex::new(outlet),
+            events: Mutex::new(events),
             handle,
             detections,
             missing: AtomicU64::new(0),
@@ -96,9 +97,9 @@ impl LiveSource {
     /// Applies what the pipeline has copied; it copies more often while a client is connected.
     pub(super) fn receive(&self, has_clients: bool) -> Received {
         let mut received = Received::default();
-        let outlet = lock(&self.outlet);
-        outlet.look(has_clients);
-        while let Some(piece) = outlet.next() {
+        let events = lock(&self.events);
+        events.set_watched(has_clients);
+        while let Some(piece) = events.next() {
             let mut state = lock(&self.state);
             self.missing.fetch_add(piece.missing, Ordering::Relaxed);
             if let (Some(first), Some(latest)) = (piece.changes.first(), state.latest()) {
@@ -125,7 +126,7 @@ impl LiveSource {
             stored.piece.changes.iter().for_each(|change| activity.count(change));
             received.picture |= !stored.piece.changes.is_empty();
         }
-        drop(outlet);
+        drop(events);
         received.detections.extend(self.detections.try_iter());
         received.zeroed = self.apply_zeroings();
         received.picture |= received.zeroed;

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use taxel_core::Array;
 use taxel_core::encode::Zeroing;
-use taxel_live::pipeline::{Counters, Said};
+use taxel_live::pipeline::{Counters, OutputDetection};
 use taxel_live::recording::now_ns;
 
 use super::keyframe_index::KeyframeIndex;
@@ -23,11 +23,11 @@ pub(super) fn zeroing(zeroing: &Zeroing) -> Value {
 }
 
 /// `detection`.
-pub(super) fn detection(said: &Said) -> Value {
-    let Said { detection, said, .. } = said;
+pub(super) fn detection(output: &OutputDetection) -> Value {
+    let OutputDetection { detection, output_us, .. } = output;
     json!({
-        "type": "detection", "label": detection.label, "t_us": detection.t, "known_us": detection.known, "said_us": said,
-        "latency_us": said - detection.known, "slope_mv_per_ms": detection.slope,
+        "type": "detection", "label": detection.label, "t_us": detection.t, "known_us": detection.known, "said_us": output_us,
+        "latency_us": output_us - detection.known, "slope_mv_per_ms": detection.slope,
     })
 }
 

@@ -10,8 +10,9 @@ use super::encoded_spikes::EncodedSpikes;
 use super::keyframe_index::{ChangeReader, KeyframeIndex, Read};
 use super::taxel_history::TaxelHistory;
 use super::time_columns::{COLUMN_US, LATE_US, SPAN, TimeColumns, column_of};
+use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
-use taxel_live::pipeline::{Change, UNKNOWN};
+use taxel_live::pipeline::Change;
 
 /// Maximum number of changes that are decoded only for the history of a taxel and the spikes of an encoder.
 const HISTORY_CHANGES: u64 = 2_000_000;

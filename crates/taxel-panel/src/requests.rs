@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use taxel_core::held::UNKNOWN;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::UNKNOWN;
 use taxel_live::ports::ports;
 
 use super::clients::Broadcast;
@@ -66,7 +66,7 @@ fn board(hub: &Hub) -> Answer<Arc<LiveSource>> {
     hub.live().ok_or_else(|| "no board is listened to".into())
 }
 
-/// Whether the live source may begin anew: on another address, or with another meaning of intensities.
+/// Whether the live source may restart: on another address, or with another meaning of intensities.
 fn check_restart(hub: &Hub) -> Answer {
     if hub.recorder.is_busy() {
         return Err("a recording runs: stop it first".into());

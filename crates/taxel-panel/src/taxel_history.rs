@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use super::time_columns::{SPAN, column_of};
-use taxel_live::pipeline::{Change, UNKNOWN};
+use taxel_core::held::UNKNOWN;
+use taxel_live::pipeline::Change;
 
 /// Least, greatest and last value of one taxel in each column of time.
 #[derive(Debug, Clone)]

@@ -21,7 +21,7 @@ import { showTab } from "./tabs.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
-/** What the raster lacks of the width of the lanes on either side, CSS pixels. */
+/** Difference between the widths of raster and lanes on each side, CSS pixels. */
 const RASTER_INSET = 44;
 
 /**

@@ -7,15 +7,15 @@ import { RefusedError } from "./server.js";
 import { whole } from "./words.js";
 
 /** @typedef {import("./registers.js").Field} Field */
-/** @typedef {import("./protocol.js").RegistersTold} RegistersTold */
-/** @typedef {import("./protocol.js").Presets} PresetsTold */
+/** @typedef {import("./protocol.js").RegistersMessage} RegistersMessage */
+/** @typedef {import("./protocol.js").Presets} PresetsMessage */
 /** @typedef {import("./protocol.js").Hello} Hello */
 /** @typedef {import("./protocol.js").Counters} Counters */
 /** @typedef {import("./server.js").Server} Server */
 
-/** Those of the scan's timing, which everybody needs, in the order of the scan. */
+/** Registers of the scan's timing, which are always shown, in the order of the scan. */
 const TIMING = ["line_period", "line_read", "step_period", "step_read", "ramp", "noise_floor", "lines"];
-/** What a person reads; the registers' own names are their titles. */
+/** Labels of the sliders; the names of the registers are their titles. */
 /** @type {Record<string, string>} */
 const SPOKEN = {
   line_period: "Line period",
@@ -58,23 +58,23 @@ class Control {
       this.input = make("input", { type: "checkbox", id, "aria-describedby": this.reason.id });
       this.row.classList.add("switch");
       this.row.append(this.input, this.reason);
-      this.input.addEventListener("change", () => this.want(Number(this.input.checked)));
+      this.input.addEventListener("change", () => this.setTarget(Number(this.input.checked)));
     } else {
       this.input = make("input", { type: "text", inputmode: "decimal", id, autocomplete: "off", "aria-describedby": `${id}-unit ${this.reason.id}` });
       if (TIMING.includes(field.name)) {
         this.slider = make("input", { type: "range", min: 0, max: SLIDER, step: 1, "aria-label": `${SPOKEN[field.name]}, slider` });
         this.row.append(this.slider);
         this.slider.addEventListener("input", () => {
-          this.want(this.slid(Number(this.slider?.value)), false);
+          this.setTarget(this.slid(Number(this.slider?.value)), false);
           this.showWanted();
         });
-        this.slider.addEventListener("change", () => this.tell());
+        this.slider.addEventListener("change", () => this.notify());
       }
       this.row.append(this.input, make("span", { class: "unit", id: `${id}-unit` }, shortUnit(this.unit.name)), this.reason);
-      this.input.addEventListener("change", () => this.want(this.read()));
+      this.input.addEventListener("change", () => this.setTarget(this.read()));
       this.input.addEventListener("keydown", (event) => this.key(event));
     }
-    this.tell = () => typed(this);
+    this.notify = () => typed(this);
     const presets = PRESETS.map(({ values }) => values[field.name]).filter((value) => value !== undefined);
     /** What the slider reaches: four times what any preset needs; the number takes whatever the register holds. */
     this.top = field.bits <= 8 ? field.greatest : Math.min(field.greatest, 4 * Math.max(Number(field.default), ...presets));
@@ -86,12 +86,12 @@ class Control {
     if (event.key === "Escape") {
       if (this.wanted === null && this.input.value === this.text(this.held)) return;
       this.restore();
-      this.tell();
+      this.notify();
       event.stopPropagation();
       event.preventDefault();
     } else if ((event.key === "ArrowUp" || event.key === "ArrowDown") && this.field.unit !== "flag") {
       const by = (event.key === "ArrowUp" ? 1 : -1) * (event.shiftKey ? 10 : 1);
-      this.want(Math.max(this.field.least, Math.min(this.field.greatest, (this.wanted ?? this.held) + by)));
+      this.setTarget(Math.max(this.field.least, Math.min(this.field.greatest, (this.wanted ?? this.held) + by)));
       this.showWanted();
       event.preventDefault();
     }
@@ -103,10 +103,10 @@ class Control {
     return text === "" ? NaN : Math.round(Number(text) * this.unit.per);
   }
 
-  /** @param {number} value @param {boolean} [tell] */
-  want(value, tell = true) {
+  /** @param {number} value @param {boolean} [notify] */
+  setTarget(value, notify = true) {
     this.wanted = value === this.held ? null : value;
-    if (tell) this.tell();
+    if (notify) this.notify();
   }
 
   /** @param {number} place of the slider @returns {number} even steps in ratio, as what is sensible spans decades */
@@ -135,7 +135,7 @@ class Control {
     if (this.wanted === held) this.wanted = null;
     const same = this.held === held;
     this.held = held;
-    // What a person is typing stays.
+    // Text that is being typed stays.
     if (this.wanted === null && !(same && document.activeElement === this.input)) this.show();
   }
 
@@ -203,7 +203,7 @@ export class Board {
     this.writable = false;
     /** @type {Record<string, number>} */
     this.values = {};
-    /** @type {PresetsTold | null} */
+    /** @type {PresetsMessage | null} */
     this.presets = null;
     /** @type {Map<string, Control>} */
     this.controls = new Map();
@@ -218,7 +218,7 @@ export class Board {
       this.restoreAll();
       if (!this.select.value) return;
       this.server.request({ type: "preset_apply", name: this.select.value }).catch((error) => {
-        // What the board holds is another one still.
+        // The board still has another version.
         this.showPresets();
         this.failed(error);
       });
@@ -270,12 +270,12 @@ export class Board {
     this.check();
   }
 
-  /** @param {RegistersTold} message */
+  /** @param {RegistersMessage} message */
   take(message) {
     this.show(message.values, message.frame_us, message.preset, message.known);
   }
 
-  /** @param {PresetsTold} presets */
+  /** @param {PresetsMessage} presets */
   takePresets(presets) {
     this.presets = presets;
     this.showPresets();

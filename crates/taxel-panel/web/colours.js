@@ -72,10 +72,10 @@ export function word([red, green, blue]) {
 }
 
 /**
- * 256 words from nothing to the most.
+ * 256 words from no pressure to the largest.
  * @param {string} name one of MAPS
  * @param {Theme} theme
- * @param {number} gamma the share of the scale is raised to 1 / gamma: above 1 shows more of what is weak
+ * @param {number} gamma values from 0 to 1 are raised to 1 / gamma: above 1 makes weak pressure more visible
  * @returns {Uint32Array}
  */
 export function pressureWords(name, theme, gamma) {

@@ -83,7 +83,7 @@ class PlaceForm {
 
   /** @param {string | null} place where it is now */
   at(place) {
-    // What a person is typing stays, and what was refused.
+    // Text that is being typed stays, and so does a refused address.
     if (document.activeElement !== this.input && (place !== null || this.why.hidden)) this.input.value = place ?? "";
     this.show();
   }

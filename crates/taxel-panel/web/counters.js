@@ -3,7 +3,7 @@
 import { make, part, write } from "./dom.js";
 import { whole } from "./words.js";
 
-/** @typedef {import("./protocol.js").Counters} Told */
+/** @typedef {import("./protocol.js").Counters} CountersMessage */
 
 /** @type {Record<string, string>} where data can be lost */
 const LOSSES = {
@@ -18,7 +18,7 @@ const LOSSES = {
 
 /**
  * Writes the counters.
- * @param {Told | null} counters of the live source
+ * @param {CountersMessage | null} counters of the live source
  * @param {boolean} assumed whether the frame rate follows from registers that were not read from the board
  * @param {number} drawn pictures a second
  */
@@ -32,7 +32,7 @@ export function writeCounters(counters, assumed, drawn) {
   put("data", number(counters.bytes_per_s, (bytes) => (bytes / 1e6).toFixed(2)));
   put("frames", number(counters.frames_per_s, whole) + (assumed ? "?" : ""));
   part("frames", HTMLElement).title = assumed ? "assumed: the board's registers have not been read yet" : "";
-  // What only the panel lacks is in every recording, and no detection needs it.
+  // Events that only the panel lacks are in every recording and in the readout.
   const all = Object.entries(lost).reduce((sum, [place, count]) => sum + (place === "panel" ? 0 : count), 0);
   put("lost", whole(all));
   part("lost-block", HTMLElement).classList.toggle("bad", all > 0);

@@ -6,12 +6,12 @@ import { seconds, short, whole } from "./words.js";
 /** @typedef {{ label: string, t_us: number, latency_us: number | null }} Detection */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
-/** Detections of the live source that are kept, and how many of them are listed and marked. */
+/** Detections of the live source that are stored, and the number of those that are listed and marked. */
 const KEPT = 300;
 const LISTED = 100;
 const MARKED = 200;
 
-/** Shapes that tell labels apart. */
+/** Shapes of the marks, one for each label. */
 const SHAPES = 4;
 
 export class Detections {

@@ -1,7 +1,7 @@
-// The page's own parts: found by their id, made, and written to only where something changed.
+// Helpers for the page's elements: find them by id, create them, write text only where it changed.
 
 /**
- * Finds a part of the page; an error where page and program disagree.
+ * Finds an element of the page; throws where the page has none of that id and kind.
  * @template {Element} T
  * @param {string} id
  * @param {new () => T} kind
@@ -31,7 +31,7 @@ export function make(tag, attributes = {}, ...children) {
 }
 
 /**
- * Writes text where it is another: a text that stays costs no layout.
+ * Writes text where it differs: an unchanged text costs no layout.
  * @param {Node} node
  * @param {string} text
  */
@@ -40,7 +40,7 @@ export function write(node, text) {
 }
 
 /**
- * The drawing ground of a canvas.
+ * The 2D context of a canvas.
  * @param {HTMLCanvasElement} canvas
  * @returns {CanvasRenderingContext2D}
  */

@@ -9,7 +9,7 @@ const BETWEEN = 40;
 const LANE = 30;
 
 /**
- * A lane's canvas. `inset`: what it lacks of the lanes' width on either side, CSS pixels.
+ * A lane's canvas. `inset`: how much narrower it is than the lanes on each side, CSS pixels.
  * @typedef {{ title: string, canvas: HTMLCanvasElement, inset: number }} Lane
  */
 

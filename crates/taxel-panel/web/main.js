@@ -62,7 +62,7 @@ let hello = null;
 let opened = null;
 /** @type {Counters | null} */
 let counters = null;
-/** @type {import("./protocol.js").RegistersTold | null} */
+/** @type {import("./protocol.js").RegistersMessage | null} */
 let registers = null;
 /** Taxels of the board that the user has zeroed. @type {import("./protocol.js").Zeroing[]} */
 let zeroed = [];

@@ -11,7 +11,7 @@ export const UNKNOWN_VALUE = 65535;
  *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, columns_us: [number, number], time_columns: number,
  *   delta_intensity: boolean | null }} Hello
  * @typedef {{ type: "registers", known: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
- *   warnings: string[] }} RegistersTold
+ *   warnings: string[] }} RegistersMessage
  * @typedef {{ type: "presets", built_in: string[], own: Record<string, Record<string, number>>, path: string }} Presets
  * @typedef {{ count: number, p50_us: number | null, p99_us: number | null, max_us: number | null }} Latency
  * @typedef {{ type: "counters", board_us: number | null, events: number, events_per_s: number | null, bytes_per_s: number | null,
@@ -43,7 +43,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "done", id: number }} Done
  * @typedef {{ type: "refused", id?: number, what: string | null, reason: string, field: string | null }} Refused
  * @typedef {{ type: "warning", text: string }} Warning
- * @typedef {Hello | RegistersTold | Presets | Counters | Detection | Spikes | Recorder | Recordings | Opened | Overview | Transport | Labels |
+ * @typedef {Hello | RegistersMessage | Presets | Counters | Detection | Spikes | Recorder | Recordings | Opened | Overview | Transport | Labels |
  *   Health | Zeroed | BoardLine | Cut | Places | Done | Refused | Warning} Message
  */
 

@@ -4,7 +4,7 @@ import { make, part, write } from "./dom.js";
 import { size } from "./words.js";
 import { Tones } from "./tones.js";
 
-/** @typedef {import("./protocol.js").Recorder} Told */
+/** @typedef {import("./protocol.js").Recorder} RecorderMessage */
 /** @typedef {import("./protocol.js").Recordings} Recordings */
 /** @typedef {import("./server.js").Server} Server */
 
@@ -21,7 +21,7 @@ export class Recorder {
     this.shown = shown;
     this.tones = new Tones();
     this.able = false;
-    /** @type {Told | null} */
+    /** @type {RecorderMessage | null} */
     this.status = null;
     /** Seconds of the countdown that were sounded. @type {number | null} */
     this.sounded = null;
@@ -93,7 +93,7 @@ export class Recorder {
     write(place, reason);
   }
 
-  /** @param {Told} status */
+  /** @param {RecorderMessage} status */
   take(status) {
     const before = this.status;
     this.status = status;

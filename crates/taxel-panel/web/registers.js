@@ -15,7 +15,7 @@
  * @property {string} text
  *
  * @typedef {Record<string, number>} Values every field by name, in its unit, with steps, driven_lines and sense_lines
- * @typedef {{ rule: number, text: string }} Said
+ * @typedef {{ rule: number, text: string }} BrokenRule
  */
 
 /** @type {readonly Field[]} */
@@ -59,39 +59,39 @@ export const PRESETS = [
 const us = (units) => (units / 100).toFixed(2);
 
 /**
- * Every rule that refuses these registers, in the order in which the board tries them; it says the first.
+ * All rules that these registers break, in the order in which the board checks them; the board reports the first.
  * @param {Values} v
- * @returns {Said[]}
+ * @returns {BrokenRule[]}
  */
 export function refused(v) {
-  /** @type {Said[]} */
-  const said = [];
+  /** @type {BrokenRule[]} */
+  const broken = [];
   for (const { name, least, greatest, unit } of FIELDS) {
     if (unit !== "flag" && (v[name] < least || v[name] > greatest)) {
-      said.push({ rule: 4, text: `${name} ${v[name]} does not fit: must be ${least} to ${greatest} (rule 4)` });
+      broken.push({ rule: 4, text: `${name} ${v[name]} does not fit: must be ${least} to ${greatest} (rule 4)` });
     }
   }
   const { wire_version, line_period, line_read, step_period, step_read, ramp, lines, channels, steps, driven_lines, sense_lines } = v;
-  if (lines > driven_lines) said.push({ rule: 4, text: `${lines} lines: the array has ${driven_lines} columns to drive (rule 4)` });
-  if (line_read > line_period) said.push({ rule: 1, text: `line_read ${us(line_read)} us is longer than line_period ${us(line_period)} us (rule 1)` });
-  if (step_read > step_period) said.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
-  if (steps * step_period > line_read) said.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });
-  if (ramp >= 3 * step_read) said.push({ rule: 3, text: `ramp ${ramp} ticks is not shorter than step_read ${us(step_read)} us = ${3 * step_read} ticks (rule 3)` });
-  if (channels + 10 > step_period) said.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one a clock and wants ${us(channels + 10)} us (rule 7)` });
-  if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) said.push({ rule: 8, text: `version 1 of the wire names 64 x 64 taxels, the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
-  return said;
+  if (lines > driven_lines) broken.push({ rule: 4, text: `${lines} lines: the array has ${driven_lines} columns to drive (rule 4)` });
+  if (line_read > line_period) broken.push({ rule: 1, text: `line_read ${us(line_read)} us is longer than line_period ${us(line_period)} us (rule 1)` });
+  if (step_read > step_period) broken.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
+  if (steps * step_period > line_read) broken.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });
+  if (ramp >= 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks is not shorter than step_read ${us(step_read)} us = ${3 * step_read} ticks (rule 3)` });
+  if (channels + 10 > step_period) broken.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one a clock and wants ${us(channels + 10)} us (rule 7)` });
+  if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `version 1 of the wire names 64 x 64 taxels, the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
+  return broken;
 }
 
 /**
- * What is allowed but hardly meant.
+ * Rules that only warn: settings that are allowed but hardly intended.
  * @param {Values} v
- * @returns {Said[]}
+ * @returns {BrokenRule[]}
  */
 export function warned(v) {
-  /** @type {Said[]} */
-  const said = [];
+  /** @type {BrokenRule[]} */
+  const broken = [];
   const { step_period, step_read, ramp, noise_floor } = v;
-  if (step_period - step_read < 20) said.push({ rule: 5, text: `step_period ${us(step_period)} us leaves ${us(step_period - step_read)} us before step_read ${us(step_read)} us: taxels settle in ${us(20)} us (rule 5)` });
-  if (noise_floor >= ramp) said.push({ rule: 6, text: `noise_floor ${noise_floor} ticks is not below ramp ${ramp} ticks: no event can ever come (rule 6)` });
-  return said;
+  if (step_period - step_read < 20) broken.push({ rule: 5, text: `step_period ${us(step_period)} us leaves ${us(step_period - step_read)} us before step_read ${us(step_read)} us: taxels settle in ${us(20)} us (rule 5)` });
+  if (noise_floor >= ramp) broken.push({ rule: 6, text: `noise_floor ${noise_floor} ticks is not below ramp ${ramp} ticks: no event can ever come (rule 6)` });
+  return broken;
 }

@@ -30,11 +30,11 @@ export class Timeline {
     this.t_us = null;
     /** Where a person points. @type {number | null} */
     this.cursor_us = null;
-    this.forget();
+    this.clear();
   }
 
   /** Forgets every column. */
-  forget() {
+  clear() {
     this.number.fill(NaN);
     this.end = this.t_us = this.cursor_us = null;
   }
@@ -54,14 +54,14 @@ export class Timeline {
    * Stores the columns of a picture. A time within the window leaves the window where it is, so that the view can move back and
    * forth in it; any other moves it.
    * @param {Picture} picture
-   * @param {boolean} anew forget what came before
+   * @param {boolean} anew discard earlier columns
    * @param {boolean} ends the window ends at it, wherever that lay
    */
   put(picture, anew, ends) {
     if (anew || picture.column_us !== this.column_us) {
       // Where a person points stays the same time.
       const cursor_us = this.cursor_us;
-      this.forget();
+      this.clear();
       if (!anew) this.cursor_us = cursor_us;
     }
     this.column_us = picture.column_us;

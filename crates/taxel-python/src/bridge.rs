@@ -9,7 +9,7 @@ use serde_json::json;
 use taxel_core::problem;
 use taxel_live::capture::{self, Receiver, ReceiverOptions};
 use taxel_live::host_clock::RoundTrip;
-use taxel_live::pipeline::{Copied, Copies as Outlet};
+use taxel_live::pipeline::{Copied, Copies as PipelineCopies};
 
 use crate::enter::{Shared, enter};
 use crate::errors::ProblemError;
@@ -41,14 +41,14 @@ impl Feed {
         Self { feed, receiver: Mutex::new(Some(receiver)) }
     }
 
-    /// Takes a parcel; False where it begins a session and `meet` has to come first.
+    /// Takes a parcel; False where it begins a session and `begin_session` has to come first.
     fn take(&self, py: Python<'_>, parcel: Vec<u8>) -> bool {
         py.detach(|| self.feed.take(&parcel))
     }
 
     /// A session begins.
-    fn meet(&self) {
-        self.feed.meet();
+    fn begin_session(&self) {
+        self.feed.begin_session();
     }
 
     /// Adds a round trip to the other computer's clock: four times, ns since 1970.
@@ -74,10 +74,10 @@ impl Feed {
 
 /// The receiving end of a pipeline's copies.
 #[pyclass(frozen)]
-pub(crate) struct Copies(Shared<Outlet>);
+pub(crate) struct Copies(Shared<PipelineCopies>);
 
 impl Copies {
-    pub(crate) fn new(copies: Outlet) -> Self {
+    pub(crate) fn new(copies: PipelineCopies) -> Self {
         Self(Shared::new(copies))
     }
 }
@@ -92,13 +92,13 @@ impl Copies {
         Ok(copied.map(|copied| match copied {
             Copied::Parcel(bytes) => ("parcel", PyBytes::new(py, &bytes)),
             Copied::Picture(bytes) => ("picture", PyBytes::new(py, &bytes)),
-            Copied::Said(bytes) => ("detection", PyBytes::new(py, &bytes)),
+            Copied::Detection(bytes) => ("detection", PyBytes::new(py, &bytes)),
         }))
     }
 
     /// Whether the pipeline has ended and every copy was taken.
     fn is_over(&self, py: Python<'_>) -> bool {
-        self.0.look(py, |copies| copies.is_over())
+        self.0.with(py, |copies| copies.is_over())
     }
 }
 

@@ -130,10 +130,10 @@ impl ConeXProblem {
         let multipliers = slice("multipliers", &multipliers)?;
         let rows = start.iter().map(to_row).collect::<PyResult<Vec<_>>>()?;
         let start: Vec<(Row, f64)> = rows.into_iter().zip(multipliers.iter().copied()).collect();
-        let (found, signal) = enter_keeping(py, self.max_seconds, |stop, teller| {
+        let (found, signal) = enter_keeping(py, self.max_seconds, |stop, caller| {
             let mut report = |round: Round| {
                 let Round { round, rows, objective, left: Left::Broken(broken) } = round else { return };
-                teller.tell(progress.as_ref(), |py, told| told.call1(py, (round, rows, broken, objective)));
+                caller.call(progress.as_ref(), |py, function| function.call1(py, (round, rows, broken, objective)));
             };
             self.problem.fit(&start, &mut report, stop)
         })?;

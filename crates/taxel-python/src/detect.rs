@@ -209,19 +209,19 @@ impl ReadoutStream {
     /// The time up to which all detections have been returned, us.
     #[getter]
     fn now(&self, py: Python<'_>) -> Option<i64> {
-        self.0.look(py, |readout| readout.now())
+        self.0.with(py, |readout| readout.now())
     }
 
     /// How many events came late.
     #[getter]
     fn late(&self, py: Python<'_>) -> u64 {
-        self.0.look(py, |readout| readout.late())
+        self.0.with(py, |readout| readout.late())
     }
 
     /// Each neuron's potential now, mV.
     #[getter]
     fn potentials(&self, py: Python<'_>) -> Vec<(String, f64)> {
-        self.0.look(py, |readout| readout.potentials().map(|(label, mv)| (label.to_owned(), mv)).collect())
+        self.0.with(py, |readout| readout.potentials().map(|(label, mv)| (label.to_owned(), mv)).collect())
     }
 }
 

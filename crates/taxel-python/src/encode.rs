@@ -91,7 +91,7 @@ impl EncoderStream {
     /// How many events came too far behind the time come to.
     #[getter]
     fn late(&self, py: Python<'_>) -> u64 {
-        self.0.look(py, |pieces| pieces.late())
+        self.0.with(py, |pieces| pieces.late())
     }
 
     fn advance<'py>(&self, py: Python<'py>, t: i64) -> PyResult<SpikesOut<'py>> {

@@ -20,13 +20,13 @@ where
     T: Send,
     E: IntoPyErr + Send,
 {
-    enter_telling(py, |stop, _| work(stop))
+    enter_with_progress(py, |stop, _| work(stop))
 }
 
 /// As [`enter`], for work that calls Python functions with its progress.
-pub(crate) fn enter_telling<T, E>(
+pub(crate) fn enter_with_progress<T, E>(
     py: Python<'_>,
-    work: impl FnOnce(Stop<'_>, Teller<'_>) -> Result<T, E> + Send,
+    work: impl FnOnce(Stop<'_>, ProgressCaller<'_>) -> Result<T, E> + Send,
 ) -> PyResult<T>
 where
     T: Send,
@@ -38,14 +38,14 @@ where
     }
 }
 
-/// As [`enter_telling`], for work that returns its best result so far when it is stopped: by Ctrl-C, by an exception of a progress
+/// As [`enter_with_progress`], for work that returns its best result so far when it is stopped: by Ctrl-C, by an exception of a progress
 /// function, or after `max_seconds`.
 ///
 /// Returns the result together with the exception that stopped the work, which the caller raises once the result is stored.
 pub(crate) fn enter_keeping<T, E>(
     py: Python<'_>,
     max_seconds: Option<f64>,
-    work: impl FnOnce(Stop<'_>, Teller<'_>) -> Result<T, E> + Send,
+    work: impl FnOnce(Stop<'_>, ProgressCaller<'_>) -> Result<T, E> + Send,
 ) -> PyResult<(T, Option<Py<PyAny>>)>
 where
     T: Send,
@@ -65,18 +65,18 @@ where
 /// Calls Python functions with the progress of work. An exception of one ends the work, as Ctrl-C does, and is raised again; no
 /// function is called after it.
 #[derive(Clone, Copy)]
-pub(crate) struct Teller<'a>(&'a Mutex<Option<PyErr>>);
+pub(crate) struct ProgressCaller<'a>(&'a Mutex<Option<PyErr>>);
 
-impl Teller<'_> {
+impl ProgressCaller<'_> {
     /// Calls a function, where there is one.
-    pub(crate) fn tell(
+    pub(crate) fn call(
         self,
-        told: Option<&Py<PyAny>>,
+        function: Option<&Py<PyAny>>,
         call: impl FnOnce(Python<'_>, &Py<PyAny>) -> PyResult<Py<PyAny>>,
     ) {
-        let Some(told) = told else { return };
+        let Some(function) = function else { return };
         if !self.raised()
-            && let Err(error) = Python::attach(|py| call(py, told).map(drop))
+            && let Err(error) = Python::attach(|py| call(py, function).map(drop))
         {
             self.keep(error);
         }
@@ -113,8 +113,8 @@ impl<T: Send> Shared<T> {
     }
 
     /// A short read or change: also without the GIL, since the thread that holds the lock may be waiting for the GIL.
-    pub(crate) fn look<R: Send>(&self, py: Python<'_>, look: impl FnOnce(&mut T) -> R + Send) -> R {
-        py.detach(|| look(&mut self.lock()))
+    pub(crate) fn with<R: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut T) -> R + Send) -> R {
+        py.detach(|| work(&mut self.lock()))
     }
 
     /// The value itself, to be called without the GIL.
@@ -132,14 +132,14 @@ fn unpoisoned<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 fn guarded<T, E>(
     py: Python<'_>,
     max_seconds: Option<f64>,
-    work: impl FnOnce(Stop<'_>, Teller<'_>) -> Result<T, E> + Send,
+    work: impl FnOnce(Stop<'_>, ProgressCaller<'_>) -> Result<T, E> + Send,
 ) -> (PyResult<T>, Option<PyErr>)
 where
     T: Send,
     E: IntoPyErr + Send,
 {
     let raised: Mutex<Option<PyErr>> = Mutex::new(None);
-    let teller = Teller(&raised);
+    let caller = ProgressCaller(&raised);
     let begun = Instant::now();
     let asked = Mutex::new(begun);
     let outcome = py.detach(|| {
@@ -152,12 +152,12 @@ where
             {
                 *last = Instant::now();
                 if let Err(error) = Python::attach(|py| py.check_signals()) {
-                    teller.keep(error);
+                    caller.keep(error);
                 }
             }
-            teller.raised()
+            caller.raised()
         };
-        catch_unwind(AssertUnwindSafe(|| work(Stop::when(&stop), teller)))
+        catch_unwind(AssertUnwindSafe(|| work(Stop::when(&stop), caller)))
     });
     let outcome = match outcome {
         Ok(Ok(value)) => Ok(value),

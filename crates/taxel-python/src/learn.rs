@@ -87,10 +87,10 @@ impl ConeRProblem {
         let silent = slice("silent", &silent)?;
         let start = start.as_ref().map(to_start).transpose()?;
         let start = start.as_ref().map(|(weights, multipliers)| (*weights, multipliers.as_ref()));
-        let (fit, raised) = enter_keeping(py, parameters.max_seconds, |stop, teller| {
+        let (fit, raised) = enter_keeping(py, parameters.max_seconds, |stop, caller| {
             let mut report = |round: Round| {
                 let Round { round, rows, objective, left: Left::Gap(gap) } = round else { return };
-                teller.tell(progress.as_ref(), |py, told| told.call1(py, (round, rows, objective, gap)));
+                caller.call(progress.as_ref(), |py, function| function.call1(py, (round, rows, objective, gap)));
             };
             self.0.fit(&parameters, silent, start, &mut report, stop)
         })?;
@@ -116,12 +116,12 @@ impl OnlineConeR {
 
     #[getter]
     fn patterns(&self, py: Python<'_>) -> usize {
-        self.window.look(py, |window| window.patterns())
+        self.window.with(py, |window| window.patterns())
     }
 
     #[getter]
     fn silent_rows(&self, py: Python<'_>) -> usize {
-        self.window.look(py, |window| window.silent_rows())
+        self.window.with(py, |window| window.silent_rows())
     }
 
     fn add(&self, py: Python<'_>, pattern: SpikesIn<'_>, targets: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
@@ -150,7 +150,7 @@ impl Plastic {
 
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        array(py, self.0.look(py, |neuron| neuron.weights().to_vec()))
+        array(py, self.0.with(py, |neuron| neuron.weights().to_vec()))
     }
 
     fn set_weights(&self, py: Python<'_>, weights: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
@@ -159,7 +159,7 @@ impl Plastic {
     }
 
     fn rest(&self, py: Python<'_>) {
-        self.0.look(py, StdpNeuron::rest);
+        self.0.with(py, StdpNeuron::rest);
     }
 
     fn push<'py>(&self, py: Python<'py>, piece: SpikesIn<'_>, learn: bool) -> PyResult<Bound<'py, PyArray1<f64>>> {

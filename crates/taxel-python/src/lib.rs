@@ -3,6 +3,7 @@
 mod convert;
 mod enter;
 mod errors;
+mod held;
 mod instructions;
 #[cfg(feature = "test-hooks")]
 mod test_hooks;
@@ -49,6 +50,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     encode::register(module)?;
     live::register(module)?;
     metrics::register(module)?;
+    held::register(module)?;
     learn::register(module)?;
     neuron::register(module)?;
     described::register(module)?;

@@ -15,7 +15,9 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
-use taxel_live::pipeline::{Handle, Lines, Listener, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
+use taxel_live::pipeline::{
+    Handle, Lines, Listener, Live as Pipeline, LiveOptions, OutputDetection, Record, Sink, Source,
+};
 
 use crate::bridge::{Copies, Feed};
 use crate::convert::{ArrayParts, array, to_array};
@@ -24,6 +26,18 @@ use crate::errors::{ProblemError, core, live};
 use crate::parameters::parsed;
 use crate::thread_state;
 use crate::threaded::Threaded;
+
+/// The defaults of the options that Python's `LiveOptions` has too, as JSON.
+#[pyfunction]
+fn live_defaults() -> String {
+    let LiveOptions { differences, guard_frames, gap_frames, record_later, name, .. } =
+        LiveOptions::new(Array::thesis());
+    json!({
+        "differences": differences, "guard_frames": guard_frames, "gap_frames": gap_frames,
+        "record_later": record_later, "name": name,
+    })
+    .to_string()
+}
 
 /// The options that Python sets; all others have Rust's defaults.
 #[derive(Deserialize)]
@@ -57,8 +71,8 @@ impl Chosen {
     }
 }
 
-/// Label, t, known, slope, said (us of the board's clock), said (ns of the host's clock), repaired.
-type SaidParts = (String, i64, i64, f64, i64, i64, bool);
+/// Label, t, known, slope, output \(us of the board's clock, ns of the host's clock\), repaired.
+type OutputParts = (String, i64, i64, f64, i64, i64, bool);
 
 /// t (us), column, row, rest after, rest before.
 type ZeroingOut = (i64, u16, u16, f64, Option<f64>);
@@ -71,9 +85,9 @@ fn to_record(path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Reco
     Ok(Record { path, compression: compression.parse().map_err(core)?, overwrite })
 }
 
-fn said_parts(said: Said) -> SaidParts {
-    let d = said.detection;
-    (d.label, d.t, d.known, d.slope, said.said, said.said_ns, d.repaired)
+fn output_parts(output: OutputDetection) -> OutputParts {
+    let d = output.detection;
+    (d.label, d.t, d.known, d.slope, output.output_us, output.output_ns, d.repaired)
 }
 
 thread_local! {
@@ -161,10 +175,10 @@ impl Live {
             sinks.push(Box::new(Lines(std::io::stdout())));
         }
         if let Some(say) = say {
-            sinks.push(Box::new(move |said: &Said| {
+            sinks.push(Box::new(move |output: &OutputDetection| {
                 thread_state::attach(|py| {
                     IN_CALLBACK.set(true);
-                    let outcome = say.call1(py, said_parts(said.clone()));
+                    let outcome = say.call1(py, output_parts(output.clone()));
                     IN_CALLBACK.set(false);
                     outcome.map(drop)
                 })
@@ -207,15 +221,15 @@ impl Live {
     }
 
     /// The next detection; None after `timeout` seconds without one, or when all is over.
-    fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<SaidParts>> {
+    fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<OutputParts>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
         self.pipeline.check()?;
-        let said = enter(py, |stop| match self.pipeline.read().as_ref() {
+        let output = enter(py, |stop| match self.pipeline.read().as_ref() {
             Some(pipeline) => pipeline.wait(timeout, stop),
             None => Ok(None),
         })?;
-        Ok(said.map(said_parts))
+        Ok(output.map(output_parts))
     }
 
     /// Whether the pipeline has ended.
@@ -348,6 +362,7 @@ fn send(
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Live>()?;
+    module.add_function(wrap_pyfunction!(live_defaults, module)?)?;
     module.add_function(wrap_pyfunction!(serial_ports, module)?)?;
     module.add_function(wrap_pyfunction!(send, module)?)
 }

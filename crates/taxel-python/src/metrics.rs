@@ -10,7 +10,7 @@ use taxel_core::problem;
 use taxel_core::vectors::Instructions;
 
 use crate::convert::{array, slice};
-use crate::enter::{enter, enter_telling};
+use crate::enter::{enter, enter_with_progress};
 use crate::errors::core;
 
 /// Patterns as Python hands them over: name, count, trains, times, offsets, window, listed.
@@ -102,9 +102,9 @@ fn pairwise<'py>(
     let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, b.map(Held::new).transpose()?);
     let (a, b) = (a.patterns()?, b.as_ref().map(Held::patterns).transpose()?);
     let instructions = to_instructions(vectors)?;
-    let distances = enter_telling(py, |stop, teller| {
+    let distances = enter_with_progress(py, |stop, caller| {
         let mut report = |done: usize, all: usize| {
-            teller.tell(progress.as_ref(), |py, told| told.call1(py, (done, all)));
+            caller.call(progress.as_ref(), |py, function| function.call1(py, (done, all)));
         };
         let mut work = Work::new(threads, stop, &mut report);
         work.instructions = instructions;

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{PoisonError, RwLock};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use taxel_core::Array;
+use taxel_core::held::UNKNOWN;
 use taxel_core::wire::Command;
-use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
-use taxel_live::pipeline::UNKNOWN;
 use taxel_panel::assets::asset;
 use taxel_panel::{
     Activity, BoardLines, Cut, LabelRow, Panel as Server, PanelOptions, PresetValue, Reply, RequestHandler,
@@ -20,6 +19,7 @@ use crate::convert::{array, from_array};
 use crate::enter::enter;
 use crate::errors::core;
 use crate::live::Live;
+use crate::threaded::Threaded;
 
 /// Gives a file of the panel's page by its name below `web/`, as bytes.
 #[pyfunction]
@@ -145,18 +145,7 @@ fn preset_value(value: &Bound<'_, PyAny>) -> PyResult<PresetValue> {
 
 /// The panel's server.
 #[pyclass(frozen)]
-struct Panel {
-    server: RwLock<Option<Server>>,
-}
-
-impl Panel {
-    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Server) -> taxel_live::Result<T> + Send) -> PyResult<T> {
-        enter(py, |_| match self.server.read().unwrap_or_else(PoisonError::into_inner).as_ref() {
-            Some(server) => work(server),
-            None => Err(problem!("panel: has been stopped; begin a new one").into()),
-        })
-    }
-}
+struct Panel(Threaded<Server>);
 
 #[pymethods]
 impl Panel {
@@ -179,47 +168,42 @@ impl Panel {
             let options = PanelOptions { address: of_host(host, port)?, folder, open: opened, control, readout };
             Server::start(options, handle, Box::new(PythonHandler(requests)))
         })?;
-        Ok(Self { server: RwLock::new(Some(server)) })
+        Ok(Self(Threaded::new("panel", "panel: has been stopped; begin a new one", server)))
     }
 
     /// Host and port on which it listens.
     fn address(&self, py: Python<'_>) -> PyResult<(String, u16)> {
-        let address = self.with(py, |server| Ok(server.address()))?;
+        let address = self.0.with(py, |server| Ok(server.address()))?;
         Ok((address.ip().to_string(), address.port()))
     }
 
     /// The address for a browser, with the token.
     fn url(&self, py: Python<'_>) -> PyResult<String> {
-        self.with(py, |server| Ok(server.url()))
+        self.0.with(py, |server| Ok(server.url()))
     }
 
     /// The token.
     fn token(&self, py: Python<'_>) -> PyResult<String> {
-        self.with(py, |server| Ok(server.token().to_owned()))
+        self.0.with(py, |server| Ok(server.token().to_owned()))
     }
 
     /// Number of connected clients.
     fn viewers(&self, py: Python<'_>) -> PyResult<usize> {
-        self.with(py, |server| Ok(server.viewers()))
+        self.0.with(py, |server| Ok(server.viewers()))
     }
 
     /// Shows another live source from now on.
     fn attach(&self, py: Python<'_>, live: &Live) -> PyResult<()> {
         let handle = live.handle(py)?;
-        self.with(py, |server| server.attach(handle))
+        self.0.with(py, |server| server.attach(handle))
     }
 
     /// Ends the server; does nothing once it has ended.
-    fn stop(&self, py: Python<'_>) {
+    fn stop(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.check()?;
         // A request may be about to call Python: without the GIL released here the server would never end.
-        py.detach(|| drop(self.server.write().unwrap_or_else(PoisonError::into_inner).take()));
-    }
-}
-
-impl Drop for Panel {
-    fn drop(&mut self) {
-        let server = self.server.get_mut().unwrap_or_else(PoisonError::into_inner).take();
-        Python::attach(|py| py.detach(|| drop(server)));
+        py.detach(|| drop(self.0.take()));
+        Ok(())
     }
 }
 

@@ -21,9 +21,9 @@ fn train<'py>(
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&mut dyn FnMut(usize, f64), Stop<'_>) -> CoreResult<Trained> + Send,
 ) -> PyResult<TrainedOut<'py>> {
-    let (trained, interrupt) = enter_keeping(py, max_seconds, |stop, teller| {
+    let (trained, interrupt) = enter_keeping(py, max_seconds, |stop, caller| {
         let mut report = |epoch: usize, right: f64| {
-            teller.tell(progress.as_ref(), |py, told| told.call1(py, (epoch, right)));
+            caller.call(progress.as_ref(), |py, function| function.call1(py, (epoch, right)));
         };
         work(&mut report, stop)
     })?;

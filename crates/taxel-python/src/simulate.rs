@@ -17,7 +17,7 @@ use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Feed, Replay, Report, Scenes, Touch};
 
 use crate::convert::{ArrayParts, EventsIn, EventsOut, array, from_events, slice, to_array, to_events};
-use crate::enter::{Shared, enter, enter_telling};
+use crate::enter::{Shared, enter, enter_with_progress};
 use crate::errors::core;
 use crate::parameters::parsed;
 
@@ -143,8 +143,8 @@ fn play<'py>(
     let (array, registers, sensor) = (to_array(parts)?, parsed("registers", registers)?, to_sensor(sensor)?);
     let PlayedBy { circuit, asynchronous } = parsed("options", options)?;
     let play = Play { array, registers, sensor, seed, acts: to_acts(acts)?, tare_ms, circuit, asynchronous };
-    let Played { events, datagrams, words, bytes, narrow } = enter_telling(py, |stop, teller| {
-        play.hear(|share| teller.tell(Some(&watch), |py, told| told.call1(py, (share,))), stop)
+    let Played { events, datagrams, words, bytes, narrow } = enter_with_progress(py, |stop, caller| {
+        play.run(|share| caller.call(Some(&watch), |py, function| function.call1(py, (share,))), stop)
     })?;
     Ok((from_events(py, events), datagrams, words, bytes, from_narrow(&narrow)))
 }
@@ -281,7 +281,7 @@ fn emulate(
             Felt::Other(Box::new(Feed::new(array.len(), from.into(), ahead, shift, most)))
         }
     };
-    enter_telling(py, |stop, teller| {
+    enter_with_progress(py, |stop, caller| {
         let mut board = Board::new(registers, &array)?.previous(previous).intensity(intensity).version_2(version_2)?;
         if chosen.asynchronous {
             board = board.asynchronous()?;
@@ -304,7 +304,7 @@ fn emulate(
         };
         let mut emulator = Emulator::open(board, &array, options)?;
         let control = emulator.control_address().map(|a| a.to_string());
-        teller.tell(Some(&begun), |py, told| told.call1(py, (control,)));
+        caller.call(Some(&begun), |py, function| function.call1(py, (control,)));
         let report = emulator.run(
             &mut touch,
             |report, touch| {
@@ -312,7 +312,7 @@ fn emulate(
                     Felt::Scenes(scenes) => from_contacts(&scenes.take_contacts()),
                     Felt::Other(_) => vec![],
                 };
-                teller.tell(Some(&watch), |py, told| told.call1(py, (json(report), contacts)));
+                caller.call(Some(&watch), |py, function| function.call1(py, (json(report), contacts)));
             },
             stop,
         )?;
@@ -342,7 +342,7 @@ impl Layer {
     /// mm/MPa and the share that arrives at the base, by wave number in 1/mm.
     fn waves<'py>(&self, py: Python<'py>, waves: PyReadonlyArray1<'py, f64>) -> PyResult<TwoOut<'py, f64, f64>> {
         let waves = slice("waves", &waves)?;
-        let (compliance, share) = self.0.look(py, |layer| {
+        let (compliance, share) = self.0.with(py, |layer| {
             waves.iter().map(|q| (layer.compliance(*q), layer.base_share(*q))).unzip::<_, _, Vec<_>, Vec<_>>()
         });
         Ok((array(py, compliance), array(py, share)))
@@ -350,7 +350,7 @@ impl Layer {
 
     /// Rows and columns of cells over the array: where they lie, mm below and right of the first taxel.
     fn cells_mm<'py>(&self, py: Python<'py>) -> TwoOut<'py, f64, f64> {
-        let places = self.0.look(py, |layer| layer.cells_mm());
+        let places = self.0.with(py, |layer| layer.cells_mm());
         (array(py, places.0), array(py, places.1))
     }
 
@@ -410,7 +410,7 @@ impl Source {
 
     /// The counts as JSON.
     fn counts(&self, py: Python<'_>) -> PyResult<String> {
-        let counts = self.0.look(py, |(board, _)| *board.counts());
+        let counts = self.0.with(py, |(board, _)| *board.counts());
         serde_json::to_string(&counts).map_err(|error| core(Error::Scene(error.to_string())))
     }
 }

@@ -8,7 +8,7 @@ use pyo3::types::PyBytes;
 use serde::Deserialize;
 use taxel_core::board::{Board, Crossed, IntensityWord, Previous, Version2};
 use taxel_core::circuit::Chain;
-use taxel_core::wire::v2::{self, Heard};
+use taxel_core::wire::v2::{self, Outcome};
 use taxel_core::wire::{self, Command, Cut, Decoder, Pairing, Registers};
 use taxel_core::{Error, Events, problem};
 
@@ -23,7 +23,7 @@ use crate::parameters::{parsed, to_json};
 /// A decoder of either version, and what the last datagram of version 2 was.
 enum Either {
     One(Decoder),
-    Two(v2::Decoder, Option<Heard>),
+    Two(v2::Decoder, Option<Outcome>),
 }
 
 /// Turns bytes of version 1, or datagrams of version 2, into events as they come.
@@ -84,7 +84,7 @@ impl WireDecoder {
 
     /// Releases the change that waits for its intensity.
     fn end_of_datagram<'py>(&self, py: Python<'py>) -> EventsOut<'py> {
-        let events = self.0.look(py, |decoder| match decoder {
+        let events = self.0.with(py, |decoder| match decoder {
             Either::One(decoder) => decoder.end_of_datagram(),
             Either::Two(decoder, _) => Events::empty(decoder.array().clone()),
         });
@@ -104,7 +104,7 @@ impl WireDecoder {
 
     /// The version's counts as JSON.
     fn counts(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.look(py, |decoder| match decoder {
+        self.0.with(py, |decoder| match decoder {
             Either::One(decoder) => to_json(decoder.counts()),
             Either::Two(decoder, _) => to_json(&decoder.counts()),
         })
@@ -112,18 +112,18 @@ impl WireDecoder {
 
     /// Of the last datagram of version 2: until when nothing comes any more, us, and whether it was decoded.
     fn last(&self, py: Python<'_>) -> Option<(Option<i64>, bool)> {
-        self.0.look(py, |decoder| match decoder {
+        self.0.with(py, |decoder| match decoder {
             Either::One(_) => None,
             Either::Two(_, heard) => heard.map(|heard| match heard {
-                Heard::Intact { until, .. } => (until, true),
-                Heard::Repeated | Heard::Refused(_) => (None, false),
+                Outcome::Intact { until, .. } => (until, true),
+                Outcome::Repeated | Outcome::Refused(_) => (None, false),
             }),
         })
     }
 
     /// The totals that the board last sent, as JSON.
     fn status(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        let status = self.0.look(py, |decoder| match decoder {
+        let status = self.0.with(py, |decoder| match decoder {
             Either::One(_) => None,
             Either::Two(decoder, _) => decoder.status().copied(),
         });
@@ -132,7 +132,7 @@ impl WireDecoder {
 
     /// What each taxel holds by index, -1 where that is not known.
     fn held<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
-        let held = self.0.look(py, |decoder| match decoder {
+        let held = self.0.with(py, |decoder| match decoder {
             Either::One(decoder) => decoder.held(),
             Either::Two(decoder, _) => decoder.held(),
         });
@@ -309,15 +309,15 @@ impl WireBoard {
     }
 
     fn greeting(&self, py: Python<'_>) -> String {
-        self.0.look(py, |(board, _)| board.greeting())
+        self.0.with(py, |(board, _)| board.greeting())
     }
 
     fn registers(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.look(py, |(board, _)| to_json(board.registers()))
+        self.0.with(py, |(board, _)| to_json(board.registers()))
     }
 
     fn time_us(&self, py: Python<'_>) -> f64 {
-        self.0.look(py, |(board, _)| board.time_us())
+        self.0.with(py, |(board, _)| board.time_us())
     }
 
     /// Takes command bytes; returns status lines.
@@ -327,11 +327,11 @@ impl WireBoard {
     }
 
     fn record(&self, py: Python<'_>, start: bool) {
-        self.0.look(py, |(board, _)| board.record(start));
+        self.0.with(py, |(board, _)| board.record(start));
     }
 
     fn faults(&self, py: Python<'_>) -> String {
-        self.0.look(py, |(board, _)| board.faults())
+        self.0.with(py, |(board, _)| board.faults())
     }
 
     /// Scans one frame; returns the datagrams, of which the sink takes at most so many.
@@ -364,7 +364,7 @@ impl WireBoard {
 
     /// The counts as JSON.
     fn counts(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.look(py, |(board, _)| to_json(board.counts()))
+        self.0.with(py, |(board, _)| to_json(board.counts()))
     }
 }
 

@@ -83,7 +83,7 @@ impl DatagramStream {
 
     /// Bytes that belonged to no datagram.
     fn skipped(&self, py: Python<'_>) -> u64 {
-        self.0.look(py, |reader| reader.skipped())
+        self.0.with(py, |reader| reader.skipped())
     }
 }
 

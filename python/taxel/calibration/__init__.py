@@ -570,7 +570,10 @@ class _Laid(NamedTuple):
         readings = frames.values.mean(axis=0, dtype=np.float64)
         chosen = _there(calibration.array) & ~np.isnan(rest)
         if load.taxel is not None:
-            x, y = (whole(f"{place}, taxel", n, 0) for n in load.taxel)
+            only = several(f"{place}, taxel", load.taxel)
+            if len(only) != 2:
+                raise ProblemError(f"{place}, taxel is {shown(load.taxel)}: must be a column and a row")
+            x, y = (whole(f"{place}, taxel", n, 0) for n in only)
             index = int(calibration.array.index(x, y))
             chosen &= np.arange(chosen.size).reshape(chosen.shape) == index
         rest = np.nan_to_num(rest)

@@ -12,11 +12,12 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import OUTSIDE, WRONG_INPUT
 from taxel.live import Remote, Summary, delays
-from taxel.live.options import about
+from taxel.live.options import LiveOptions
 from taxel.tare import Tare
 
 __all__ = [
@@ -51,7 +52,7 @@ REDRAW_S = 0.1
 
 def live_option(name: str, *flags: str, metavar: str | None = None) -> Any:
     """Return the option of the command line that sets an option of `Live`: its text and range."""
-    return typer.Option(*flags, metavar=metavar, **about(name))
+    return typer.Option(*flags, metavar=metavar, **about(LiveOptions, name))
 
 
 PortOption = Annotated[int, live_option("port")]
@@ -59,7 +60,7 @@ HostOption = Annotated[str, live_option("host")]
 ArrayOption = Annotated[str | None, live_option("array", metavar="ROWSxCOLUMNS[xMM]")]
 PresetOption = Annotated[str | None, live_option("registers")]
 DifferencesOption = Annotated[bool, live_option("differences", "--differences")]
-TareOption = Annotated[str | None, typer.Option(help=about("tare")["help"])]
+TareOption = Annotated[str | None, typer.Option(help=about(LiveOptions, "tare")["help"])]
 RecordOption = Annotated[Path | None, live_option("record")]
 CompressionOption = Annotated[str, live_option("compression")]
 NameOption = Annotated[str, live_option("name")]

@@ -115,13 +115,13 @@ def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -
 
 def _changed(folder: Path) -> list[str]:
     """Return the files of the checkout that differ from its last commit, but for results."""
-    said = subprocess.run(
+    status = subprocess.run(
         ["git", "status", "--porcelain", "--untracked-files=no", "--", ":/", f":!{folder}/results"],
         capture_output=True,
         text=True,
         check=False,
     )
-    return [line[3:] for line in said.stdout.splitlines()]
+    return [line[3:] for line in status.stdout.splitlines()]
 
 
 def _put(text: str, file: BinaryIO) -> None:

@@ -15,8 +15,8 @@ from rich.table import Table
 from taxel._core import ProblemError
 from taxel.cli._app import App, SecondsOption, app
 from taxel.device import Device, ports
-from taxel.live.options import QUOTED_PRESETS
 from taxel.wire import PRESETS, Registers, described
+from taxel.wire.registers import QUOTED_PRESETS
 
 __all__ = ["apply", "listed", "record", "set_registers", "show", "watch"]
 

@@ -17,18 +17,31 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taxel._base.files import try_whole
+from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._recordings import told
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
-from taxel.live.options import QUOTED_PRESETS
 from taxel.recording.opening import open_any
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
 from taxel.simulate.board import fitting
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
+from taxel.simulate.options import EmulateOptions
+from taxel.spikes import to_ms
 
 __all__ = ["emulate"]
+
+
+def _option(name: str, *flags: str, of: type = EmulateOptions, metavar: str | None = None) -> Any:
+    """Return the option of the command line that sets an option of `emulate`: its text and range."""
+    return typer.Option(*flags, metavar=metavar, **about(of, name))
+
+
+def _in_ms(name: str) -> Any:
+    """Return the option of the command line, ms, that sets an option of version 2, us."""
+    found = about(Version2, name)
+    return typer.Option(help=found["help"], min=to_ms(found["min"]), max=to_ms(found["max"]))
 
 
 @app.command()
@@ -39,9 +52,7 @@ def emulate(
     scene: Annotated[
         Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random ones.")
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Seed of scenes, taxels and noise.")
-    ] = None,
+    seed: Annotated[int | None, typer.Option(max=TRAINING_SEED - 1, **about(EmulateOptions, "seed"))] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recording instead of scenes.")] = None,
     speed: Annotated[
         float | None, typer.Option(help="With --replay: playback speed; 2 takes half the time. Default: 1.")
@@ -53,81 +64,25 @@ def emulate(
         int | None,
         typer.Option(min=0, max=255, help="With --pipe: a change above this makes an event. Default: 3."),
     ] = None,
-    tare: Annotated[
-        float | None,
-        typer.Option(
-            min=0,
-            max=60,
-            help="How long the noise floor is 0 before the start marker, s. Default: 0.05, or the scene's.",
-        ),
-    ] = None,
-    preset: Annotated[
-        str | None,
-        typer.Option(
-            help=f"The registers: one of {QUOTED_PRESETS}. Default: the scene's, or those of the array at reset.",
-        ),
-    ] = None,
-    wire: Annotated[
-        int | None,
-        typer.Option(min=1, max=2, help="Version of the wire. Default: by the registers."),
-    ] = None,
-    board: Annotated[int, typer.Option(min=0, max=65_535, help="Wire 2: the board's number.")] = 0,
-    session: Annotated[int, typer.Option(min=0, max=65_535, help="Wire 2: the number of the first session.")] = 1,
-    hold: Annotated[
-        float, typer.Option(min=0, max=30, help="Wire 2: how long events wait to share a datagram, ms.")
-    ] = 0.0,
-    heartbeat: Annotated[
-        float, typer.Option(min=0, help="Wire 2: interval of heartbeats while nothing happens, ms.")
-    ] = 10.0,
-    states: Annotated[
-        float, typer.Option(min=0, help="Wire 2: interval at which each taxel's value is repeated, ms; 0: never.")
-    ] = 1000.0,
-    reset_every: Annotated[
-        float | None, typer.Option(min=0.001, help="Interval between resets of the board, s. Default: none.")
-    ] = None,
-    drift: Annotated[float, typer.Option(help="How much faster the board's clock runs, parts per million.")] = 0.0,
-    circuit: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            help="Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, wire_ohm, offset_mv, "
-            "hysteresis_v, settle_us, amplifier_us; "
-            "one of them puts in the whole circuit, the others as usual. Takes the board to some 2.4 kHz.",
-        ),
-    ] = None,
-    asynchronous: Annotated[
-        bool,
-        typer.Option("--asynchronous", help="Taxels send by themselves, without a scan, with stamps of 1 us (wire 2)."),
-    ] = False,
-    flaw: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=SIZE[:SEED]",
-            help="A flaw of taxels: gain, threshold, hysteresis, drift, dead, stuck, loose, noise. May be repeated.",
-        ),
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=SHARE",
-            help="A fault of the network: a share of the datagrams is lost, repeated, reordered, cut or "
-            "corrupted. May be repeated.",
-        ),
-    ] = None,
-    control: Annotated[
-        int | None, typer.Option(help="Accept commands on this TCP port of loopback; 0 finds a free one.")
-    ] = None,
-    line: Annotated[
-        Path | None, typer.Option(help="Accept commands on a serial line of this name (a link to a pseudo-terminal).")
-    ] = None,
-    baud: Annotated[
-        int | None, typer.Option(min=300, max=4_000_000, help="Baud rate of --line. Default: 115200.")
-    ] = None,
-    sync: Annotated[
-        Path | None,
-        typer.Option(help="Write the sync line as text to a new file or a pipe: board us, 1 or 0, host ns."),
-    ] = None,
-    source_port: Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port to send from; 0: any.")] = 0,
+    tare: Annotated[float | None, typer.Option(min=0, max=60, help=about(EmulateOptions, "tare_ms")["help"])] = None,
+    preset: Annotated[str | None, _option("preset")] = None,
+    wire: Annotated[int | None, _option("wire")] = None,
+    board: Annotated[int, _option("board", of=Version2)] = Version2.board,
+    session: Annotated[int, _option("seed", of=Version2)] = Version2.seed,
+    hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us),
+    heartbeat: Annotated[float, _in_ms("heartbeat_us")] = to_ms(Version2.heartbeat_us),
+    states: Annotated[float, _in_ms("states_us")] = to_ms(Version2.states_us),
+    reset_every: Annotated[float | None, _option("reset_every_s")] = EmulateOptions.reset_every_s,
+    drift: Annotated[float, _option("drift_ppm")] = EmulateOptions.drift_ppm,
+    circuit: Annotated[list[str] | None, _option("circuit", metavar="NAME=VALUE")] = None,
+    asynchronous: Annotated[bool, _option("asynchronous", "--asynchronous")] = EmulateOptions.asynchronous,
+    flaw: Annotated[list[str] | None, _option("flaws", metavar="NAME=SIZE[:SEED]")] = None,
+    fault: Annotated[list[str] | None, _option("faults", metavar="NAME=SHARE")] = None,
+    control: Annotated[int | None, typer.Option(help=about(EmulateOptions, "control")["help"])] = None,
+    line: Annotated[Path | None, _option("line")] = None,
+    baud: Annotated[int | None, _option("baud")] = None,
+    sync: Annotated[Path | None, _option("sync")] = None,
+    source_port: Annotated[int, _option("source_port")] = EmulateOptions.source_port,
     rest: Annotated[
         bool, typer.Option("--rest", help="Let the ball bounce until it rests, instead of catching it.")
     ] = False,
@@ -137,9 +92,7 @@ def emulate(
             "--truth", help="Write the true times of the touches to this CSV, label,t_us,host_ns, as they happen."
         ),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the files that are written where they exist.")
-    ] = False,
+    overwrite: Annotated[bool, _option("overwrite", "--overwrite")] = EmulateOptions.overwrite,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False,
 ) -> None:
     """Emulate a board that sends its events by UDP, in real time, until Ctrl-C.
@@ -218,7 +171,7 @@ def emulate(
                     drift_ppm=drift,
                     control=None if control is None else f"127.0.0.1:{control}",
                     line=line,
-                    baud=115_200 if baud is None else baud,
+                    baud=EmulateOptions.baud if baud is None else baud,
                     sync=sync,
                     overwrite=overwrite,
                     source_port=source_port,
@@ -236,9 +189,9 @@ def emulate(
     if labels is not None:
         console.print(f"truth: {labels}", soft_wrap=True)
     if as_json:
-        about: dict[str, Any] = {"seed": seed, "scenes": scenes, "preset": said_by.preset, "held": report.held}
-        about |= {"verdict": report.verdict, "wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
-        typer.echo(json.dumps({**about, **asdict(report)}))
+        summary: dict[str, Any] = {"seed": seed, "scenes": scenes, "preset": said_by.preset, "held": report.held}
+        summary |= {"verdict": report.verdict, "wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
+        typer.echo(json.dumps({**summary, **asdict(report)}))
     else:
         _say(report, in_time=not pipe)
 

@@ -120,7 +120,7 @@ def play_live(
     if summary.counters["late"]:
         verdicts.append(
             f"{summary.counters['late']} events came after the readout's time had moved on, 5 frames behind the host's "
-            f"clock: this machine was too busy, and detections of them came late, moved or were missed; the recording has "
-            f"every event, and --no-clock simulates without the clock"
+            "clock: this machine was too busy, and detections of them came late, moved or were missed; the recording "
+            "has every event, and --no-clock simulates without the clock"
         )
     return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, finite, flag, instance, shown, whole
+from taxel._base.arguments import callback, finite, flag, instance, several, shown, whole, window
 from taxel._core import ProblemError
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import Readout, run
@@ -358,19 +358,23 @@ def _sound(folds: Sequence[Fold], examples: int) -> None:
         raise ProblemError("folds is empty: must be one Fold or more")
     tested: dict[int, list[Part]] = {}
     for n, fold in enumerate(folds):
-        if not isinstance(fold, Fold) or not fold.train or not fold.test:
-            raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold with parts to train on and parts to test")
-        for part in (*fold.train, *fold.test):
+        if not isinstance(fold, Fold):
+            raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold")
+        train, test, inner = (several(f"fold {n}: {name}", getattr(fold, name)) for name in fold._fields)
+        if not train or not test:
+            raise ProblemError(f"fold {n} is {shown(fold)}: must have parts to train on and parts to test")
+        for part in (*train, *test):
             if not isinstance(part, Part) or not 0 <= whole(f"fold {n}: example", part.example) < examples:
                 raise ProblemError(f"fold {n}: {shown(part)} is no Part of {examples} examples")
-            if not part.start < part.stop:
+            start, stop = window("us", part.start, part.stop)
+            if not start < stop:
                 raise ProblemError(f"fold {n}: {shown(part)} must start before it stops")
-        for part in fold.test:
+        for part in test:
             if any(part.start < other.stop and other.start < part.stop for other in tested.get(part.example, ())):
                 raise ProblemError(f"fold {n}: {shown(part)} is tested twice")
             tested.setdefault(part.example, []).append(part)
-        if fold.inner:
-            _sound(fold.inner, examples)
+        if inner:
+            _sound(inner, examples)
 
 
 def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> list[Fold]:

@@ -398,9 +398,9 @@ def _remarks(
         places = [f"{targets[p][k] - shift_ms:.10g} ms" + f" of example {p}" * (len(targets) > 1) for p, k in missed]
         named = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
         yield (
-            f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too little is felt at them "
-            f"({named}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the recipe's "
-            "points (taxel train --search) may reach them"
+            f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too few input spikes come before "
+            f"them ({named}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
+            "recipe's points (taxel train --search) may reach them"
         )
     # The learner names unreachable targets, if any, first.
     yield from (str(one.message) for one in caught[bool(missed) :])

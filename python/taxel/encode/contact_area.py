@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from taxel import _core
 from taxel._base.parameters import defaults
 from taxel.encode._tared import Tared
 from taxel.tare import Tare
@@ -55,3 +56,14 @@ class ContactArea(Tared):
     noise_floor: float = _DEFAULT.noise_floor
     levels: Sequence[int] = _DEFAULT.levels
     tare: Tare | float | None = _DEFAULT.tare
+
+    @property
+    def above(self) -> float:
+        """What a loaded taxel reads above its rest at least, in the sensor's unit: the noise floor and half a tick.
+
+        Examples
+        --------
+        >>> ContactArea().above
+        3.5
+        """
+        return _core.touched_above(float(self.noise_floor))

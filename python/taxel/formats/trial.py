@@ -73,6 +73,10 @@ class Trial:
     def __post_init__(self) -> None:
         if not isinstance(self.recorded, Frames | Events):
             raise ProblemError(f"recorded is {arguments.shown(self.recorded)}: must be taxel.Frames or taxel.Events")
+        for name in ("name", "person", "source", "foot", "group"):
+            arguments.text(name, getattr(self, name))
+        for name in ("truth", "series", "about"):
+            arguments.mapping(name, getattr(self, name))
         for event, times in self.truth.items():
             arguments.column(event, times, np.int64)
             back = np.flatnonzero(np.diff(times) <= 0)
@@ -80,8 +84,8 @@ class Trial:
                 k = int(back[0])
                 raise ProblemError(f"{self.name}: {event} {k + 1} at {times[k + 1]} us is not after {times[k]} us")
         for name, column in self.series.items():
-            if len(column) != len(self.recorded):
-                raise ProblemError(f"{self.name}: {name} has {len(column)} values for {self.recorded!r}")
+            if np.shape(column)[:1] != (len(self.recorded),):
+                raise ProblemError(f"{self.name}: {name} has shape {np.shape(column)} for {self.recorded!r}")
         if self.scored is None:
             t = self.recorded.t
             object.__setattr__(self, "scored", (int(t.min()), int(t.max())) if len(t) else (0, 0))

@@ -1,7 +1,7 @@
 """How many bits touches hold: estimators, classifiers, and the question of chapter 5 asked of one's own sensor."""
 
+from taxel.information.analysis import answer
 from taxel.information.answers import Answer, Control, Point
-from taxel.information.asking import answer
 from taxel.information.bits import (
     confusion_matrix,
     label_entropy,

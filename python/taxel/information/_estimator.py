@@ -29,7 +29,7 @@ class Classifier(Parameters):
         raise NotImplementedError
 
     def score(self, x: Any, y: ArrayLike) -> float:
-        """Return the share of trials that are named rightly."""
+        """Return the share of trials that are classified correctly."""
         return float(np.mean(self.predict(x) == words("y", y)))
 
     def __sklearn_tags__(self) -> Any:

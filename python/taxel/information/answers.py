@@ -172,8 +172,8 @@ class Answer:
         guessed, least = _guessing(found)
         if found.right < least:
             said.append(
-                f"{100 * found.right:.0f} % are named rightly, guessing gives {100 * guessed:.0f} %: the bits are "
-                "those of wrong answers" + (", as where a group has mostly one label" if self.groups else "")
+                f"{100 * found.right:.0f} % are classified correctly, guessing gives {100 * guessed:.0f} %: the bits "
+                "are those of wrong answers" + (", as where a group has mostly one label" if self.groups else "")
             )
         if not self.empty:
             said += [

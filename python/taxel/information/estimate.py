@@ -120,7 +120,7 @@ class ZeroTest:
 
     def __str__(self) -> str:
         n = len(self.shuffled)
-        return f"95 % below {self.level:.2f} bits; {round(self.p * (n + 1)) - 1} of {n} reach what was found"
+        return f"95 % below {self.level:.2f} bits; {round(self.p * (n + 1)) - 1} of {n} reach the measured bits"
 
 
 def estimate(

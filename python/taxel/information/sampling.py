@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._base.arguments import instance, several
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -20,14 +21,12 @@ from taxel.spikes import to_ms, to_us
 
 __all__ = ["STEP_US", "HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "pictures_of", "spikes_of"]
 
-#: Events between two kept states of the array.
-_STRIDE = 4096
 #: No touch's beginning is looked for more finely on a grid, us.
 STEP_US = 100
 
 
 class HeldValues:
-    """Say what every taxel holds at any time: the last picture, or the last intensity that came.
+    """Return what every taxel holds at any time: the last picture, or the last intensity that came.
 
     Events without intensities count as steps of one, up or down, from their beginning on.
 
@@ -42,22 +41,8 @@ class HeldValues:
         self.taxels = np.flatnonzero(exists)
         if isinstance(source, Frames):
             self._values = source.values.reshape(len(source), -1)
-            return
-        place = np.full(exists.size, -1)
-        place[self.taxels] = np.arange(len(self.taxels))
-        there = np.arange(len(source)) if source.present is None else np.flatnonzero(source.present)
-        order = there[np.argsort(source.t[there], kind="stable")]
-        self._t = source.t[order]
-        self._taxel = place[self.array.index(source.x[order], source.y[order])]
-        if source.intensity is not None:
-            self._level = source.intensity[order].astype(np.float32)
         else:
-            self._level = _steps(self._taxel, source.p[order])
-        state, self._states = np.zeros(len(self.taxels), np.float32), []
-        for first in range(0, len(order), _STRIDE):
-            self._states.append(state.copy())
-            part = slice(first, first + _STRIDE)
-            state[self._taxel[part]] = self._level[part]
+            self._held = _core.HeldValues(source._parts(), self.taxels.astype(np.uint32), None)
 
     @property
     def has_values(self) -> bool:
@@ -74,25 +59,7 @@ class HeldValues:
         if isinstance(self.source, Frames):
             rows = np.searchsorted(self.source.t, times, side="right") - 1
             return np.asarray(self._values[np.maximum(rows, 0)][:, self.taxels])
-        ends = np.searchsorted(self._t, times, side="right")
-        first = int(ends[0]) if len(ends) else 0
-        state = self._state(first)
-        found = np.empty((len(times), len(self.taxels)), np.float32)
-        for k, end in enumerate(ends):
-            part = slice(first, int(end))
-            state[self._taxel[part]] = self._level[part]
-            found[k], first = state, int(end)
-        return found
-
-    def _state(self, events: int) -> NDArray[np.float32]:
-        """Return what is held after so many events."""
-        block = min(events // _STRIDE, len(self._states) - 1)
-        if block < 0:
-            return np.zeros(len(self.taxels), np.float32)
-        state = self._states[block].copy()
-        part = slice(block * _STRIDE, events)
-        state[self._taxel[part]] = self._level[part]
-        return state
+        return self._held.at(np.ascontiguousarray(times, np.int64)).reshape(len(times), len(self.taxels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,19 +292,6 @@ def _pooling(held: HeldValues, pool: int) -> tuple[NDArray[np.int64], int, NDArr
         (row // pool) * held.array.columns + column // pool, return_inverse=True, return_counts=True
     )
     return where, len(cells), 1.0 / size
-
-
-def _steps(taxel: NDArray[np.int64], rises: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Return each taxel's rises less falls up to each event."""
-    order = np.argsort(taxel, kind="stable")
-    step = np.where(rises[order], 1.0, -1.0)
-    total = np.cumsum(step)
-    own = taxel[order]
-    begin = np.flatnonzero(np.diff(own, prepend=-1))
-    before = np.repeat(total[begin] - step[begin], np.diff(np.append(begin, len(own))))
-    found = np.empty(len(taxel), np.float32)
-    found[order] = total - before
-    return found
 
 
 def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:

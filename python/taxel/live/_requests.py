@@ -80,7 +80,7 @@ def _reasons() -> Iterator[None]:
 class RequestHandler:
     """Handle the requests of a panel's server, which calls from several threads at a time.
 
-    What a method raises is the reason that the client is told.
+    The text of an exception is the reason that the client shows.
 
     Parameters
     ----------

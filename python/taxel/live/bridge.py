@@ -17,39 +17,42 @@ from taxel import _core
 from taxel._base.arguments import number, text
 from taxel._core import DeviceError, ProblemError
 from taxel.live.live import Live
-from taxel.live.remote import told, wheel
+from taxel.live.remote import wheel, with_taxel_errors
 
 __all__ = ["PLACE", "Bridge"]
 
-#: Where a bridge listens if nothing else is said: nobody but this computer reaches it.
+#: Default address: only this computer can connect to it.
 PLACE = "127.0.0.1:7447"
 
 #: How long a wait lasts before it is asked whether to stop, s.
 _LOOK_S = 0.05
 
-#: What is said of the sensor is renewed so often, s.
-_TELL_S = 1.0
+#: Interval at which the published description of the sensor is updated, s.
+_UPDATE_S = 1.0
 
 
 class Bridge:
-    """Publish what a board sends to this computer: datagrams as they are, low-rate pictures, detections.
+    """Publish what a board sends to this computer: unchanged datagrams, low-rate pictures, detections.
 
-    A context manager. Recorders on other computers get every datagram: a slow one is waited for, up to 64 MiB, and cut
-    off after 1.5 s in which it took nothing. Viewers miss what they are too slow for. Neither slows what listens here.
-    What is published is neither encrypted nor guarded: whoever reaches `listen` hears it.
+    A context manager. Recorders on other computers receive every datagram: the bridge buffers up to 64 MiB for a slow
+    one, and disconnects it after 1.5 s without progress. Viewers lose datagrams where they are too slow. Neither slows
+    the `Live` of this computer. The data are neither encrypted nor protected: every computer that reaches `listen` can
+    receive them.
 
     Parameters
     ----------
     live : Live
-        What listens here; its readout's detections are published, its picture ten times a second.
+        The receiver of the board; its detections are published, and its picture ten times a second.
     name : str
-        Of the board: 1 to 64 letters, digits, - _ or .
+        The name of the board: 1 to 64 letters, digits, - _ or .
     listen : str or sequence of str
-        HOST:PORT of this computer, at which others connect.
+        HOST:PORT of this computer to listen on.
     connect : str or sequence of str
-        HOST:PORT of a Zenoh router, for those who have one.
-    clock_ahead_s, clock_drift_ppm : float
-        For trials: this computer's clock is set off in all that is published.
+        HOST:PORT of a Zenoh router, where there is one.
+    clock_ahead_s : float, s
+        For tests: offset of the clock of all published times.
+    clock_drift_ppm : float, parts per million (share)
+        For tests: drift of that clock.
 
     Raises
     ------
@@ -74,7 +77,9 @@ class Bridge:
         zenoh = wheel()
         routers = _places("connect", connect)
         try:
-            self._zenoh = told(zenoh.Publisher, self.name, self.listen, routers, _about(live), ahead_ns, drift)
+            self._zenoh = with_taxel_errors(
+                zenoh.Publisher, self.name, self.listen, routers, _about(live), ahead_ns, drift
+            )
         except DeviceError:
             for place in self.listen:
                 _refused(place)
@@ -86,7 +91,7 @@ class Bridge:
         self._thread.start()
 
     def _run(self) -> None:
-        """Hand over what comes, until all of it was."""
+        """Publish the copies of the pipeline until all are published."""
         send = {"parcel": self._zenoh.parcel, "picture": self._zenoh.picture, "detection": self._zenoh.detection}
         renewed = time.monotonic()
         try:
@@ -94,29 +99,34 @@ class Bridge:
                 copied = self._copies.next(_LOOK_S)
                 if copied is not None:
                     send[copied[0]](copied[1])
-                if time.monotonic() - renewed > _TELL_S:
+                if time.monotonic() - renewed > _UPDATE_S:
                     # A panel may have written the registers.
                     renewed = time.monotonic()
                     with contextlib.suppress(ProblemError):
-                        # That it ends is seen above.
+                        # The pipeline has ended: the loop ends too.
                         self._zenoh.tell(_about(self._live))
         except Exception as error:
-            # Raised by `stop`, in the thread that asks.
+            # `stop` raises it, in the thread of its caller.
             self._failed = error
 
     @property
     def counts(self) -> dict[str, dict[str, Any]]:
-        """What was published for "block" (recorders) and "drop" (viewers): parcels sent, dropped; whether heard."""
-        counted = dict(zip(("block", "drop"), told(self._zenoh.counts), strict=True))
+        """Parcels sent and dropped for "block" (recorders) and "drop" (viewers), and whether there is a subscriber."""
+        counted = dict(zip(("block", "drop"), with_taxel_errors(self._zenoh.counts), strict=True))
         return {what: dict(zip(("sent", "dropped", "heard"), row, strict=True)) for what, row in counted.items()}
 
     def stop(self) -> None:
-        """Publish what waits, and end; listening goes on, and ends first where all of it is to be published."""
+        """Publish what waits, and end; stop the `Live` first where everything is to be published.
+
+        Raises
+        ------
+        DeviceError : publishing failed
+        """
         if self._thread.is_alive():
             if not self._live._core.is_over():
                 self._ending.set()
             self._thread.join()
-        told(self._zenoh.close)
+        with_taxel_errors(self._zenoh.close)
         if self._failed is not None:
             failed, self._failed = self._failed, None
             raise DeviceError(f"bridge {self.name}: {failed}")
@@ -130,7 +140,7 @@ class Bridge:
         if error is None:
             self.stop()
         else:
-            # The first error is the one to hear of.
+            # The first error is the one that is raised.
             with contextlib.suppress(_core.Error, OSError):
                 self.stop()
 
@@ -168,6 +178,6 @@ def _refused(place: str) -> None:
 
 
 def _about(live: Live) -> str:
-    """Return what those who ask are told of the sensor."""
+    """Return the description of the sensor that is published."""
     held = json.loads(live._core.registers())
     return json.dumps({"array": live.array._geometry(), "registers": held, "differences": live._options.differences})

@@ -17,11 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import flag, number, numbers, parameters, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.options import with_fields_of
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detections import Detection
 from taxel.live.lsl import LslInlet, LslOutlet
-from taxel.live.options import LiveOptions, takes
+from taxel.live.options import LiveOptions
 from taxel.live.summary import Summary, summary_of
 from taxel.recording.notes import Zeroing
 from taxel.tare import Tare
@@ -39,35 +40,35 @@ _WAIT_S = 0.5
 
 
 class Live:
-    """Receive a board's datagrams, record them, read them out, while they come.
+    """Receive a board's datagrams, record them and read them out, as they arrive.
 
-    A context manager, and an iterator of detections that ends when `stop` was called. The work is done in threads of
-    its own: receive, decode and record; encode and read out; while it records, a third receives. What is too slow loses
-    data where it is counted.
+    A context manager, and an iterator of detections that ends when `stop` was called. It works in threads of its own:
+    one receives, decodes and records, one encodes and reads out, and while it records a third receives. A queue that is
+    full drops data, and counts it.
 
     Parameters
     ----------
-    port : int
-        UDP; 0 finds a free one, see `address`.
+    port : int, 0 to 65535
+        The UDP port to listen on; 0 finds a free one, see `address`.
     host : str
-        The address of this machine on which to listen: every one of its addresses by default.
+        The address of this machine to listen on. Default: all its addresses.
     remote : Remote, optional
-        A board of another computer, in place of `port` and `host`. End this before that.
-    array : Array
-        The sensor; by default the remote board's or the readout's own, or the thesis' 64 x 64.
-    registers : str or taxel.wire.Registers
-        What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz", of
-        which a smaller array drives fewer lines. Left out: those of a board of this array at reset, up to 64 x 64 at
-        5.2 kHz; a remote board reports its own.
+        A board of another computer, in place of `port` and `host`. Stop the `Live` before the `Remote`.
+    array : Array, optional
+        The sensor. Default: the remote board's or the readout's own, or the thesis' 64 x 64.
+    registers : str or taxel.wire.Registers, optional
+        The contents of the board's registers, or the name of a preset, "5.2 kHz", "2 kHz" or "20.8 kHz", of
+        which a smaller array drives fewer lines. Default: those of a board of this array at reset, up to 64 x 64
+        at 5.2 kHz; a remote board reports its own.
     differences : bool
         Whether the board sends differences for intensities (the panel's "delta intensity").
     readout : Readout, optional
-        Reads the events out. Left out, nothing is detected.
+        The readout of the events. Without one nothing is detected.
     tare : Tare or float (s), optional
         For a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event on, which
         ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
     record : path, optional
-        A new file: `.mcap` keeps all that is known, `.lsa` the manual's raw bytes.
+        A new file: `.mcap` for all data, `.lsa` for the raw bytes of the manual.
     record_later : bool
         Whether recordings begin and end while it runs (`record`, `end_recording`); then none begins here, and `sources`
         are recorded while one runs.
@@ -76,34 +77,33 @@ class Live:
     sources : mapping of str to str, optional
         The other sources of the recording (`.mcap`), by name, each with its own clock:
         "udp:HOST:PORT,array=16x16,preset=2 kHz" another board, which sends to that address of this machine;
-        "serial:PATH@BAUD" or "pipe:PATH" lines of numbers, as an IMU's ("-" is the standard input); "given" numbers
-        that a program gives (`sample`). Of numbers ``columns=t_us:ax:ay`` names the columns of a line (else the first
-        line is waited for), and ``time=NAME:UNIT`` the column that is its clock, where that is not one called `t_us`,
-        `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, a line's time is when it
-        came.
+        "serial:PATH@BAUD" or "pipe:PATH" lines of numbers, as of an IMU ("-" is the standard input); "given" numbers
+        that a program passes to `sample`. Of numbers ``columns=t_us:ax:ay`` names the columns of a line (default: those
+        of the first line), and ``time=NAME:UNIT`` the column of its clock, where that is not called `t_us`,
+        `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, the time of a line is its
+        arrival.
     compression : {"none", "lz4", "zstd"}
-        Of `.mcap`.
+        Compression of a `.mcap`.
     overwrite : bool
         Whether an existing file may be replaced.
     guard_frames : float, 0 or more
-        In silence the readout's time moves on by the host's clock, this many frames behind it.
+        While no events arrive the readout's time follows the host's clock, this many frames behind it.
     gap_frames : float, 0 or more
-        At a gap in the sequence of wire version 2 time waits so many frames for what may only be late.
+        At a gap in the sequence of wire version 2 time waits this many frames: the datagrams may only be late.
     say : callable, optional
-        Called with each `Detection` in the thread that made it, one at a time; what it raises ends everything and is
-        raised by `next`. It must not call `stop`. Where it takes longer than 2 ms another thread goes on receiving; up
-        to 16 384 detections wait for it.
+        Called with each `Detection` in the thread that detected it, one at a time; an exception ends the pipeline and
+        is raised by `next`. The function must not call `stop`. Where it takes longer than 2 ms another thread continues
+        to receive; up to 16 384 detections wait for it.
     lines : bool
-        Write each detection to the standard output as one line of JSON, from the thread that made it.
+        Write each detection to the standard output as one line of JSON.
     send : str or sequence of str
-        Send each detection as such a line to "udp:HOST:PORT" (a datagram a line), "pipe:PATH" (a named pipe that
-        exists) or "serial:PATH@BAUD", from the thread that made it; "lsl:NAME" sends its label in a stream of markers
-        of the lab streaming layer. Up to 1024 lines wait for a slow reader; lines that find no room, or no reader, are
-        lost and counted, and nothing waits for them.
-    kernel_buffer_bytes, queue_bytes, readout_events : int, optional
-        How much may wait in the kernel, before the decoder and before the readout.
+        Send each detection as such a line to "udp:HOST:PORT" (a datagram each), "pipe:PATH" (an existing named pipe)
+        or "serial:PATH@BAUD"; "lsl:NAME" sends its label in a stream of markers of the lab streaming layer. Up to 1024
+        lines wait for a slow reader; lines without room, or without a reader, are lost and counted.
+    kernel_buffer_bytes, queue_bytes, readout_events : int, 0 or more (bytes, bytes, events), optional
+        Sizes of the queues in the kernel, before the decoder and before the readout.
     gro : bool, optional
-        Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`). It then counts its drops in trains.
+        Let the kernel merge trains of datagrams (`UDP_GRO`). It then counts its drops in trains.
 
     Raises
     ------
@@ -114,9 +114,9 @@ class Live:
 
     Notes
     -----
-    `t` and `known` of a detection are the same here and from the recording; `said` is when it was output in fact. The
-    clocks' offset and drift are estimated from arrivals: nothing comes early, so the lower envelope of arrival less
-    board time is the offset.
+    `t` and `known` of a detection are the same live and from the recording; `said` is the time of its output. The
+    offset and drift of the clocks are estimated from arrivals: a delay is never negative, so the lower envelope of
+    arrival time minus board time is the offset.
 
     Examples
     --------
@@ -129,7 +129,7 @@ class Live:
     Live(ended; nothing lost after arrival (version 1 of the wire cannot show what was lost before it))
     """
 
-    @takes(LiveOptions)
+    @with_fields_of(LiveOptions)
     def __init__(self, options: LiveOptions) -> None:
         options = options.completed()
         remote, readout, tare, say = options.remote, options.readout, options.tare, options.say
@@ -175,7 +175,7 @@ class Live:
 
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port that it receives on.
+        """Host and port on which it listens.
 
         Raises
         ------
@@ -187,16 +187,26 @@ class Live:
 
     @property
     def place(self) -> str:
-        """Where datagrams come from, in words: "UDP 127.0.0.1:5208", or a remote board's address."""
+        """The origin of the datagrams: "UDP 127.0.0.1:5208", or the address of a remote board."""
         return self._place
 
     def next(self, timeout: float = 1.0) -> Detection | None:
-        """Return the next detection, or None after `timeout` s without one, or at once after the end.
+        """Return the next detection, or None after `timeout` without one, or at once after the end.
+
+        Parameters
+        ----------
+        timeout : float, s, 0 or more
 
         Raises
         ------
         OSError : the disk is full, the socket failed
-        ProblemError : the encoder cannot use what comes
+        ProblemError : the encoder cannot read the events
+
+        Examples
+        --------
+        >>> with Live(0, host="127.0.0.1") as live:
+        ...     live.next(0.0) is None
+        True
         """
         said = self._core.next(number("timeout", timeout))
         return None if said is None else Detection(*said)
@@ -213,7 +223,7 @@ class Live:
 
     @property
     def counters(self) -> dict[str, Any]:
-        """Counts of what came, what became of it and what was lost where, up to now.
+        """Counts of what was received, decoded and lost so far, by place.
 
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
@@ -251,11 +261,15 @@ class Live:
         return None if taken is None else Tare.from_json(taken)
 
     def take_markers(self) -> list[tuple[int, bool]]:
-        """Return the markers that came since the last call: (t us, start)."""
+        """Return the markers that were received since the last call: (t us, start)."""
         return self._core.take_markers()
 
     def expect_version(self, version: int) -> None:
-        """Announce that the board was told to speak this version of the wire: decoded at once, not after a second.
+        """Announce that the board was set to this version of the wire: it is decoded at once, not after a second.
+
+        Parameters
+        ----------
+        version : int, from 1 to 2
 
         Raises
         ------
@@ -265,6 +279,11 @@ class Live:
 
     def source_address(self, name: str) -> tuple[str, int]:
         """Return host and port that another board of the recording sends to.
+
+        Parameters
+        ----------
+        name : str
+            Of the source, as in `sources`.
 
         Raises
         ------
@@ -276,14 +295,16 @@ class Live:
         return address
 
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
-        """Record numbers of a source whose values a program gives.
+        """Record numbers of a source whose values a program passes.
 
         Parameters
         ----------
         name : str
-        values : float, one for each column of the source, its own stamp among them
+            Of the source, as in `sources`.
+        values : float, shape (columns,), each in the unit of its column (s, m/s2 ...)
+            One for each column, with its own time stamp.
         arrived_ns : int, ns since 1970, optional
-            When they came; now, where it is left out.
+            When they arrived. Default: now.
 
         Raises
         ------
@@ -294,15 +315,15 @@ class Live:
         self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), came)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
-        """Take the values that taxels hold for their rest from now on: for taxels that drift.
+        """Use the values that taxels hold now as their rest from now on: for taxels that drift.
 
-        The readout's encoder reads them above that rest, where it uses a tare; the recording states the zeroing, with
-        the rests before and after, and `taxel.detect.run` applies it. Only done on request: a load that stands on a
-        taxel then would be taken for its rest.
+        The readout's encoder reads them above that rest, where it uses a tare; the recording contains the zeroing, with
+        the rests before and after, and `taxel.detect.run` applies it. Only done on request: done automatically, it
+        would use a standing load as the rest.
 
         Parameters
         ----------
-        x, y : int, or shape (n,)
+        x, y : int, or shape (n,), 0 or more
             Columns and rows.
 
         Raises
@@ -327,7 +348,12 @@ class Live:
         return tuple(Zeroing(*one) for one in self._core.zeroed())
 
     def note(self, said: str) -> None:
-        """Write a note into the recording, with the time of now.
+        """Write a note into the recording, with the current time.
+
+        Parameters
+        ----------
+        said : str
+            The text.
 
         Raises
         ------
@@ -338,25 +364,27 @@ class Live:
     def record(
         self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
     ) -> Summary | None:
-        """Record what comes from here on, of all sources, beginning with the registers and the taxels' values.
+        """Record what arrives from now on, of all sources, beginning with the registers and the held values.
 
-        A recording that runs ends with what came before: each datagram, and each line, belongs to one of the two.
+        The previous recording ends with what arrived before: each datagram, and each line, belongs to one of the two.
 
         Parameters
         ----------
         path : path
-            As `record` of the constructor; so are the others.
+            A new file, as `record` of the constructor.
         compression : {"none", "lz4", "zstd"}
+            Of a `.mcap`.
         overwrite : bool
+            Whether an existing file may be replaced.
 
         Returns
         -------
-        Summary or None : how the recording that ran ended, with what came while it ran (latencies are of all)
+        Summary or None : of the previous recording, with the counts since its beginning (latencies are of all)
 
         Raises
         ------
-        FileExistsError : the file is there already and `overwrite` is false; the recording that runs goes on
-        OSError : the file cannot be created; the disk was full before the end of the one that ran
+        FileExistsError : the file is there already and `overwrite` is false; the previous recording continues
+        OSError : the file cannot be created; the disk was full before the end of the previous one
         ProblemError : `record_later` was not given
         """
         place = checked_path("path", path)
@@ -364,11 +392,11 @@ class Live:
         return None if ended is None else summary_of(ended)
 
     def record_again(self) -> bool:
-        """Let the recording that runs begin anew, where no source has given anything; return whether it does."""
+        """Restart the recording, where no source has sent anything yet; return whether that was so."""
         return self._core.record_again()
 
     def end_recording(self) -> Summary:
-        """End the recording that `record` began; a file to which nothing came is not kept.
+        """End the recording that `record` began; a file without any data is removed.
 
         Raises
         ------
@@ -383,7 +411,7 @@ class Live:
         return self._core.records()
 
     def stop(self) -> Summary:
-        """Process what has arrived, close the file, and return what was lost; every call returns the same summary.
+        """Process what has arrived, close the file, and return a summary; every call returns the same one.
 
         Raises
         ------

@@ -2,93 +2,90 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from dataclasses import KW_ONLY, dataclass, replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
+from taxel import _core
 from taxel._base.arguments import flag, instance, number, several, shown, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.options import option
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import Readout
 from taxel.live.remote import Remote
 from taxel.live.sending import PORT
 from taxel.tare import Tare
-from taxel.wire import PRESETS, Registers
+from taxel.wire import Registers
+from taxel.wire.registers import QUOTED_PRESETS
 
 if TYPE_CHECKING:
     from taxel.detections import Detection
 
-__all__ = ["QUOTED_PRESETS", "LiveOptions", "about", "takes"]
+__all__ = ["LiveOptions"]
 
-#: The names of all presets, for a text.
-QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
-
-_P = ParamSpec("_P")
-_Self = TypeVar("_Self")
-_Options = TypeVar("_Options")
-
-
-def _option(default: Any, about: str, *, least: float | None = None, most: float | None = None) -> Any:
-    """Return a field with its default, its text, and the range of its values."""
-    return field(default=default, metadata={"help": about, "min": least, "max": most})
+#: The defaults of the values that Rust reads.
+_DEFAULT = SimpleNamespace(**json.loads(_core.live_defaults()))
 
 
 @dataclass(frozen=True)
 class LiveOptions:
     """Hold the options of a `Live`, which documents each, with their defaults."""
 
-    port: int = _option(PORT, "The UDP port that the board sends to.", least=0, most=65_535)
+    port: int = option(PORT, "The UDP port that the board sends to.", least=0, most=65_535)
     _: KW_ONLY
-    host: str = _option("0.0.0.0", "The address of this machine to listen on; 0.0.0.0: all.")
-    remote: Remote | None = _option(
+    host: str = option("0.0.0.0", "The address of this machine to listen on; 0.0.0.0: all.")
+    remote: Remote | None = option(
         None, "Receive a board of another computer instead: zenoh:HOST:PORT/NAME, as taxel bridge prints it there."
     )
-    array: Array | None = _option(
+    array: Array | None = option(
         None,
         "Rows, columns and pitch of the sensor, as 24x20x5 (default pitch: 2.67 mm). Default: 64x64x2.67; with --from, "
         "the bridge reports it.",
     )
-    registers: str | Registers | None = _option(
+    registers: str | Registers | None = option(
         None,
         f'The board\'s registers: one of {QUOTED_PRESETS}. Default: "5.2 kHz"; with --from, the bridge reports them.',
     )
-    differences: bool = _option(False, "The board sends intensity differences.")
-    readout: Readout | None = _option(None, "A trained readout (JSON), as taxel train writes it; the panel needs none.")
-    tare: Tare | float | None = _option(
+    differences: bool = option(_DEFAULT.differences, "The board sends intensity differences.")
+    readout: Readout | None = option(None, "A trained readout (JSON), as taxel train writes it; the panel needs none.")
+    tare: Tare | float | None = option(
         None,
         "Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).",
         least=1e-6,
         most=3600,
     )
-    record: str | os.PathLike[str] | None = _option(None, "Record in a new file (.mcap or .lsa).")
-    record_later: bool = _option(False, "Recordings begin and end while it runs.")
-    name: str = _option("board", "The board's name among the sources of the recording.")
-    sources: Mapping[str, str] | None = _option(
+    record: str | os.PathLike[str] | None = option(None, "Record in a new file (.mcap or .lsa).")
+    record_later: bool = option(_DEFAULT.record_later, "Recordings begin and end while it runs.")
+    name: str = option(_DEFAULT.name, "The board's name among the sources of the recording.")
+    sources: Mapping[str, str] | None = option(
         None,
         "Record another source too: a board (udp:HOST:PORT,array=16x16), or lines of numbers, as of an IMU "
         "(serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.",
     )
-    compression: str = _option("none", "Compression of a .mcap: none, lz4 or zstd.")
-    overwrite: bool = _option(False, "Replace the file where it exists.")
-    guard_frames: float = _option(
-        5.0, "How far, in frames, a readout stays behind the host's clock while no events come.", least=0.0
+    compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.")
+    overwrite: bool = option(False, "Replace the file where it exists.")
+    guard_frames: float = option(
+        _DEFAULT.guard_frames,
+        "How far, in frames, a readout stays behind the host's clock while no events come.",
+        least=0.0,
     )
-    gap_frames: float = _option(1.0, "At a gap in version 2, frames to wait for what may only be late.", least=0.0)
-    say: Callable[[Detection], object] | None = _option(None, "Called with each detection.")
-    lines: bool = _option(False, "Print one line of JSON for each detection, and nothing else.")
-    send: str | Sequence[str] = _option(
+    gap_frames: float = option(
+        _DEFAULT.gap_frames, "At a gap in version 2, frames to wait for what may only be late.", least=0.0
+    )
+    say: Callable[[Detection], object] | None = option(None, "Called with each detection.")
+    lines: bool = option(False, "Print one line of JSON for each detection, and nothing else.")
+    send: str | Sequence[str] = option(
         (),
         "Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be repeated.",
     )
-    kernel_buffer_bytes: int | None = _option(None, "How much may wait in the kernel, bytes.", least=0, most=2**31 - 1)
-    queue_bytes: int | None = _option(None, "How much may wait for the decoder, bytes.", least=0, most=2**31 - 1)
-    readout_events: int | None = _option(None, "How many events may wait for the readout.", least=0, most=2**31 - 1)
-    gro: bool | None = _option(None, "Let the kernel hand over trains of datagrams in one piece.")
+    kernel_buffer_bytes: int | None = option(None, "How much may wait in the kernel, bytes.", least=0, most=2**31 - 1)
+    queue_bytes: int | None = option(None, "How much may wait for the decoder, bytes.", least=0, most=2**31 - 1)
+    readout_events: int | None = option(None, "How many events may wait for the readout.", least=0, most=2**31 - 1)
+    gro: bool | None = option(None, "Let the kernel hand over trains of datagrams in one piece.")
 
     def completed(self) -> LiveOptions:
         """Return them with the sensor of the remote board or the readout; refuse what makes no sense."""
@@ -150,27 +147,3 @@ class LiveOptions:
             "sources": sources,
             **{name: None if n is None else whole(name, n, 0, 2**31 - 1) for name, n in sizes.items()},
         }
-
-
-def about(name: str) -> dict[str, Any]:
-    """Return the text and the range of an option, for the command line: help, min, max."""
-    found = {one.name: one.metadata for one in fields(LiveOptions)}[name]
-    return {key: value for key, value in found.items() if value is not None}
-
-
-def takes(
-    options: Callable[_P, _Options],
-) -> Callable[[Callable[[_Self, _Options], None]], Callable[Concatenate[_Self, _P], None]]:
-    """Let a constructor that is written for a dataclass of options take the fields of that dataclass."""
-
-    def decorate(begin: Callable[[_Self, _Options], None]) -> Callable[Concatenate[_Self, _P], None]:
-        def init(self: _Self, /, *arguments: _P.args, **keywords: _P.kwargs) -> None:
-            begin(self, options(*arguments, **keywords))
-
-        functools.update_wrapper(init, begin)
-        own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-        named = inspect.signature(options).parameters.values()
-        init.__signature__ = inspect.Signature([own, *named])  # type: ignore[attr-defined]
-        return init
-
-    return decorate

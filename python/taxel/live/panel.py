@@ -31,12 +31,12 @@ class Panel:
     control : str, optional
         The board's serial line ("/dev/ttyUSB0", host:port), with which the page reads and sets registers.
     folder : path, optional
-        The folder of recordings, also of new ones: the recording's own, or the current one.
-    port : int
-        TCP; 0 finds a free one, see `url`.
+        The folder of recordings, also of new ones. Default: that of the recording, or the current one.
+    port : int, 0 to 65535
+        The TCP port; 0 finds a free one, see `url`.
     host : str
-        The address of this machine on which to listen. On any but loopback everybody who has the token in the panel's
-        address can see the board and set registers, over a connection that is not encrypted.
+        The address of this machine to listen on. On any but loopback every user with the token of the panel's address
+        can see the board and set registers, over a connection that is not encrypted.
 
     Raises
     ------
@@ -59,7 +59,7 @@ class Panel:
         port: int = 0,
         host: str = "127.0.0.1",
     ) -> None:
-        # Held while one `Live` replaces another.
+        # Locked while one `Live` replaces another.
         self._restarting = threading.Lock()
         self._live = shows if isinstance(shows, Live) else None
         opened = None
@@ -125,6 +125,13 @@ class Panel:
     def listen(self, host: str, port: int) -> None:
         """Receive on another address, with all other options unchanged.
 
+        Parameters
+        ----------
+        host : str
+            The address of this machine to listen on.
+        port : int, 0 to 65535
+            The UDP port.
+
         Raises
         ------
         ProblemError : the panel shows recordings only; a recording was begun with this address, or the board is another
@@ -139,15 +146,20 @@ class Panel:
             before.stop()
 
     def delta_intensity(self, on: bool) -> None:
-        """Interpret intensities as differences from the value before, or as values, from now on.
+        """Interpret intensities as differences from the previous value, or as values, from now on.
 
-        Earlier events were decoded with the other meaning, so nothing of them is kept: time, picture, a readout and its
-        tare begin anew, on the same address.
+        Earlier events were decoded the other way, so they are discarded: time, picture, a readout and its tare restart,
+        on the same address.
+
+        Parameters
+        ----------
+        on : bool
+            Differences (true) or values.
 
         Raises
         ------
         ProblemError : as `listen`
-        OSError : another program has taken the port in that moment
+        OSError : another program has opened the port in the meantime
         """
         with self._restarting:
             before = self._restartable("delta_intensity")

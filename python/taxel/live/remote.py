@@ -1,6 +1,6 @@
-"""Boards of other computers, heard as if they were here.
+"""Boards of other computers, received as if they were connected to this one.
 
-Zenoh carries what they send, by the wheel ``taxel-bridge``, which only those need who have more than one computer.
+Zenoh transports their datagrams, by the wheel ``taxel-bridge``, which only users of more than one computer install.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ from taxel._base.arguments import number, shown, text
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 
-__all__ = ["Address", "Remote", "told", "wheel"]
+__all__ = ["Address", "Remote", "wheel", "with_taxel_errors"]
 
-#: Zenoh's own port.
+#: Zenoh's default port.
 _PORT = 7447
 
-#: How long a wait lasts before it is asked whether to stop, s.
-_LOOK_S = 0.05
+#: Interval at which a wait checks whether to stop, s.
+_POLL_S = 0.05
 
-#: The clocks are compared so often at the beginning, and so often afterwards, s.
+#: Number of clock comparisons at the beginning, and their interval afterwards, s.
 _AT_FIRST, _COMPARE_S = 8, 0.25
 
-#: Who answers is asked for so long, s.
+#: Timeout of a query for the published boards, s.
 _ASK_S = 0.5
 
-#: So long it is tried to reach a computer on which nobody answered, to say why, s.
+#: Timeout of the TCP connection that finds out why no bridge answered, s.
 _REACH_S = 2.0
 
 
 class Address(NamedTuple):
-    """Say where a board of another computer is heard: ``zenoh:HOST[:PORT][/NAME]``.
+    """Hold the address of a board of another computer: ``zenoh:HOST[:PORT][/NAME]``.
 
     Attributes
     ----------
     host : str
-        Of the computer whose bridge listens, or of a Zenoh router.
+        The computer whose bridge listens, or a Zenoh router.
     port : int
     name : str or None
-        Of the board; None where only one is published there.
+        The board; None where only one is published there.
     """
 
     host: str
@@ -57,12 +57,16 @@ class Address(NamedTuple):
     name: str | None
 
     @classmethod
-    def of(cls, said: str) -> Address:
+    def of(cls, address: str) -> Address:
         """Return the address that a text names.
+
+        Parameters
+        ----------
+        address : str
 
         Raises
         ------
-        ProblemError : it names none
+        ProblemError : the text is no such address
 
         Examples
         --------
@@ -71,12 +75,12 @@ class Address(NamedTuple):
         """
         found = re.fullmatch(
             r"zenoh:(?P<host>\[[0-9a-fA-F:.]+\]|[\w.-]+)(:(?P<port>\d{1,5}))?(/(?P<name>[\w.-]{1,64}))?",
-            text("address", said),
+            text("address", address),
             re.ASCII,
         )
         port = _PORT if found is None else int(found["port"] or _PORT)
         if found is None or not 1 <= port <= 65_535:
-            raise ProblemError(f"address {said!r}: must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left")
+            raise ProblemError(f"address {address!r}: must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left")
         return cls(found["host"], port, found["name"])
 
     @property
@@ -89,24 +93,34 @@ class Address(NamedTuple):
 
 
 class Remote:
-    """Hear a board of another computer, which a `Bridge` there publishes. A context manager.
+    """Receive a board of another computer, which a `Bridge` there publishes. A context manager.
 
-    Give it to `Live`, which then decodes, shows, records and detects as if the board were here; or read what that
-    computer itself says: `detections`, `pictures`.
+    Give it to `Live`, which then decodes, shows, records and detects as if the board were connected here; or
+    read the detections and pictures of that computer: `detections`, `pictures`.
 
     Parameters
     ----------
     address : str
         ``zenoh:HOST[:PORT][/NAME]``.
     congestion : {"block", "drop"}
-        Where this computer is slow: the bridge waits for it, as a recorder wants, or leaves out what is too much.
+        Where this computer is too slow: the bridge waits for it, as a recorder needs, or drops datagrams and counts
+        them.
     timeout : float, s
-        How long the bridge is waited for.
+        How long to wait for the bridge.
 
     Raises
     ------
-    DeviceError : nobody answers, or several publish there and none is named; the wheel is not installed
-    ProblemError : the address is none
+    DeviceError : no bridge answers, or several boards are published and none is named; the wheel is not installed
+    ProblemError : the text is no address
+
+    Examples
+    --------
+    ``with Remote("zenoh:192.168.1.5/left") as remote, Live(remote=remote) as live: ...`` receives a board of another
+    computer.
+
+    >>> Remote("192.168.1.5")
+    Traceback (most recent call last):
+    taxel.ProblemError: address '192.168.1.5': must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left
 
     Notes
     -----
@@ -120,7 +134,7 @@ class Remote:
         if congestion not in ("block", "drop"):
             raise ProblemError(f"congestion is {shown(congestion)}: must be block or drop")
         self.congestion = congestion
-        self._zenoh = told(wheel().Subscriber, [self.address.place])
+        self._zenoh = with_taxel_errors(wheel().Subscriber, [self.address.place])
         try:
             self.name, self._about = self._find(number("timeout", timeout))
         except BaseException:
@@ -133,10 +147,10 @@ class Remote:
         self.array: Array = Array._from_geometry(dict(self._about["array"]))
 
     def _find(self, timeout: float) -> tuple[str, dict[str, Any]]:
-        """Return the board's name and what is said of it."""
+        """Return the board's name and description."""
         until = time.monotonic() + timeout
         while True:
-            found: dict[str, str] = dict(told(self._zenoh.names, _ASK_S))
+            found: dict[str, str] = dict(with_taxel_errors(self._zenoh.names, _ASK_S))
             wanted = self.address.name
             if wanted in found:
                 return wanted, json.loads(found[wanted])
@@ -149,12 +163,12 @@ class Remote:
             if time.monotonic() >= until:
                 if found:
                     raise DeviceError(f"{self.address}: publishes {', '.join(sorted(found))}, not {wanted}")
-                raise DeviceError(f"{self.address}: {self._unheard()}")
-            # A link that does not stand yet answers at once.
-            time.sleep(_LOOK_S)
+                raise DeviceError(f"{self.address}: {self._why_unreachable()}")
+            # A query on a link that is not established yet returns at once.
+            time.sleep(_POLL_S)
 
-    def _unheard(self) -> str:
-        """Return why nobody answers, as far as that can be seen from here."""
+    def _why_unreachable(self) -> str:
+        """Return why no bridge answers, as far as this computer can tell."""
         begin = "begin taxel bridge on that computer, with --listen and an address that others reach"
         try:
             with socket.create_connection((self.address.host.strip("[]"), self.address.port), timeout=_REACH_S):
@@ -165,12 +179,12 @@ class Remote:
             return f"does not answer; is the address right, does a firewall let port {self.address.port} (TCP) through?"
         except OSError as error:
             if error.errno == errno.ECONNREFUSED:
-                return f"that computer is reached, but nobody listens at this port; {begin}"
+                return f"that computer is reached, but no program listens at this port; {begin}"
             return f"{(error.strerror or str(error)).lower()}; is the address right, are both on one network?"
 
     @property
     def registers(self) -> dict[str, Any]:
-        """What the board's registers hold, in their own units."""
+        """The contents of the board's registers, in their own units."""
         return dict(self._about["registers"])
 
     @property
@@ -179,44 +193,44 @@ class Remote:
         return bool(self._about["differences"])
 
     def _fed(self, queue_bytes: int | None) -> _core.Feed:
-        """Return what a pipeline is fed by."""
+        """Return the feed for a pipeline."""
         self._only_one()
         return _core.Feed(str(self.address._replace(name=self.name)), queue_bytes)
 
     def _begin(self, feed: _core.Feed) -> None:
-        """Feed it, from here on."""
+        """Feed the pipeline from now on."""
         self._feed = feed
         self._thread = threading.Thread(target=self._run, args=(feed,), name="taxel-bridge", daemon=True)
         self._thread.start()
 
     def _only_one(self) -> None:
         if self._feed is not None:
-            raise ProblemError("remote: is listened to already; make another one")
+            raise ProblemError("remote: is in use already; make another one")
 
     def _run(self, feed: _core.Feed) -> None:
-        """Hand over what comes; ends with the pipeline that it feeds, or with `stop`."""
+        """Feed received parcels until the pipeline ends, or `stop` is called."""
         try:
             self._compare(feed, _AT_FIRST)
             self._zenoh.listen(self.name, self.congestion)
             clocks = threading.Thread(target=self._clocks, args=(feed,), name="taxel-clocks", daemon=True)
             clocks.start()
             while not (feed.is_over() or self._ending.is_set()):
-                parcel = self._zenoh.take(_LOOK_S)
+                parcel = self._zenoh.take(_POLL_S)
                 while parcel is not None and not feed.take(parcel):
-                    self._meet(feed)
+                    self._begin_session(feed)
                     if feed.is_over() or self._ending.is_set():
                         break
             clocks.join()
         except Exception as error:
-            # Said by the pipeline, to those who listen.
+            # The pipeline raises it in its callers.
             feed.fail(str(error))
 
-    def _meet(self, feed: _core.Feed) -> None:
-        """Another session begins: it must be of the same sensor, and the clocks are compared anew."""
-        about = dict(told(self._zenoh.names, _ASK_S)).get(self.name)
+    def _begin_session(self, feed: _core.Feed) -> None:
+        """Begin another session: it must be of the same sensor, and the clocks are compared again."""
+        about = dict(with_taxel_errors(self._zenoh.names, _ASK_S)).get(self.name)
         if about is not None and json.loads(about)["array"] != self._about["array"]:
-            raise DeviceError("the board there is another one now; begin anew")
-        feed.meet()
+            raise DeviceError("the board there is another one now; make a new Remote")
+        feed.begin_session()
         self._compare(feed, _AT_FIRST)
 
     def _compare(self, feed: _core.Feed, times: int) -> None:
@@ -226,34 +240,34 @@ class Remote:
                 feed.compare(*trip)
 
     def _clocks(self, feed: _core.Feed) -> None:
-        # A round trip may take as long as a second where the other is gone: what comes must not wait for it.
+        # A round trip takes up to a second where the other computer is gone: parcels must not wait for it.
         with contextlib.suppress(ConnectionError):
             while not (feed.is_over() or self._ending.wait(_COMPARE_S)):
                 self._compare(feed, 1)
 
     def detections(self) -> Iterator[dict[str, Any]]:
-        """Yield what the other computer's readout says, as ``taxel live --json`` says it there; endless."""
+        """Yield the detections of the other computer's readout, with the keys of ``taxel live --json``; endless."""
         return self._messages("detection")
 
     def pictures(self) -> Iterator[dict[str, Any]]:
-        """Yield what the taxels hold, ten times a second while something comes: t_us, rows, columns, ticks; endless."""
+        """Yield the held values, ten times a second while events come: t_us, rows, columns, ticks; endless."""
         return self._messages("picture")
 
     def _messages(self, what: str) -> Iterator[dict[str, Any]]:
         self._only_one()
-        told(self._zenoh.listen, self.name, what)
+        with_taxel_errors(self._zenoh.listen, self.name, what)
         while not self._ending.is_set():
-            message = told(self._zenoh.take, _LOOK_S)
+            message = with_taxel_errors(self._zenoh.take, _POLL_S)
             if message is not None:
                 yield json.loads(message)
 
     def stop(self) -> None:
-        """End; what still waits is let go."""
+        """Disconnect; discard what was received and not read."""
         self._ending.set()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-        told(self._zenoh.close)
+        with_taxel_errors(self._zenoh.close)
 
     def __enter__(self) -> Remote:
         return self
@@ -268,17 +282,17 @@ class Remote:
 
 
 def wheel() -> Any:
-    """Return the wheel that carries it."""
+    """Return the module of the wheel taxel-bridge."""
     try:
         return importlib.import_module("taxel_bridge")
     except ImportError:
         raise DeviceError(
-            "a bridge needs the wheel taxel-bridge: say make bridge in a checkout of taxel (six minutes of a core)"
+            "a bridge needs the wheel taxel-bridge: run make bridge in a checkout of taxel (six minutes on one core)"
         ) from None
 
 
-def told(call: Any, *arguments: Any) -> Any:
-    """Call the wheel; its errors are ours."""
+def with_taxel_errors(call: Any, *arguments: Any) -> Any:
+    """Call a function of the wheel; raise its errors as errors of taxel."""
     try:
         return call(*arguments)
     except ConnectionError as error:

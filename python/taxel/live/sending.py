@@ -1,4 +1,4 @@
-"""Sends datagrams as a board does, to try a receiver or to measure it."""
+"""Sends datagrams as a board does, to test or measure a receiver."""
 
 from __future__ import annotations
 
@@ -27,20 +27,26 @@ def send(
     seconds: float = 1.0,
     segment: bool = True,
 ) -> dict[str, Any]:
-    """Send datagrams over and over, `each` of them every `period_us`, for `seconds`; return what was sent.
+    """Send datagrams repeatedly, `each` of them every `period_us`, for `seconds`; return counts of what was sent.
 
-    As a board does: to try a receiver, or to measure it.
+    To test or measure a receiver.
 
     Parameters
     ----------
     datagrams : sequence of bytes, one or more
+        Their payloads.
+    host : str
+        The machine to send to, by name or address.
+    port : int, 1 to 65535
+        The UDP port to send to.
     each : int, 1 or more
-        How many at a time.
-    period_us : float, us
-        From one time to the next, a frame where it is left out; 0 for as fast as it goes.
+        Number of datagrams sent at a time.
+    period_us : float, us, 0 or more
+        Interval between two times; 0: as fast as possible. Default: a frame.
     seconds : float, s
+        Duration.
     segment : bool
-        Hand trains of datagrams to the kernel in one call where it can cut them (`UDP_SEGMENT`).
+        Pass trains of datagrams to the kernel in one call where it can cut them (`UDP_SEGMENT`).
 
     Returns
     -------
@@ -49,6 +55,12 @@ def send(
     Raises
     ------
     OSError : the system refuses to send
+    ProblemError : arguments that make no sense
+
+    Examples
+    --------
+    >>> send([bytes.fromhex("c000050304")], "127.0.0.1", 9, seconds=0.0)["datagrams"] >= 0
+    True
     """
     counts: dict[str, Any] = json.loads(
         _core.send(

@@ -1,4 +1,4 @@
-"""Any sensor that Python can read, as a board."""
+"""Sends the frames of any sensor that Python can read, as a board does."""
 
 from __future__ import annotations
 
@@ -21,29 +21,30 @@ _MOST = 2**16 - 1
 
 
 class Source:
-    """Make any sensor that Python can read live: frames become events by the board's rules, and travel as a board's.
+    """Send frames of any sensor as a board does: they become events by the board's rules, in datagrams of version 2.
 
-    Whatever receives from a board receives from this: `Live`, ``taxel record``, ``taxel live``, with this array and, as
+    Any receiver of a board can receive them: `Live`, ``taxel record``, ``taxel live``, with this array and, as
     `registers`, these registers.
 
     Parameters
     ----------
     array : Array
-    rate : float, 1/s
-        Frames a second; each push moves the source's clock on by one frame.
+        The sensor.
+    rate : float, 1/s, above 0
+        Frames per second; each push advances the source's clock by one frame.
     bits : int, 1 to 16
-        Of the values. Where so fast a scan resolves fewer, values are halved `shift` times.
+        Bits of the values. Where the board resolves fewer at this rate, values are shifted right by `shift`.
     noise_floor : int, 0 to 255
         A change above it makes an event.
     to : str
         Address and port that the datagrams are sent to.
     board : int, 0 to 65535
-        Its number: sources on one address are told apart by it.
+        Its number, by which receivers distinguish sources on one address.
 
     Raises
     ------
     ProblemError : arguments that make no sense
-    OSError : a socket cannot be had
+    OSError : a socket cannot be opened
 
     Examples
     --------
@@ -76,11 +77,15 @@ class Source:
         self._core = _core.Source(text("to", to), array._parts(), self.registers._json(), options)
 
     def push(self, frame: ArrayLike) -> int:
-        """Take the next frame, shape (rows, columns) or flat, 0 or more; return how many events it made.
+        """Send the events of the next frame; return how many there are.
+
+        Parameters
+        ----------
+        frame : int, shape (rows, columns) or flat, 0 to 65535
 
         Raises
         ------
-        ProblemError : not one number a taxel, or below 0
+        ProblemError : not one number for each taxel, or one below 0
         OSError : the system refuses to send
         """
         values = numbers("frame", frame, np.int64).reshape(-1)

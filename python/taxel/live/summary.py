@@ -16,14 +16,14 @@ __all__ = ["Summary", "delays"]
 class Summary:
     """Report how a `Live`, or a recording of one, ended.
 
-    Attributes
+    Parameters
     ----------
     counters : dict
-        As `Live.counters`; its sums are closed.
+        As `Live.counters`, at the end.
     verdict : str
-        One line: nothing lost after arrival, what was lost where, or that nothing came.
+        One line: that nothing was lost after arrival, what was lost where, or that nothing arrived.
     path : Path or None
-        The recording; none where nothing came: then a new file is removed, and an earlier one stays.
+        The recording; None where nothing arrived: then a new file is removed, and an earlier one stays.
     tare : Tare or None
         The fresh tare, where one was completed.
     """
@@ -35,9 +35,9 @@ class Summary:
 
     @property
     def lost(self) -> int:
-        """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing.
+        """Number of losses after arrival: messages in the kernel, datagrams in the queue.
 
-        Of a board of another computer also what was lost there and between the two.
+        For a board of another computer with the losses there and between the two computers.
         """
         boards = [self.counters, *(one for one in self.counters["sources"].values() if "capture" in one)]
         lost = sum(int(one["capture"]["dropped_by_kernel"] + one["capture"]["dropped_by_queue"]) for one in boards)
@@ -46,13 +46,13 @@ class Summary:
 
     @property
     def nothing_came(self) -> bool:
-        """Whether no datagram has come, lost ones included."""
+        """Whether no datagram has arrived, lost ones included."""
         capture = self.counters["capture"]
         return not capture["messages"] + capture["dropped_by_kernel"]
 
 
 def summary_of(text: str) -> Summary:
-    """Return the summary that Rust gives as JSON."""
+    """Return the summary that Rust returns as JSON."""
     values = json.loads(text)
     path = None if values["path"] is None else Path(values["path"])
     taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
@@ -60,7 +60,7 @@ def summary_of(text: str) -> Summary:
 
 
 def delays(measured: dict[str, Any]) -> str:
-    """Return median and 99 % of a latency of `Live.counters` in words, or that nothing was measured.
+    """Return median and 99 % of a latency of `Live.counters` as text.
 
     Examples
     --------

@@ -38,17 +38,22 @@ _END_WITHIN_S = 4.0
 class Viewing:
     """Hold the state of a `Viewer`.
 
-    Attributes
+    Parameters
     ----------
     sent, lost : dict
-        How many pictures, times of the curves ("curves"), spikes, detections and notes the viewer has received, and how
-        many were dropped because it was not connected or too slow.
+        Numbers of pictures, times of the curves ("curves"), spikes, detections and notes that the viewer has received,
+        and of those that were dropped because it was not connected or too slow.
     there : bool
         Whether a viewer is connected.
     trouble : str or None
         Why no viewer is connected, or what the panel's server refused.
     over : bool
         Whether all of a recording has been shown.
+
+    Examples
+    --------
+    >>> Viewing(sent={"pictures": 3}, there=True).lost
+    {}
     """
 
     sent: dict[str, int] = field(default_factory=dict)
@@ -70,7 +75,7 @@ class Viewer:
     Parameters
     ----------
     shows : Live, Panel or path
-        A board that is listened to, a panel that shows one, or a recording (`.mcap`, `.lsa`), which is played once,
+        A board, a panel that shows one, or a recording (`.mcap`, `.lsa`), which is played once,
         from when a viewer is connected.
     to : str
         "rerun", "rerun:HOST:PORT" or "rerun+http://HOST:PORT/proxy": a viewer that the user has started; taxel
@@ -173,7 +178,7 @@ class Viewer:
 
     @property
     def place(self) -> str:
-        """Where the viewer is, in words: "Rerun at 127.0.0.1:9876", "Foxglove at ws://127.0.0.1:8765"."""
+        """The address of the viewer as text: "Rerun at 127.0.0.1:9876", "Foxglove at ws://127.0.0.1:8765"."""
         return self._place
 
     @property
@@ -187,7 +192,7 @@ class Viewer:
         Parameters
         ----------
         timeout : float, s, optional
-            How long at most; for ever where it is left out.
+            How long at most. Default: without limit.
         """
         limit = None if timeout is None else number("timeout", timeout)
         with self._changed:
@@ -195,7 +200,7 @@ class Viewer:
             return self._state.over
 
     def stop(self) -> Viewing:
-        """End, and return the last state; pending items have 2 s. A second call returns the same."""
+        """End, after at most 2 s for pending items, and return the last state; a second call returns the same."""
         self._stopping = True
         assert self._process.stdin is not None  # asked for
         with contextlib.suppress(BrokenPipeError):

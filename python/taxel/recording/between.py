@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._core import ProblemError
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
@@ -91,11 +92,9 @@ def _held_at(of: Contents, start: float) -> NDArray[np.uint16] | None:
     events = of.events if of.has_events else None
     if events is None or events.intensity is None or events.present is None:
         return of.held
-    before = np.flatnonzero(events.present & (events.t < start))
-    if not len(before):
+    before = events.between(-np.inf, start)
+    if before.present is None or not before.present.any():
         return of.held
-    now = np.full(of.array.shape, UNKNOWN, np.uint16) if of.held is None else of.held.copy()
-    last = before[np.argsort(events.t[before], kind="stable")]
-    # Of values at one place the last one stays.
-    now[events.y[last], events.x[last]] = events.intensity[last]
-    return now
+    begins = np.full(of.array.shape, UNKNOWN, np.uint16) if of.held is None else of.held
+    values = _core.HeldValues(before._parts(), None, begins.astype(np.float32).reshape(-1))
+    return values.at(np.array([before.t.max()])).astype(np.uint16).reshape(of.array.shape)

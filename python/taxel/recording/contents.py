@@ -10,6 +10,7 @@ from typing import Any, Generic, Self, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -26,7 +27,7 @@ __all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "once",
 T = TypeVar("T")
 
 #: Value of a taxel without any event so far, where files hold what the taxels held.
-UNKNOWN = 65_535
+UNKNOWN = _core.UNKNOWN
 
 
 class Once(Generic[T]):

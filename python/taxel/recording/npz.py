@@ -19,8 +19,8 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.frames import Frames
-from taxel.recording.about import about_of, json_of
 from taxel.recording.contents import Contents
+from taxel.recording.description import about_of, json_of
 
 __all__ = ["TEXTS", "around", "columns_of", "contents_of", "read_npz", "write_npz"]
 

@@ -15,7 +15,6 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import Trial
 from taxel.labels import Labels, Note
-from taxel.recording.beside import with_what_lies_beside
 from taxel.recording.contents import Contents
 from taxel.recording.csv import read_csv
 from taxel.recording.h5 import is_ours, read_h5
@@ -24,6 +23,7 @@ from taxel.recording.npz import read_npz
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.recording import Recording
+from taxel.recording.sidecars import with_sidecars
 
 __all__ = ["open_any", "open_recording"]
 
@@ -126,7 +126,7 @@ def open_recording(
     flag("differences", differences)
     kind = kind_of(place)
     try:
-        return Recording(with_what_lies_beside(_read(place, kind, array, pairing, differences)))
+        return Recording(with_sidecars(_read(place, kind, array, pairing, differences)))
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
 
@@ -196,7 +196,7 @@ def _of(trial: Trial, place: Path, kind: str) -> Recording:
     events, frames = (table, None) if isinstance(table, Events) else (None, table)
     path = place if place.is_file() else place / trial.name
     held: dict[str, Any] = {"events": events, "frames": frames, "source": trial.source, "notes": tuple(notes)}
-    return Recording(with_what_lies_beside(Contents(path, trial.name, kind, table.array, **held)))
+    return Recording(with_sidecars(Contents(path, trial.name, kind, table.array, **held)))
 
 
 def _formats(place: Path) -> list[str]:

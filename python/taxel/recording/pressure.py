@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.parameters import defaults
+from taxel import _core
+from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import UNKNOWN
@@ -69,7 +70,7 @@ def series(recording: Recording) -> Series | None:
     events = recording.events
     if events.present is None or events.intensity is None or not events.present.any():
         return None
-    floor = defaults("contact_area").noise_floor + 0.5
+    floor = ContactArea().above
     drawn = _Drawn.of(recording)
     rest = np.full(len(drawn.taxels), np.inf)
     for first, values in drawn.blocks():
@@ -79,7 +80,7 @@ def series(recording: Recording) -> Series | None:
     y, x = np.divmod(drawn.taxels, array.columns)
     area, peak, total, centre = np.zeros(n), np.zeros(n), np.zeros(n), np.full((n, 2), np.nan)
     for first, values in drawn.blocks():
-        over = np.maximum(values - rest, 0.0).astype(np.float32)
+        over = _core.above_rest(values.reshape(-1), rest).reshape(values.shape)
         loaded = over > np.float64(floor)
         part = slice(first, first + len(values))
         area[part] = array.pitch_mm**2 * np.count_nonzero(loaded, axis=1)
@@ -96,42 +97,30 @@ class _Drawn:
     """What the taxels with events hold at the times of pictures, a block of pictures at a time."""
 
     t: NDArray[np.int64]
-    #: The indices of the taxels, what each holds at first, and when its first event comes, us.
+    #: The indices of the taxels, when the first event of each comes, us, and what they hold.
     taxels: NDArray[np.int64]
-    begins: NDArray[np.float32]
     since: NDArray[np.int64]
-    #: Of each event with a value the first picture that shows it, its taxel's number, its value; by time.
-    picture: NDArray[np.int64]
-    column: NDArray[np.int64]
-    ticks: NDArray[np.uint16]
+    held: _core.HeldValues
 
     @classmethod
     def of(cls, recording: Recording) -> _Drawn:
         events = recording.events
         assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller asked
         there = np.flatnonzero(events.present)
-        order = there[np.argsort(events.t[there], kind="stable")]
-        taxels, column = np.unique(events.array.index(events.x[order], events.y[order]), return_inverse=True)
-        t, held = _times(recording), recording._contents.held
-        begins = np.zeros(len(taxels), np.float32)
+        taxels, column = np.unique(events.array.index(events.x[there], events.y[there]), return_inverse=True)
+        begins, held = None, recording._contents.held
         if held is not None:
             begins = np.where(held == UNKNOWN, 0, held).reshape(-1)[taxels].astype(np.float32)
         since = np.full(len(taxels), np.iinfo(np.int64).max)
-        np.minimum.at(since, column, events.t[order])
-        picture = np.searchsorted(t, events.t[order], side="left")
-        return cls(t, taxels, begins, since, picture, column, events.intensity[order])
+        np.minimum.at(since, column, events.t[there])
+        values = _core.HeldValues(events._parts(), taxels.astype(np.uint32), begins)
+        return cls(_times(recording), taxels, since, values)
 
     def blocks(self) -> Iterator[tuple[int, NDArray[np.float32]]]:
         """Give the first picture of each block, and what the taxels hold in its pictures."""
-        now, each = self.begins.copy(), max(1, _BLOCK // max(1, len(self.taxels)))
-        bounds = np.searchsorted(self.picture, np.arange(len(self.t) + 1), side="left").tolist()
+        each = max(1, _BLOCK // max(1, len(self.taxels)))
         for first in range(0, len(self.t), each):
-            values = np.empty((min(each, len(self.t) - first), len(self.taxels)), np.float32)
-            for k in range(len(values)):
-                new = slice(bounds[first + k], bounds[first + k + 1])
-                now[self.column[new]] = self.ticks[new]
-                values[k] = now
-            yield first, values
+            yield first, self.held.at(self.t[first : first + each]).reshape(-1, len(self.taxels))
 
 
 def _rate_hz(recording: Recording) -> float:
@@ -164,8 +153,7 @@ def above_rest(recording: Recording) -> tuple[Frames, float] | None:
         return recording.calibration.apply(frames, None if known else np.where(np.isinf(rest), np.nan, rest)), 0.0
     if not recording.has_events:
         return frames, 0.0
-    values = np.maximum(frames.values - rest, 0.0)
-    return Frames(values.astype(np.float32), frames.t, unit=frames.unit, array=frames.array), floor
+    return frames._above(rest), floor
 
 
 def readings(recording: Recording) -> tuple[Frames, NDArray[np.float64], float] | None:
@@ -181,7 +169,7 @@ def readings(recording: Recording) -> tuple[Frames, NDArray[np.float64], float] 
     frames = recording.frames(_rate_hz(recording))
     heard = frames.t[:, None, None] >= _first_heard(events)
     rest = np.min(frames.values, axis=0, where=heard, initial=np.inf).astype(np.float64)
-    return frames, rest, defaults("contact_area").noise_floor + 0.5
+    return frames, rest, ContactArea().above
 
 
 def _first_heard(events: Events) -> NDArray[np.int64]:

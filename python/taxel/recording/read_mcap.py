@@ -14,8 +14,8 @@ from taxel.array import Array
 from taxel.clock import Clock
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.about import array_of, board_changes_of, detections_of, notes_of, zeroings_of
 from taxel.recording.contents import Contents, Once, alone, once
+from taxel.recording.description import array_of, board_changes_of, detections_of, notes_of, zeroings_of
 from taxel.recording.notes import Datagrams, Samples
 from taxel.wire import Registers
 

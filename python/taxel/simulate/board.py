@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._base.arguments import flag, instance, numbers, text, whole
+from taxel._base.options import option
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit
@@ -53,16 +54,17 @@ class Version2:
     10000
     """
 
-    board: int = 0
-    seed: int = 1
-    hold_us: int = 0
-    heartbeat_us: int = 10_000
-    states_us: int = 1_000_000
+    board: int = option(0, "Wire 2: the board's number.", least=0, most=65_535)
+    seed: int = option(1, "Wire 2: the number of the first session.", least=0, most=65_535)
+    hold_us: int = option(0, "Wire 2: how long events wait to share a datagram, ms.", least=0, most=30_000)
+    heartbeat_us: int = option(10_000, "Wire 2: interval of heartbeats while nothing happens, ms.", least=0, most=10**9)
+    states_us: int = option(
+        1_000_000, "Wire 2: interval at which each taxel's value is repeated, ms; 0: never.", least=0, most=10**9
+    )
 
     def __post_init__(self) -> None:
-        for name, most in (("board", 65_535), ("seed", 65_535), ("hold_us", 30_000), ("heartbeat_us", 10**9)):
-            whole(name, getattr(self, name), 0, most)
-        whole("states_us", self.states_us, 0, 10**9)
+        for one in fields(self):
+            whole(one.name, getattr(self, one.name), one.metadata["min"], one.metadata["max"])
 
 
 def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:

@@ -1,12 +1,10 @@
-"""The emulated board: acts are played to it as fast as it goes, or any touch in real time and over UDP."""
+"""The emulated board: plays acts as fast as possible, or any touch in real time over UDP."""
 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -14,16 +12,16 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._base.arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
-from taxel._base.arguments import path as checked_path
+from taxel._base.options import with_options
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence
-from taxel.simulate.board import Version2, fitting, reading
+from taxel.simulate.board import fitting, reading
 from taxel.simulate.circuit import Circuit
+from taxel.simulate.options import EmulateOptions
 from taxel.simulate.pipe import Pipe
 from taxel.simulate.replay import Replay
-from taxel.simulate.trouble import Faults, Flaws
 from taxel.spikes import to_ms
 from taxel.wire import Registers
 
@@ -246,146 +244,110 @@ def play(
     return Played(Events._from_parts(events), datagrams, words, taken)
 
 
-def emulate(
-    to: str,
-    touch: Iterable[Act] | Replay | Pipe,
-    *,
-    seed: int = 0,
-    preset: str | None = None,
-    registers: Registers | None = None,
-    tare_ms: float = 50.0,
-    array: Array | None = None,
-    sensor: Mapping[str, float] | None = None,
-    wire: Literal[1, 2] | None = None,
-    previous: Literal["last_sent", "last_sample"] = "last_sent",
-    intensity: Literal["value", "difference", "nothing"] = "value",
-    version_2: Version2 | None = None,
-    circuit: Circuit | None = None,
-    asynchronous: bool = False,
-    flaws: Flaws | None = None,
-    faults: Faults | None = None,
-    reset_every_s: float | None = None,
-    drift_ppm: float = 0.0,
-    control: str | None = None,
-    line: str | os.PathLike[str] | None = None,
-    baud: int = 115_200,
-    sync: str | os.PathLike[str] | None = None,
-    overwrite: bool = False,
-    source_port: int = 0,
-    begun: Callable[[str | None], None] = lambda _: None,
-    watch: Callable[[EmulatorReport], None] = lambda _: None,
-    touched: Callable[[list[Contact]], None] = lambda _: None,
-) -> EmulatorReport:
+@with_options(EmulateOptions)
+def emulate(options: EmulateOptions) -> EmulatorReport:
     """Play a touch to an emulated board in real time, and send its datagrams by UDP.
+
+    Of acts the board arms after the first frame, sets the noise floor to 0 for `tare_ms`, marks a start, and at the end
+    a stop.
 
     Parameters
     ----------
     to : str
-        Address and port, as "127.0.0.1:5208".
+        Address and port to send to, as "127.0.0.1:5208".
     touch : iterable of Scene, Silence, Pictures; Replay; or Pipe
-        The touch. Acts may be without an end: each is worked out while those before it are played. Of acts the
-        board arms after the first frame, is tared with a noise floor of 0 for `tare_ms`, marks a start, and at the end
-        a stop.
+        The touch. An iterable of acts may be endless: each act is computed while those before it are played.
     seed : int, 0 or more
+        Of the spread of the taxels and the noise.
     preset : str, optional
-        As in `play`.
+        A preset of the registers. Default: those of a board of this array at reset.
     registers : Registers, optional
-        What the board holds instead of the preset.
+        The registers of the board, in place of a preset.
     tare_ms : float, ms, 0 to 60000
+        How long the noise floor is 0 before the start marker, where acts are played.
     array : Array, optional
+        The sensor; that of a Replay or a Pipe is its own. Default: 64 x 64 taxels.
     sensor : mapping, optional
-        As in `play`; of a Replay or a Pipe the array is theirs.
+        Parameters that differ from the usual sensor, as in `play`.
     wire : {1, 2}, optional
-        The version of the wire that it speaks; left out, the registers'.
+        Version of the wire. Default: that of the registers.
     previous : {"last_sent", "last_sample"}
+        As in `Board`.
     intensity : {"value", "difference", "nothing"}
         As in `Board`.
     version_2 : Version2, optional
-        How it speaks version 2.
+        How the board speaks version 2.
     circuit : Circuit, optional
-        Lines that its taxels share, settling, comparators with hysteresis; left out, each taxel reads by itself. Of
-        acts its voltage and resistor must be the sensor's; the converter's times are the registers', and flaws come
-        after it. How many frames a second one core then keeps is in the report.
+        Lines that the taxels share, settling, comparators with hysteresis; by default each taxel is read by itself. Of
+        acts its voltage and resistor must be the sensor's. The converter's times are those of the registers, and flaws
+        are applied after it. The report has the frame rate that one core reached.
     asynchronous : bool
-        Each taxel compares by itself, as in `Board`; no circuit, and the registers must hold version 2 of the wire
-        (``wire=2``).
+        Each taxel compares by itself, as in `Board`; no circuit, and version 2 of the wire (``wire=2``).
     flaws : Flaws, optional
-        What is wrong with its taxels.
+        Flaws of the taxels.
     faults : Faults, optional
-        What the network does to its datagrams.
+        Faults of the network.
     reset_every_s : float, s, optional
-        The board is reset so often, by its own clock.
-    drift_ppm : float, parts per million, share of the time
-        How much faster its clock runs than this machine's.
+        Interval between resets of the board, by its own clock. Default: none.
+    drift_ppm : float, parts per million, from -100000 to 100000
+        How much faster the board's clock runs than this machine's.
     control : str, optional
-        Address and port where the board takes commands by TCP; port 0 finds a free one.
+        Address and port where the board accepts commands by TCP; port 0 finds a free one.
     line : path, optional
-        A serial line: a link of this name to a pseudo-terminal, at `baud` and no faster.
-    baud : int, from 300 to 4000000
+        A serial line for commands: a link of this name to a pseudo-terminal, with the throughput of `baud`.
+    baud : int, bits/s, from 300 to 4000000
+        Baud rate of `line`.
     sync : path, optional
-        A new file, or a pipe that is there: the sync line, a line an edge: board time (us), 1 or 0, host time (ns).
+        A new file, or an existing pipe, for the sync line: for each edge a line with board time (us), 1 or 0, host time
+        (ns).
     overwrite : bool
         Whether an existing file `sync` may be replaced.
-    source_port : int, from 0 to 65535
-        The UDP port that it sends from; 0 finds a free one.
+    source_port : int, 0 to 65535
+        The UDP port to send from; 0 finds a free one.
     begun : function, optional
-        Called with the address of `control` just before the first frame.
+        Called with the address of `control`, or None, just before the first frame.
     watch : function, optional
-        Called with a report ten times a second.
+        Called with an `EmulatorReport` ten times a second.
     touched : function, optional
-        Called before `watch` with touches of acts that were worked out since; us of the board's clock.
+        Called before `watch` with the touches (`Contact`, us of the board's clock) of acts that were computed since.
 
     Returns
     -------
-    EmulatorReport : also how late frames were, which is where a machine shows that it cannot hold the board's rate
+    EmulatorReport
+        With the delays of the frames, from which it is known whether the machine can hold the board's rate.
 
     Raises
     ------
-    As in `play`; OSError where a socket, line or file cannot be had.
+    SceneError : an act or a sensor that makes no sense
+    ProblemError : options that make no sense, or a circuit of another voltage or resistor
+    DeviceError : the array has more lines than the preset, or that version of the wire, reads
+    OSError : a socket, line or file cannot be opened
+
+    Examples
+    --------
+    >>> report = emulate("127.0.0.1:9", [Silence(30.0)], tare_ms=10.0)
+    >>> report.frames > 0, report.resets
+    (True, 0)
     """
-    felt: Any
-    if isinstance(touch, Replay | Pipe):
-        sensed, acts = touch.array, None
-        held = touch.registers(preset) if registers is None else registers
-        felt = touch._touch(instance("registers", held, Registers))
-    else:
-        sensed, acts = Array._of(array), _checked(touch, Array._of(array))
-        held = fitting(preset, sensed) if registers is None else registers
-        felt = acts
-    held = instance("registers", held, Registers)
-    if wire is not None:
-        held = held.replace(wire_version=whole("wire", wire, 1, 2))
-    options = {
-        "registers": held._held,
-        "tare_ms": None if acts is None else number("tare_ms", tare_ms),
-        "previous": text("previous", previous, ("last_sent", "last_sample")),
-        "intensity": text("intensity", intensity, ("value", "difference", "nothing")),
-        "version_2": asdict(instance("version_2", version_2 or Version2(), Version2)),
-        "control": None if control is None else text("control", control),
-        "line": None if line is None else (str(Path(checked_path("line", line))), whole("baud", baud, 300, 4_000_000)),
-        "sync": None if sync is None else (str(Path(checked_path("sync", sync))), bool(overwrite)),
-        **reading(circuit, asynchronous),
-        "flaws": None if flaws is None else instance("flaws", flaws, Flaws)._parts(),
-        "faults": None if faults is None else instance("faults", faults, Faults)._parts(),
-        "reset_every_s": None if reset_every_s is None else number("reset_every_s", reset_every_s),
-        "drift_ppm": number("drift_ppm", drift_ppm),
-        "source_port": whole("source_port", source_port, 0, 65_535),
-    }
+    options = options.completed()
+    touch, sensed = options.touch, Array._of(options.array)
+    registers = instance("registers", options.registers, Registers)
+    felt: Any = touch._touch(registers) if isinstance(touch, Replay | Pipe) else _checked(touch, sensed)
 
     def tell(said: str, contacts: list[Any]) -> None:
         if contacts:
-            touched([Contact(*contact) for contact in contacts])
-        watch(EmulatorReport._from_json(said))
+            options.touched([Contact(*contact) for contact in contacts])
+        options.watch(EmulatorReport._from_json(said))
 
-    callback("watch", watch), callback("touched", touched)
+    callback("watch", options.watch), callback("touched", options.touched)
     report = _core.emulate(
-        text("to", to),
+        text("to", options.to),
         sensed._parts(),
-        parameters({} if sensor is None else mapping("sensor", sensor)),
-        whole("seed", seed, 0),
+        parameters({} if options.sensor is None else mapping("sensor", options.sensor)),
+        whole("seed", options.seed, 0),
         felt,
-        parameters(options),
-        callback("begun", begun),
+        parameters(options.for_rust()),
+        callback("begun", options.begun),
         tell,
     )
     return EmulatorReport._from_json(report)

@@ -6,7 +6,7 @@ import json
 import os
 from typing import IO, Any
 
-from taxel._base.arguments import number, whole
+from taxel._base.arguments import number, shown, whole
 from taxel._core import DeviceError, FormatError, ProblemError
 from taxel.array import Array
 from taxel.wire import Registers
@@ -39,7 +39,10 @@ class Pipe:
     """
 
     def __init__(self, source: IO[bytes], noise_floor: int = 3) -> None:
-        self._descriptor, self._ahead = source.fileno(), b""
+        try:
+            self._descriptor, self._ahead = source.fileno(), b""
+        except AttributeError:
+            raise ProblemError(f"source is {shown(source)}: must be a pipe or a file, opened to read bytes") from None
         line = self._line()
         try:
             said = json.loads(line)

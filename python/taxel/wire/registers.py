@@ -14,10 +14,13 @@ from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.wire.command import Command
 
-__all__ = ["FRAME_US", "PRESETS", "Registers", "described"]
+__all__ = ["FRAME_US", "PRESETS", "QUOTED_PRESETS", "Registers", "described"]
 
 #: The names that `Registers.preset` knows.
 PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
+
+#: The names of all presets, for a text.
+QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
 
 #: The fields as registers.toml has them, by name.
 _FIELDS: dict[str, Any] = {field["name"]: field for field in json.loads(_core.registers_fields())}

@@ -101,13 +101,13 @@ impl Play {
     /// # Errors
     ///
     /// As [`Play::arm`]; `Interrupted` where asked to stop.
-    pub fn hear(&self, mut watch: impl FnMut(f64), stop: Stop<'_>) -> Result<Played> {
+    pub fn run(&self, mut watch: impl FnMut(f64), stop: Stop<'_>) -> Result<Played> {
         let Armed { mut board, mut crossed, mut stage, commands } = self.arm(stop)?;
         let version = self.registers.wire_version;
         let mut receiver = Receiver::new(Decoder::new(self.array.clone()), version);
         let mut events = Events::empty(self.array.clone());
         let (mut datagrams, mut bytes) = (0, 0);
-        let hear = |datagram: &[u8]| {
+        let sink = |datagram: &[u8]| {
             receiver.push(datagram, None, &mut events);
             datagrams += 1;
             bytes += datagram.len() as u64;
@@ -130,7 +130,7 @@ impl Play {
             }
             Ok(more)
         };
-        board.play(touch, &commands, hear, stop)?;
+        board.play(touch, &commands, sink, stop)?;
         let words = if version == 1 { bytes / WORD_BYTES as u64 } else { 0 };
         Ok(Played { events, datagrams, words, bytes, narrow })
     }

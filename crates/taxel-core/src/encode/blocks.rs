@@ -13,6 +13,11 @@ pub(super) fn blocks(channels: usize) -> usize {
     channels.div_ceil(BLOCK)
 }
 
+/// Values as blocks, of which they fill a whole number.
+pub(super) fn in_blocks(values: &[f32]) -> &[Block] {
+    values.as_chunks().0
+}
+
 /// The next picture, where it follows in memory. It is prefetched a block at a time while this one is read or encoded, as the
 /// processor has few line fill buffers: more prefetches at once would be dropped.
 pub(super) struct Next {

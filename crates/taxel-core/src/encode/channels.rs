@@ -1,6 +1,7 @@
 //! The existing taxels of an array as the channels of an encoder, which of them a picture changes, and which events they take.
 
 use super::blocks::{BLOCK, Block, Next};
+use crate::held::Held;
 use crate::vectors::wide;
 use crate::{Array, EventsView, Result, problem};
 
@@ -87,10 +88,11 @@ impl Channels {
         &self,
         t: i64,
         values: &[f32],
-        held: &mut [Block],
+        held: &mut Held<f32>,
         changed: &mut [bool],
         next: &mut Next,
     ) -> Result<()> {
+        let held = held.values_mut().as_chunks_mut().0;
         if values.len() != self.grid() {
             let (rows, columns) = (self.rows, self.columns);
             return Err(problem!("frame at {t} us: {} values, must be {rows} x {columns}", values.len()));

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next, blocks};
+use super::blocks::{BLOCK, Next, blocks, in_blocks};
 use super::channels::Channels;
 use super::law::Law;
 use super::loaded::Loaded;
@@ -11,6 +11,7 @@ use super::stream::Stream;
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
+use crate::held::Held;
 use crate::spikes::ms;
 use crate::{Array, EventsView, Result, Spike, problem};
 
@@ -75,7 +76,7 @@ impl Law for ContactArea {
             levels: self.levels.clone(),
             loaded: Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?,
             said: 0,
-            held: vec![[0.0; BLOCK]; blocks(array.len())],
+            held: Held::all(blocks(array.len()) * BLOCK, 0.0),
             changed: vec![false; blocks(array.len())],
             // Place by place: which taxels exist is in `loaded`.
             channels: Channels::new(&Array { exists: None, ..array.clone() }),
@@ -102,7 +103,7 @@ struct Area {
     loaded: Loaded,
     /// The area at the end of the last stamp.
     said: u32,
-    held: Vec<Block>,
+    held: Held<f32>,
     changed: Vec<bool>,
     channels: Channels,
     source: Source,
@@ -164,7 +165,7 @@ impl Stream for Area {
             if intensity.present[k] {
                 let place = events.array.index(events.x[k], events.y[k]);
                 let value = f32::from(intensity.ticks[k]);
-                self.held[place / BLOCK][place % BLOCK] = value;
+                self.held.set(place, value);
                 self.loaded.take(place, value);
             }
         }
@@ -177,18 +178,18 @@ impl Stream for Area {
         match self.source {
             // The next picture is looked at there anew.
             Source::Frames { .. } => self.changed[place / BLOCK] = true,
-            _ => self.loaded.take(place, self.held[place / BLOCK][place % BLOCK]),
+            _ => self.loaded.take(place, self.held.values()[place]),
         }
     }
 
     fn rest(&self, place: usize) -> Option<f64> {
-        Some(self.loaded.rest(place)).filter(|rest| rest.is_finite())
+        self.loaded.rest(place)
     }
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
         self.source.frame(t)?;
         self.channels.load(t, values, &mut self.held, &mut self.changed, &mut Next::after(values))?;
-        for (block, values) in self.held.iter().enumerate() {
+        for (block, values) in in_blocks(self.held.values()).iter().enumerate() {
             if std::mem::take(&mut self.changed[block]) {
                 self.loaded.take_block(block, values);
             }

@@ -2,6 +2,7 @@
 
 use super::blocks::{BLOCK, Block, blocks};
 use super::tare::Tare;
+use crate::rest::{Rest, touched_from};
 use crate::vectors::wide;
 use crate::{Array, Result, problem};
 
@@ -33,8 +34,7 @@ pub(super) struct Loaded {
     /// From which value on each place is loaded; infinite where it has no rest.
     from: Vec<Block>,
     noise_floor: f64,
-    /// By place; infinite where none is known.
-    rest: Vec<f64>,
+    rest: Rest<f64>,
     /// 1 where a place is loaded.
     loaded: Vec<[u32; BLOCK]>,
     /// How many neighbours of each place are loaded.
@@ -49,33 +49,40 @@ impl Loaded {
         let Some(tare) = tare else {
             return Err(problem!("{what} without a tare: take one at rest and give it to the encoder"));
         };
-        let rests = tare.rests(array)?;
-        let n = blocks(array.len());
+        let (rest, n) = (tare.rest_of(array)?, blocks(array.len()));
         let mut fresh = Self {
             rows: usize::from(array.rows),
             columns: usize::from(array.columns),
             loaded: vec![[0; BLOCK]; n],
             from: vec![[f32::INFINITY; BLOCK]; n],
             noise_floor,
-            rest: vec![f64::INFINITY; array.len()],
+            rest,
             neighbours: vec![0; array.len()],
             area: 0,
         };
-        for (place, &rest) in rests.iter().enumerate() {
-            fresh.set_rest(place, rest);
-        }
+        (0..array.len()).for_each(|place| fresh.rest_changed(place));
         Ok(fresh)
     }
 
     /// Gives a place another rest; its value above rest must be computed again.
     pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
-        self.rest[place] = rest;
-        self.from[place / BLOCK][place % BLOCK] = round_up(rest + self.noise_floor + 0.5);
+        self.rest.set(place, rest);
+        self.rest_changed(place);
     }
 
-    /// What a place rests at; infinite where that is not known.
-    pub(super) fn rest(&self, place: usize) -> f64 {
-        self.rest[place]
+    fn rest_changed(&mut self, place: usize) {
+        let from = touched_from(self.rest.values()[place], self.noise_floor);
+        self.from[place / BLOCK][place % BLOCK] = round_up(from);
+    }
+
+    /// What a place rests at; `None` where that is not known.
+    pub(super) fn rest(&self, place: usize) -> Option<f64> {
+        Some(self.rest.values()[place]).filter(|rest| rest.is_finite())
+    }
+
+    /// How far a value stands above a place's rest.
+    pub(super) fn above(&self, place: usize, value: f32) -> f64 {
+        self.rest.above(place, f64::from(value))
     }
 
     /// How many taxels count.

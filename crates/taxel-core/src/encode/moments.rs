@@ -240,7 +240,7 @@ impl Passing {
         for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.loaded.any(block)) {
             for (place, &value) in (block * BLOCK..self.places).zip(values) {
                 if self.loaded.counts(place) {
-                    let above = f64::from(value) - self.loaded.rest(place);
+                    let above = self.loaded.above(place, value);
                     total += above;
                     peak = peak.max(above);
                     x += above * (place % self.columns) as f64;
@@ -325,7 +325,7 @@ impl Rule for Passing {
     }
 
     fn rest(&self, channel: usize) -> Option<f64> {
-        Some(self.loaded.rest(channel)).filter(|rest| rest.is_finite())
+        self.loaded.rest(channel)
     }
 
     fn idle(&self) -> bool {

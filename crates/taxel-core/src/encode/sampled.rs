@@ -3,13 +3,15 @@
 //! A [`Rule`] knows one encoder's law and nothing of events, pieces or order; [`Sampled`] brings it the samples. What
 //! did not change since the last sample is known by block, so a rule need not look at it.
 
-use super::blocks::{BLOCK, Block, Next, blocks};
+use super::blocks::{BLOCK, Block, Next, blocks, in_blocks};
 use super::channels::{Channels, FARTHEST};
 use super::law::Law;
 use super::periods::micros;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::events::FARTHEST_BACK_US;
+use crate::held::Held;
+use crate::rest::Rest;
 use crate::spikes::{ms, us};
 use crate::vectors::wide;
 use crate::{Array, EventsView, Result, Spike, problem};
@@ -136,7 +138,7 @@ pub(super) struct Sampled<R> {
     trains: usize,
     signed: bool,
     latency_ms: f64,
-    held: Vec<Block>,
+    held: Held<f32>,
     changed: Vec<bool>,
     quiet: bool,
     source: Source,
@@ -152,17 +154,16 @@ pub(super) struct Sampled<R> {
 /// What stands above rest, for a rule that feels held pressure: 0 where a taxel reads less, or where its rest is not known.
 #[derive(Clone)]
 struct Above {
-    /// Of each place; infinite where it is not known.
-    rests: Vec<f64>,
+    rest: Rest<f64>,
     /// What each place reads.
-    read: Vec<f32>,
+    held: Held<f32>,
     /// A picture of what stands above.
     picture: Vec<f32>,
 }
 
 impl Above {
     fn of(&self, place: usize) -> f32 {
-        (f64::from(self.read[place]) - self.rests[place]).max(0.0) as f32
+        self.rest.above(place, f64::from(self.held.values()[place])) as f32
     }
 }
 
@@ -178,7 +179,7 @@ impl<R: Rule> Sampled<R> {
             trains: law.trains(array),
             signed: law.signed(),
             latency_ms: law.latency_ms(),
-            held: vec![[0.0; BLOCK]; n],
+            held: Held::all(n * BLOCK, 0.0),
             changed: vec![false; n],
             quiet: true,
             source: Source::Unknown,
@@ -193,8 +194,8 @@ impl<R: Rule> Sampled<R> {
     /// Gives the rule values above rest, where there is a tare.
     pub(super) fn above(mut self, tare: Option<&Tare>, array: &Array) -> Result<Self> {
         if let Some(tare) = tare {
-            let blank = vec![0.0; array.len()];
-            self.above = Some(Above { rests: tare.rests(array)?, read: blank.clone(), picture: blank });
+            let (rest, n) = (tare.rest_of(array)?, array.len());
+            self.above = Some(Above { rest, held: Held::all(n, 0.0), picture: vec![0.0; n] });
         }
         Ok(self)
     }
@@ -206,10 +207,11 @@ impl<R: Rule> Sampled<R> {
     }
 
     fn sample(&mut self, t: i64, mut next: Next, out: &mut Vec<Spike>) {
+        let held = in_blocks(self.held.values());
         if self.begun {
-            take_sample(&mut self.rule, t, &self.held, &self.changed, &mut next, out);
+            take_sample(&mut self.rule, t, held, &self.changed, &mut next, out);
         } else {
-            self.rule.begin(t, &self.held, out);
+            self.rule.begin(t, held, out);
             self.begun = true;
         }
         self.last = t;
@@ -275,14 +277,13 @@ impl<R: Rule> Stream for Sampled<R> {
             {
                 let read = f32::from(intensity.ticks[k]);
                 let value = self.above.as_mut().map_or(read, |above| {
-                    above.read[place] = read;
+                    above.held.set(place, read);
                     above.of(place)
                 });
-                let held = &mut self.held[channel / BLOCK][channel % BLOCK];
+                let before = self.held.set(channel, value);
                 if self.begun && events.is_repaired(k) {
-                    self.rule.repair(channel, *held, value);
+                    self.rule.repair(channel, before, value);
                 }
-                *held = value;
                 self.changed[channel / BLOCK] = true;
                 self.quiet = false;
             }
@@ -308,8 +309,8 @@ impl<R: Rule> Stream for Sampled<R> {
         }
         self.rule.set_rest(channel, rest);
         if let Some(above) = &mut self.above {
-            above.rests[place] = rest;
-            self.held[channel / BLOCK][channel % BLOCK] = above.of(place);
+            above.rest.set(place, rest);
+            self.held.set(channel, above.of(place));
         }
         self.changed[channel / BLOCK] = true;
         self.quiet = false;
@@ -317,7 +318,7 @@ impl<R: Rule> Stream for Sampled<R> {
 
     fn rest(&self, place: usize) -> Option<f64> {
         let channel = self.channels.of_place(place)?;
-        let above = self.above.as_ref().map(|above| above.rests[place]).filter(|rest| rest.is_finite());
+        let above = self.above.as_ref().map(|above| above.rest.values()[place]).filter(|rest| rest.is_finite());
         above.or_else(|| self.rule.rest(channel))
     }
 
@@ -330,8 +331,8 @@ impl<R: Rule> Stream for Sampled<R> {
         let (now, later) = (Next::after(values), Next::unknown());
         let (mut now, later) = if R::ASKS { (later, now) } else { (now, later) };
         let values = match &mut self.above {
-            Some(above) if values.len() == above.read.len() => {
-                above.read.copy_from_slice(values);
+            Some(above) if values.len() == above.picture.len() => {
+                above.held.values_mut().copy_from_slice(values);
                 for (place, &read) in values.iter().enumerate() {
                     // What is not finite stays so, and is refused.
                     above.picture[place] = if read.is_finite() { above.of(place) } else { read };

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::held::Held;
+use crate::rest::{Rest, Value};
 use crate::{Array, EventsView, FramesView, Result, problem, reading};
 
 /// The rest of each taxel: the mean by time of its held values over a stretch at rest.
@@ -47,12 +49,12 @@ impl Tare {
         }
     }
 
-    /// What each place of an array rests at; infinite where no taxel exists or its rest is not known.
+    /// What each taxel of an array rests at; not known where it does not exist.
     ///
     /// # Errors
     ///
     /// `Problem` where the tare is of an array of another shape.
-    pub(super) fn rests(&self, array: &Array) -> Result<Vec<f64>> {
+    pub(super) fn rest_of(&self, array: &Array) -> Result<Rest<f64>> {
         let (of, to) = (&self.array, array);
         if (of.rows, of.columns) != (to.rows, to.columns) {
             return Err(problem!(
@@ -64,8 +66,8 @@ impl Tare {
             ));
         }
         let exists = |place: usize| array.exists.as_ref().is_none_or(|exists| exists[place]);
-        let of_place = |(place, rest): (usize, &Option<f64>)| rest.filter(|_| exists(place)).unwrap_or(f64::INFINITY);
-        Ok(self.rest.iter().enumerate().map(of_place).collect())
+        let of_place = |(place, rest): (usize, &Option<f64>)| rest.filter(|_| exists(place)).unwrap_or(f64::NO_REST);
+        Ok(Rest::measured(self.rest.iter().enumerate().map(of_place).collect()))
     }
 
     /// Takes a tare from events in order of time: of `start` to `stop` us, or of all of them.
@@ -154,35 +156,30 @@ pub struct TareBuilder {
     array: Array,
     start: Option<i64>,
     present: i64,
-    taxels: Vec<Held>,
+    held: Held<f64>,
+    integrals: Vec<Integral>,
 }
 
-/// One taxel's held value, and its integral over time since the start.
+/// The integral of one taxel's held value over time since the start.
 #[derive(Clone, Copy, Default)]
-struct Held {
-    value: f64,
-    /// Since when it holds, us; `None` before its first event.
-    since: Option<i64>,
+struct Integral {
+    /// Up to when it goes, us; `None` before the taxel's first event.
+    until: Option<i64>,
     /// value times us.
     area: f64,
     /// us.
     time: f64,
 }
 
-impl Held {
-    fn hold_until(&mut self, t: i64) {
-        if let Some(since) = self.since {
-            let time = (t - since).max(0) as f64;
-            self.area += self.value * time;
+impl Integral {
+    /// Goes on to `t` us, up to which the taxel held `value`.
+    fn extend(&mut self, t: i64, value: f64) {
+        if let Some(until) = self.until {
+            let time = (t - until).max(0) as f64;
+            self.area += value * time;
             self.time += time;
-            self.since = Some(t.max(since));
         }
-    }
-
-    fn take(&mut self, t: i64, value: f64) {
-        self.hold_until(t);
-        self.value = value;
-        self.since = Some(self.since.map_or(t, |since| since.max(t)));
+        self.until = self.until.max(Some(t));
     }
 }
 
@@ -190,7 +187,8 @@ impl TareBuilder {
     /// Begins at `start` us, or with what comes first; values that came before still hold at the start.
     #[must_use]
     pub fn new(array: &Array, start: Option<i64>) -> Self {
-        Self { taxels: vec![Held::default(); array.len()], array: array.clone(), start, present: i64::MIN }
+        let (held, integrals) = (Held::all(array.len(), 0.0), vec![Integral::default(); array.len()]);
+        Self { array: array.clone(), start, present: i64::MIN, held, integrals }
     }
 
     /// When the stretch begins, us; `None` while nothing came and no start was given.
@@ -218,8 +216,9 @@ impl TareBuilder {
             self.present = events.t[k].max(self.present);
             let start = *self.start.get_or_insert(self.present);
             if intensity.present[k] {
-                let taxel = &mut self.taxels[self.array.index(events.x[k], events.y[k])];
-                taxel.take(self.present.max(start), f64::from(intensity.ticks[k]));
+                let taxel = self.array.index(events.x[k], events.y[k]);
+                let before = self.held.set(taxel, f64::from(intensity.ticks[k]));
+                self.integrals[taxel].extend(self.present.max(start), before);
             }
         }
         Ok(())
@@ -231,8 +230,8 @@ impl TareBuilder {
     ///
     /// `Problem` where the picture has another size, holds NaN or comes out of order.
     pub fn push_frame(&mut self, t: i64, values: &[f32]) -> Result<()> {
-        if values.len() != self.taxels.len() {
-            return Err(problem!("frame at {t} us: {} values, must be {}", values.len(), self.taxels.len()));
+        if values.len() != self.integrals.len() {
+            return Err(problem!("frame at {t} us: {} values, must be {}", values.len(), self.integrals.len()));
         }
         if t < self.present {
             return Err(problem!("frame at {t} us after {} us: times ascend", self.present));
@@ -242,8 +241,9 @@ impl TareBuilder {
         }
         self.present = t;
         let start = *self.start.get_or_insert(t);
-        for (taxel, &value) in self.taxels.iter_mut().zip(values) {
-            taxel.take(t.max(start), f64::from(value));
+        for (taxel, &value) in values.iter().enumerate() {
+            let before = self.held.set(taxel, f64::from(value));
+            self.integrals[taxel].extend(t.max(start), before);
         }
         Ok(())
     }
@@ -261,13 +261,13 @@ impl TareBuilder {
         if stop < self.present {
             return Err(problem!("tare to {stop} us: something came at {} us, after it", self.present));
         }
-        for taxel in &mut self.taxels {
-            taxel.hold_until(stop);
+        for (integral, &held) in self.integrals.iter_mut().zip(self.held.values()) {
+            integral.extend(stop, held);
         }
         let exists = |place: usize| self.array.exists.as_ref().is_none_or(|e| e[place]);
         let rest: Vec<Option<f64>> = (0..)
-            .zip(&self.taxels)
-            .map(|(place, taxel)| (taxel.time > 0.0 && exists(place)).then(|| taxel.area / taxel.time))
+            .zip(&self.integrals)
+            .map(|(place, integral)| (integral.time > 0.0 && exists(place)).then(|| integral.area / integral.time))
             .collect();
         if rest.iter().all(Option::is_none) {
             return Err(problem!("tare from {start} to {stop} us: no event came"));

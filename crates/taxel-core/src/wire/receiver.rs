@@ -3,26 +3,26 @@
 use crate::wire::decoder::{Counts, Decoder};
 use crate::wire::silence::silence;
 use crate::wire::v1::{FIRST, WORD_BYTES};
-use crate::wire::v2::{self, Header, Heard};
+use crate::wire::v2::{self, Header, Outcome};
 use crate::{Array, Events};
 
 /// For so long nothing but whole words of version 1 must come before a sender of version 2 counts as changed, us.
 const CHANGED_AFTER_US: i64 = 1_000_000;
 
-/// What a datagram held beside its events.
+/// What a datagram reports besides its events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Took {
-    /// The version that the sender speaks after it.
+pub struct DatagramInfo {
+    /// The version of the sender after it.
     pub version: u8,
-    /// Whether that changed by it.
+    /// Whether it changed the version.
     pub changed: bool,
     /// Whether the board was reset before it.
     pub reset: bool,
-    /// Nothing before this comes any more with a higher number, us (version 2).
+    /// No later datagram has an event before this time, us (version 2).
     pub until: Option<i64>,
-    /// Numbers that have not come so far (version 2).
+    /// Missing sequence numbers so far (version 2).
     pub missing: u64,
-    /// The latest time that was received, us.
+    /// The latest received time, us.
     pub now: Option<i64>,
 }
 
@@ -106,17 +106,17 @@ impl Receiver {
     }
 
     /// Takes a datagram; appends its events.
-    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Took {
+    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> DatagramInfo {
         let (before, heard) = (self.version, out.len());
-        let mut took = Took::default();
+        let mut info = DatagramInfo::default();
         let second = datagram.first() == Some(&v2::MAGIC) && (self.version == 2 || Header::read(datagram).is_ok());
         if second {
             if self.version == 1 {
                 self.change(2, out);
             }
-            if let Heard::Intact { until, missing, reset } = self.two.push(datagram, arrived, out) {
+            if let Outcome::Intact { until, missing, reset } = self.two.push(datagram, arrived, out) {
                 self.whole_since = None;
-                (took.until, took.missing, took.reset) = (until, missing, reset);
+                (info.until, info.missing, info.reset) = (until, missing, reset);
             }
         } else if self.version == 2 && !self.changed_back(datagram, arrived) {
             self.refused += datagram.len() as u64;
@@ -134,10 +134,10 @@ impl Receiver {
             let latest = self.latest.map_or(t, |(latest, _)| latest.max(t));
             self.latest = Some((latest, arrived));
         }
-        took.now = if self.version == 2 { Some(self.two.latest()) } else { self.latest.map(|(t, _)| t) };
-        took.version = self.version;
-        took.changed = self.version != before;
-        took
+        info.now = if self.version == 2 { Some(self.two.latest()) } else { self.latest.map(|(t, _)| t) };
+        info.version = self.version;
+        info.changed = self.version != before;
+        info
     }
 
     /// Ends the stream: gives what waits.
@@ -255,9 +255,9 @@ mod tests {
             speak(&mut board, version);
             for _ in 0..6000 {
                 play(&mut board, 1, |datagram| {
-                    let took = receiver.push(datagram, Some(now), &mut events);
-                    if took.changed {
-                        changes.push((took.version, now));
+                    let info = receiver.push(datagram, Some(now), &mut events);
+                    if info.changed {
+                        changes.push((info.version, now));
                     }
                 });
                 now += 192;

@@ -25,7 +25,7 @@ mod packer;
 mod stream;
 
 pub use counts::{Counts, Status};
-pub use decoder::{Decoder, Heard, stream_rows};
+pub use decoder::{Decoder, Outcome, stream_rows};
 pub use encode::{Encoded, encode};
 pub use packer::{Packer, Settings};
 pub use stream::{Decoded, StreamReader, decode};

@@ -2,7 +2,7 @@
 
 use rand::{SeedableRng, rngs::StdRng};
 use taxel_core::board::Board;
-use taxel_core::wire::v2::{Decoder, Header, Heard, Kind, Packer, Settings};
+use taxel_core::wire::v2::{Decoder, Header, Kind, Outcome, Packer, Settings};
 use taxel_core::wire::{Decoder as Decoder1, Registers};
 use taxel_core::{Array, Events};
 
@@ -52,7 +52,7 @@ fn the_host_decodes_the_events_that_the_board_sent() {
                         events.t[before..].iter().all(|&t| t >= until),
                         "seed {seed}: an event before the promised time"
                     );
-                    let Heard::Intact { until: promised, missing: 0, reset: false } = heard else {
+                    let Outcome::Intact { until: promised, missing: 0, reset: false } = heard else {
                         panic!("{heard:?}")
                     };
                     until = until.max(promised.unwrap_or(0));
@@ -124,7 +124,7 @@ fn a_slow_board_still_promises_and_silence_has_its_heartbeats() {
     for k in 0..20_u16 {
         board
             .frame(&[if k == 3 { 50 } else { 0 }; 16], |datagram| {
-                if let Heard::Intact { until: Some(u), .. } =
+                if let Outcome::Intact { until: Some(u), .. } =
                     decoder.push(datagram, None, &mut Events::empty(array.clone()))
                 {
                     until = until.max(u);

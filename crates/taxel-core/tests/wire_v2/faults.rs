@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
 use taxel_core::board::{Board, IntensityWord, Version2};
 use taxel_core::wire::Registers;
-use taxel_core::wire::v2::{Decoder, Header, Heard};
+use taxel_core::wire::v2::{Decoder, Header, Outcome};
 use taxel_core::{Array, Events};
 
 use crate::scenes::{board, rows, scene};
@@ -58,9 +58,9 @@ fn each_intact_datagram_is_decoded_once_whatever_the_network_does() {
         let (mut once, mut refused) = (vec![], 0);
         for (k, datagram) in &arriving {
             match decoder.push(datagram, None, &mut events) {
-                Heard::Intact { .. } => once.push(*k),
-                Heard::Repeated => assert!(once.contains(k)),
-                Heard::Refused(_) => refused += 1,
+                Outcome::Intact { .. } => once.push(*k),
+                Outcome::Repeated => assert!(once.contains(k)),
+                Outcome::Refused(_) => refused += 1,
             }
         }
         assert_eq!(refused, hurt);
@@ -136,7 +136,7 @@ fn time_goes_on_after_a_reset_which_is_counted() {
             board
                 .frame(&frame, |datagram| {
                     let heard = decoder.push(datagram, Some(arrived), &mut events);
-                    resets += u64::from(matches!(heard, Heard::Intact { reset: true, .. }));
+                    resets += u64::from(matches!(heard, Outcome::Intact { reset: true, .. }));
                     true
                 })
                 .unwrap();
@@ -162,13 +162,13 @@ fn a_number_drawn_twice_is_a_reset_once() {
         header.write(&[0x05, 0x80], &mut datagram);
         decoder.push(&datagram, None, &mut events)
     };
-    let intact = |heard| matches!(heard, Heard::Intact { .. });
+    let intact = |heard| matches!(heard, Outcome::Intact { .. });
     assert!(intact(hear(70_000, 20_000_000)));
     assert!(intact(hear(70_001, 20_000_192)));
     // After the reset, each once; what comes again stays a repetition, and the old session is over.
     for sequence in 0..5 {
         assert!(intact(hear(sequence, 192 * u64::from(sequence))));
-        assert!(matches!(hear(sequence, 192 * u64::from(sequence)), Heard::Repeated));
+        assert!(matches!(hear(sequence, 192 * u64::from(sequence)), Outcome::Repeated));
     }
     let counts = decoder.counts();
     assert_eq!((counts.intact, counts.repeated, counts.resets, counts.missing), (7, 5, 1, 0));

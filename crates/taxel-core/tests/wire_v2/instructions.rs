@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::Events;
 use taxel_core::vectors::Instructions;
-use taxel_core::wire::v2::{Decoder, Header, Heard};
+use taxel_core::wire::v2::{Decoder, Header, Outcome};
 
 use crate::scenes::{arrays, as_a_network, words};
 
@@ -34,9 +34,9 @@ fn every_set_of_instructions_decodes_the_same() {
         for set in Instructions::ALL.into_iter().filter(|set| set.present()) {
             let mut decoder = Decoder::new(array.clone()).instructions(set).unwrap();
             let mut events = Events::empty(array.clone());
-            let found: Vec<Heard> =
+            let found: Vec<Outcome> =
                 datagrams.iter().map(|datagram| decoder.push(datagram, None, &mut events)).collect();
-            assert!(seed % 2 == 1 || found.iter().all(|heard| matches!(heard, Heard::Intact { .. })));
+            assert!(seed % 2 == 1 || found.iter().all(|heard| matches!(heard, Outcome::Intact { .. })));
             events.view().check().unwrap();
             let heard = (events, decoder.counts(), decoder.held(), found);
             let first = first.get_or_insert_with(|| heard.clone());

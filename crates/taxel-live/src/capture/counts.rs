@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What came and what was lost up to now; see [`crate::capture`] for the sums.
+/// What arrived and what was lost up to now; see [`crate::capture`] for the sums.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Counts {
     /// Receive calls that gave something.

@@ -1,4 +1,5 @@
-//! What another computer received, instead of a socket: parcels in, by this computer's clock, and every loss counted.
+//! Datagrams that another computer received, in place of a socket: reads parcels, converts their times to this computer's clock, and
+//! counts every loss.
 
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -10,14 +11,14 @@ use crate::bridged::Bridged;
 use crate::host_clock::{HostClock, RoundTrip};
 use crate::locked::lock;
 
-/// A bridge sends something each 10 ms: after so long without anything it is gone, or the network between.
+/// A bridge sends a parcel every 10 ms: after this long without one the bridge or the network is down.
 const SILENT: Duration = Duration::from_secs(1);
 
 #[derive(Debug, Clone, Copy)]
 struct Session {
     session: u64,
     number: u64,
-    /// The number of the datagram that comes next if none is missing.
+    /// The number of the next datagram if none is missing.
     next: u64,
     dropped: u64,
     dropped_by_kernel: u64,
@@ -28,11 +29,11 @@ struct FeedState {
     bridged: Bridged,
     clock: HostClock,
     session: Option<Session>,
-    heard: Option<Instant>,
+    received: Option<Instant>,
     batch: Batch,
 }
 
-/// Where parcels of another computer go in; clones go to the same place.
+/// Accepts the parcels of another computer; clones accept them for the same queue.
 #[derive(Debug, Clone)]
 pub struct Feed {
     queue: Arc<Queue>,
@@ -44,18 +45,19 @@ impl Feed {
         Self { queue, state: Arc::default() }
     }
 
-    /// Takes a parcel. False where it begins a session and [`Feed::meet`] was not called: nothing was taken then.
+    /// Queues the datagrams of a parcel. Returns false, and does nothing, where the parcel begins a session and
+    /// [`Feed::begin_session`] was not called for it.
     ///
-    /// What cannot be read, or came before, is counted and left out.
+    /// Parcels that cannot be read, and repeated ones, are counted and ignored.
     pub fn take(&self, parcel: &[u8]) -> bool {
         let mut state = lock(&self.state);
-        let FeedState { bridged, session, heard, batch, clock } = &mut *state;
+        let FeedState { bridged, session, received, batch, clock } = &mut *state;
         let Some(parcel) = Parcel::read(parcel) else {
             bridged.refused += 1;
             return true;
         };
         let Some(offset) = clock.offset() else { return false };
-        if heard.replace(Instant::now()).is_some_and(|before| before.elapsed() >= SILENT) {
+        if received.replace(Instant::now()).is_some_and(|before| before.elapsed() >= SILENT) {
             bridged.silences += 1;
         }
         if session.is_some_and(|known| known.session != parcel.session) {
@@ -86,14 +88,14 @@ impl Feed {
         for (arrived_ns, bytes) in parcel.datagrams() {
             batch.push_arrived(offset.here_ns(arrived_ns), bytes);
         }
-        // The promise holds for a caller who finds the queue empty afterwards.
+        // The promise holds for callers that find the queue empty after this.
         self.queue.put(batch, u64::from(parcel.count > 0), 0);
         self.queue.promise(offset.here_ns(parcel.until_ns()));
         true
     }
 
-    /// Another session begins: a first one, or one after the bridge was begun anew. The clocks are compared anew.
-    pub fn meet(&self) {
+    /// Begins a session: the first one, or one after the bridge was restarted. The clocks are compared again.
+    pub fn begin_session(&self) {
         let mut state = lock(&self.state);
         if state.session.take().is_some() {
             state.bridged.restarts += 1;
@@ -101,25 +103,25 @@ impl Feed {
         state.clock = HostClock::default();
     }
 
-    /// Takes a round trip to the other computer.
+    /// Adds a round trip to the other computer.
     pub fn compare(&self, trip: RoundTrip) {
         lock(&self.state).clock.note(trip);
     }
 
-    /// What came and what was lost up to now.
+    /// Counts of what was received and lost so far.
     #[must_use]
     pub fn bridged(&self) -> Bridged {
         let state = lock(&self.state);
-        let heard = state.heard.is_some_and(|heard| heard.elapsed() < SILENT);
+        let heard = state.received.is_some_and(|received| received.elapsed() < SILENT);
         Bridged { heard, clock: state.clock.offset(), ..state.bridged }
     }
 
-    /// Ends it all because of an error.
-    pub fn fail(&self, said: &str) {
-        self.queue.close(Some(io::Error::other(said.to_owned())));
+    /// Ends the pipeline with an error.
+    pub fn fail(&self, error: &str) {
+        self.queue.close(Some(io::Error::other(error.to_owned())));
     }
 
-    /// Whether the pipeline has ended, and takes no more.
+    /// Whether the pipeline has ended, so that no parcel is read any more.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.queue.stopped_ns().is_some()

@@ -1,7 +1,8 @@
-//! Datagrams as they travel to other computers: as they came, gathered, with what it takes to count every loss.
+//! The format in which datagrams are sent to other computers: unchanged, several in a parcel, with counts from which every loss is
+//! known.
 //!
-//! Everything is little-endian. The transport reads and changes one field, the base time, so that trials can set the
-//! clocks of two computers apart; see docs/bridge.md.
+//! All numbers are little-endian. The transport changes one field, the base time, so that tests can set the clocks of two computers
+//! apart; see docs/bridge.md.
 //!
 //! | bytes | field |
 //! |---|---|
@@ -28,13 +29,13 @@ const HEADER: usize = 64;
 /// Length and time before each datagram, bytes.
 const ENTRY: usize = 6;
 
-/// A parcel is closed when it holds so much, bytes.
+/// A parcel is closed when its body has this length, bytes.
 const FULL: usize = 1 << 18;
 
-/// No parcel is longer, bytes: a full one, and a datagram.
+/// Largest length of a parcel, bytes: a full body and one more datagram.
 pub const LONGEST: usize = FULL + HEADER + ENTRY + (1 << 16);
 
-/// A parcel that came.
+/// A received parcel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Parcel<'a> {
     pub(super) last: bool,
@@ -50,7 +51,7 @@ pub(super) struct Parcel<'a> {
 }
 
 impl<'a> Parcel<'a> {
-    /// Reads a parcel; `None` where it is none, or not whole.
+    /// Reads a parcel; `None` where the bytes are not a whole parcel.
     pub(super) fn read(bytes: &'a [u8]) -> Option<Self> {
         let (head, body) = bytes.split_first_chunk::<HEADER>()?;
         let last = match head[4..8] {
@@ -78,12 +79,12 @@ impl<'a> Parcel<'a> {
         (head[..4] == MAGIC && rest.is_empty() && bytes.len() <= LONGEST).then_some(parcel)
     }
 
-    /// Nothing that arrived before this follows, ns of the other computer's clock.
+    /// All datagrams that arrived before this time have been sent, ns of the other computer's clock.
     pub(super) fn until_ns(&self) -> i64 {
         self.base_ns.saturating_add(i64::from(self.until))
     }
 
-    /// Each datagram with when it arrived, ns of the other computer's clock.
+    /// Each datagram with its arrival time, ns of the other computer's clock.
     pub(super) fn datagrams(&self) -> impl Iterator<Item = (i64, &'a [u8])> {
         let (mut rest, base) = (self.body, self.base_ns);
         std::iter::from_fn(move || {
@@ -94,7 +95,7 @@ impl<'a> Parcel<'a> {
     }
 }
 
-/// When the first datagram of a body came, its bytes, and what follows.
+/// Arrival time and bytes of the first datagram of a body, and the rest of the body.
 fn first(body: &[u8]) -> Option<(i32, &[u8], &[u8])> {
     let (length, body) = body.split_first_chunk()?;
     let (since, body) = body.split_first_chunk()?;
@@ -110,18 +111,18 @@ pub struct Packer {
     base_ns: i64,
     count: u32,
     before: u64,
-    /// The number of the datagram that comes next if none is missing.
+    /// The number of the next datagram if none is missing.
     next: u64,
     dropped: u64,
     body: Vec<u8>,
 }
 
 impl Packer {
-    /// Begins a session after so many datagrams.
+    /// Begins a session after this number of received datagrams.
     #[must_use]
     pub fn after(received: u64) -> Self {
         Self {
-            // The standard library's own source of chance.
+            // A random number from the standard library.
             session: RandomState::new().hash_one(std::process::id()),
             number: 0,
             base_ns: 0,
@@ -139,7 +140,7 @@ impl Packer {
         self.count
     }
 
-    /// Adds a datagram, with its number among those received; gives the parcel before it where it does not fit in.
+    /// Adds a datagram, with its number among those received; returns the previous parcel where the datagram does not fit into it.
     pub fn push(&mut self, number: u64, arrived_ns: i64, bytes: &[u8], dropped_by_kernel: u64) -> Option<Vec<u8>> {
         let since = arrived_ns.checked_sub(self.base_ns).and_then(|since| i32::try_from(since).ok());
         let fits = self.next == number && since.is_some() && self.body.len() + bytes.len() <= FULL;
@@ -148,7 +149,7 @@ impl Packer {
         if self.count == 0 {
             (self.base_ns, self.before) = (arrived_ns, number);
         }
-        // No datagram is longer than a u16 can say, and of a parcel that was begun with it the time fits.
+        // The length of a datagram fits a u16, and the base time of a parcel that begins with it is its own.
         let length = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
         let since = i32::try_from(arrived_ns.saturating_sub(self.base_ns)).unwrap_or(0);
         self.body.extend_from_slice(&length.to_le_bytes());
@@ -159,12 +160,12 @@ impl Packer {
         closed
     }
 
-    /// Closes the parcel, which may be empty: nothing that arrived before `until_ns` follows, as far as it is told.
+    /// Closes the parcel, which may be empty: all datagrams that arrived before `until_ns` are in it or in earlier ones.
     pub fn close(&mut self, until_ns: i64, dropped_by_kernel: u64, last: bool) -> Vec<u8> {
         if self.count == 0 {
             (self.base_ns, self.before) = (until_ns, self.next);
         }
-        // Without a time the parcel promises nothing.
+        // Without a time the parcel makes no promise.
         let until = until_ns.saturating_sub(self.base_ns).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
         let mut parcel = Vec::with_capacity(HEADER + self.body.len());
         parcel.extend_from_slice(&MAGIC);
@@ -183,7 +184,7 @@ impl Packer {
         parcel
     }
 
-    /// A parcel that was closed found no room on the way out: its datagrams are lost here.
+    /// Counts the datagrams of a closed parcel that found no room in the queue as dropped.
     pub fn lost(&mut self, parcel: &[u8]) {
         self.dropped += Parcel::read(parcel).map_or(0, |parcel| u64::from(parcel.count));
     }
@@ -219,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_queue_dropped_and_what_found_no_room_is_told() {
+    fn datagrams_that_a_queue_dropped_are_counted() {
         let mut packer = Packer::after(10);
         assert!(packer.push(10, 0, b"ten", 0).is_none());
         let parcel = packer.push(15, 0, b"fifteen", 0).expect("11 to 14 are missing");

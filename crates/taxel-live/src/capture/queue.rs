@@ -1,4 +1,4 @@
-//! The queue between the receiving thread and the caller who takes datagrams.
+//! The queue between the receiving thread and the caller that reads datagrams.
 
 use std::io;
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -11,15 +11,15 @@ use crate::recording::now_ns;
 /// One datagram of a [`Batch`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Datagram {
-    /// The kernel's stamp when it came, ns of the host's clock since 1970.
+    /// The kernel's time stamp of its arrival, ns of the host's clock since 1970.
     pub arrived_ns: i64,
-    /// How many datagrams came before it; those that our queue dropped leave a gap.
+    /// Number of datagrams that arrived before it; those that this queue dropped leave a gap.
     pub number: u64,
     start: usize,
     end: usize,
 }
 
-/// Datagrams in the order in which they came, in memory that is used again and again.
+/// Datagrams in order of arrival, in memory that is reused.
 #[derive(Debug, Default)]
 pub struct Batch {
     pub(super) bytes: Vec<u8>,
@@ -55,7 +55,7 @@ impl Batch {
         self.bytes.capacity() - self.bytes.len()
     }
 
-    /// Notes that the bytes from `start` on are a message that came at `arrived_ns`, of datagrams of `segment` bytes,
+    /// Adds a message, the bytes from `start` on, that arrived at `arrived_ns`, of datagrams of `segment` bytes,
     /// the last of which may be shorter.
     pub(super) fn note_message(&mut self, start: usize, segment: usize, arrived_ns: i64) {
         let stop = self.bytes.len();
@@ -70,7 +70,7 @@ impl Batch {
         }
     }
 
-    /// Adds a datagram that came at `arrived_ns`.
+    /// Adds a datagram that arrived at `arrived_ns`.
     pub(super) fn push_arrived(&mut self, arrived_ns: i64, bytes: &[u8]) {
         self.push(Datagram { arrived_ns, number: 0, start: 0, end: 0 }, bytes);
     }
@@ -86,32 +86,32 @@ impl Batch {
         self.datagrams.clear();
     }
 
-    /// Whether it holds nothing, or something that came at `ns` or later.
+    /// Whether it is empty, or holds a datagram that arrived at `ns` or later.
     pub(super) fn ends_after(&self, ns: i64) -> bool {
         self.datagrams.last().is_none_or(|last| last.arrived_ns >= ns)
     }
 
-    /// Numbers what it holds.
+    /// Numbers its datagrams.
     fn number_from(&mut self, first: u64) {
         for (number, datagram) in (first..).zip(&mut self.datagrams) {
             datagram.number = number;
         }
     }
 
-    /// Forgets what it holds and makes room for so many bytes.
+    /// Empties it and makes room for this many bytes.
     pub(super) fn begin(&mut self, bytes: usize) {
         self.clear();
         self.bytes.reserve(bytes);
     }
 }
 
-/// Batches take turns: one fills while another is worked on. While the taker is behind, a copy of each byte buys that any number
-/// of small datagrams packs tightly, so that the bound in bytes is also a bound in time.
+/// Two batches alternate: one is filled while the other is read. While the reader is behind, datagrams are copied into one batch, so
+/// that small ones are packed tightly and the limit in bytes is also a limit in time.
 #[derive(Debug)]
 pub(super) struct Queue {
     state: Mutex<Received>,
     came: Condvar,
-    /// When the end was asked for, ns of the host's clock since 1970.
+    /// When the end was requested, ns of the host's clock since 1970.
     stop: OnceLock<i64>,
     limit: usize,
 }
@@ -120,7 +120,7 @@ pub(super) struct Queue {
 struct Received {
     waiting: Batch,
     counts: Counts,
-    /// What is promised of a feed: nothing that arrived before this follows, ns.
+    /// Promise of a feed: every datagram that arrived before this time is in the queue or was read, ns.
     until_ns: Option<i64>,
     closed: bool,
     failed: Option<io::Error>,
@@ -132,7 +132,7 @@ impl Queue {
         Self { state: Mutex::new(state), came: Condvar::new(), stop: OnceLock::new(), limit }
     }
 
-    /// Moves what was received into the waiting batch; what has no room is dropped and counted.
+    /// Moves received datagrams into the waiting batch; those without room are dropped and counted.
     pub(super) fn put(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
         let mut state = self.state();
         let Received { waiting, counts, .. } = &mut *state;
@@ -180,13 +180,13 @@ impl Queue {
         Ok(!batch.is_empty())
     }
 
-    /// Nothing that arrived before this will be put in any more.
+    /// No datagram that arrived before this time will be added any more.
     pub(super) fn promise(&self, until_ns: i64) {
         let mut state = self.state();
         state.until_ns = state.until_ns.max(Some(until_ns));
     }
 
-    /// What was promised, where nothing waits.
+    /// The promised time, where the queue is empty.
     pub(super) fn silent_until(&self) -> Option<i64> {
         let state = self.state();
         state.until_ns.filter(|_| state.waiting.is_empty())
@@ -214,7 +214,7 @@ impl Queue {
         self.stop.get_or_init(now_ns);
     }
 
-    /// When the end was asked for, ns of the host's clock since 1970; none where it was not.
+    /// When the end was requested, ns of the host's clock since 1970; `None` where it was not.
     pub(super) fn stopped_ns(&self) -> Option<i64> {
         self.stop.get().copied()
     }

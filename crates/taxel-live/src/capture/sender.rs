@@ -1,4 +1,4 @@
-//! UDP datagrams out, counted: what the emulated board and the benchmarks send with.
+//! Sends and counts UDP datagrams, for the emulated board and the benchmarks.
 
 use std::io;
 use std::mem::{size_of, zeroed};
@@ -20,7 +20,7 @@ const LARGEST: usize = 65_507;
 /// The kernel takes no longer train (`UDP_MAX_SEGMENTS` of linux/udp.h before 6.9; later kernels take twice that).
 const TRAIN_DATAGRAMS: usize = 64;
 
-/// What was sent, whether anybody listened or not.
+/// Counts of what was sent, whether it was received or not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct SendCounts {
     /// Send calls: trains of datagrams, or single ones.
@@ -78,7 +78,7 @@ impl Sender {
         let mut from = unspecified(to);
         from.set_port(port);
         let socket = UdpSocket::bind(from).map_err(Error::socket(format!("UDP from port {port} to {to}")))?;
-        // Not connected: a connected socket would fail while no receiver is there yet; a board sends all the same.
+        // Not connected: a connected socket fails while there is no receiver, and a board sends regardless.
         let segmenting =
             segment && super::socket::set(socket.as_raw_fd(), libc::SOL_UDP, libc::UDP_SEGMENT, &0).is_ok();
         let counts = SendCounts { segmenting, ..SendCounts::default() };
@@ -151,7 +151,7 @@ impl Sender {
         Ok(())
     }
 
-    /// Sends what still waits.
+    /// Sends the datagrams that wait.
     ///
     /// # Errors
     ///
@@ -169,8 +169,8 @@ impl Sender {
         Ok(())
     }
 
-    /// Says of an error of the system when it is about a datagram that is too long: "message too long", or of a train
-    /// "invalid argument" by older kernels.
+    /// Adds to an error that the datagram is too long where that is its cause: "message too long", or "invalid argument" of a train
+    /// on older kernels.
     fn explained(&self, error: io::Error) -> io::Error {
         let too_long = match error.raw_os_error() {
             Some(libc::EMSGSIZE) => true,
@@ -191,7 +191,7 @@ impl Sender {
         io::Error::new(io::ErrorKind::InvalidInput, text)
     }
 
-    /// The largest packet that the route carries as far as the kernel knows, bytes: it tells for a connected socket.
+    /// The largest packet of the route as far as the kernel knows, bytes; it is known of connected sockets only.
     fn path_mtu(&self) -> Option<usize> {
         let ask = UdpSocket::bind(unspecified(self.to)).ok()?;
         ask.connect(self.to).ok()?;

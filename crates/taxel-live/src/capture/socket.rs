@@ -1,4 +1,4 @@
-//! The kernel's side: a UDP socket that stamps, coalesces and counts.
+//! A UDP socket whose kernel stamps arrivals, merges datagrams and counts drops.
 
 use std::io;
 use std::mem::{size_of, size_of_val, zeroed};
@@ -69,7 +69,7 @@ impl Socket {
         if got.is_ok() { u64::from(bytes[0]) } else { 0 }
     }
 
-    /// Waits until a message is there, no longer than `timeout`; false where none came.
+    /// Waits for a message, at most for `timeout`; false where none arrived.
     pub(super) fn wait(&self, timeout: Duration) -> io::Result<bool> {
         let mut asked = libc::pollfd { fd: self.socket.as_raw_fd(), events: libc::POLLIN, revents: 0 };
         let timeout = libc::timespec {
@@ -88,7 +88,7 @@ impl Socket {
         }
     }
 
-    /// Appends the next message to `batch`, which has room for [`LARGEST`] bytes; false where none is there.
+    /// Appends the next message to `batch`, which has room for [`LARGEST`] bytes; false where there is none.
     pub(super) fn receive(&mut self, batch: &mut Batch) -> io::Result<bool> {
         let start = batch.bytes.len();
         let room = batch.bytes.spare_capacity_mut();
@@ -133,12 +133,12 @@ impl Socket {
                 header = libc::CMSG_NXTHDR(&raw const message, header);
             }
         }
-        // The kernel stamps every message that comes after SO_TIMESTAMPNS; one already queued then has no stamp.
+        // The kernel stamps messages that arrive after SO_TIMESTAMPNS was set; one that was queued before has no stamp.
         batch.note_message(start, segment, arrived_ns.unwrap_or_else(now_ns));
         Ok(true)
     }
 
-    /// Asks the kernel itself: the count that comes with a message says only what was dropped before that message.
+    /// Reads the count from the kernel: the one that comes with a message only counts drops before that message.
     pub(super) fn ask_dropped(&mut self) -> io::Result<()> {
         let mut numbers = [0_u32; MEMINFO_NUMBERS];
         get(self.socket.as_raw_fd(), libc::SO_MEMINFO, &mut numbers)?;
@@ -150,7 +150,7 @@ impl Socket {
     #[allow(clippy::cast_possible_truncation)]
     fn note_dropped(&mut self, total: u32) {
         let more = total.wrapping_sub(self.dropped as u32);
-        // A message may carry an older count than the one asked for last.
+        // A message may carry an older count than the one that was read last.
         if more <= u32::MAX / 2 {
             self.dropped += u64::from(more);
         }
@@ -164,7 +164,7 @@ pub(super) fn set(fd: RawFd, level: c_int, name: c_int, value: &c_int) -> io::Re
     if done == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
-/// One number that the kernel keeps of a socket.
+/// One of the numbers that the kernel stores for a socket.
 pub(super) fn number(fd: RawFd, level: c_int, name: c_int) -> io::Result<c_int> {
     let mut value: c_int = 0;
     let mut length = size_of::<c_int>() as libc::socklen_t;

@@ -8,8 +8,8 @@ use taxel_core::board::Board;
 use super::line::Line;
 use crate::{Error, Result};
 
-/// Reads commands from the connected host. On the TCP port there is one at a time, as a UART has one cable: a new one takes the
-/// place of the old.
+/// Reads commands from the connected host. On the TCP port there is one host at a time, as a UART has one cable: a new connection
+/// replaces the old one.
 #[derive(Debug)]
 pub(super) struct Control {
     listener: Option<(TcpListener, SocketAddr)>,
@@ -37,10 +37,10 @@ impl Control {
 
     /// Sends the line that a board sends at reset.
     pub(super) fn greet(&mut self, board: &Board) {
-        self.say(&board.greeting());
+        self.send(&board.greeting());
     }
 
-    /// Carries out what came and answers; never waits.
+    /// Carries out received commands and answers them; never waits.
     pub(super) fn serve(&mut self, board: &mut Board) {
         if let Some((listener, _)) = &self.listener
             && let Ok((mut cable, _)) = listener.accept()
@@ -50,11 +50,11 @@ impl Control {
             self.cable = ready.is_ok().then_some(cable);
         }
         let faults = board.faults();
-        self.say(&faults);
+        self.send(&faults);
         if let Some(line) = &mut self.line {
             let bytes = line.read();
             let answers = board.command(&bytes);
-            line.say(&answers);
+            line.send(&answers);
         }
         let mut bytes = [0; 256];
         while let Some(cable) = &mut self.cable {
@@ -62,7 +62,7 @@ impl Control {
                 Ok(0) => self.cable = None,
                 Ok(n) => {
                     let lines = board.command(&bytes[..n]);
-                    say(&mut self.cable, &lines);
+                    send(&mut self.cable, &lines);
                 }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return,
                 Err(_) => self.cable = None,
@@ -70,16 +70,16 @@ impl Control {
         }
     }
 
-    fn say(&mut self, lines: &str) {
-        say(&mut self.cable, lines);
+    fn send(&mut self, lines: &str) {
+        send(&mut self.cable, lines);
         if let Some(line) = &mut self.line {
-            line.say(lines);
+            line.send(lines);
         }
     }
 }
 
 /// A status line without a reader is lost, as on a UART; a closed connection is dropped.
-fn say(cable: &mut Option<TcpStream>, lines: &str) {
+fn send(cable: &mut Option<TcpStream>, lines: &str) {
     if let Some(there) = cable
         && let Err(error) = there.write_all(lines.as_bytes())
         && error.kind() != ErrorKind::WouldBlock

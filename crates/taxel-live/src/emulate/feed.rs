@@ -9,16 +9,16 @@ use taxel_core::Stop;
 use super::Touch;
 use crate::{Error, Result};
 
-/// How long to wait for more before the board looks for commands again, ms.
+/// How long to wait for data before the board reads commands again, ms.
 const LOOK_EVERY_MS: i32 = 10;
 
 /// A pipe as a touch. The board's time is the pipe's: a frame a frame.
 #[derive(Debug)]
 pub struct Feed {
     from: File,
-    /// What was read ahead of the frames, as the line before them was looked for.
+    /// Bytes of frames that were read together with the line before them.
     bytes: Vec<u8>,
-    /// A value is divided by 2 so often, so that it fits the ramp.
+    /// Number of bits by which values are shifted right, so that they fit the ramp.
     shift: u32,
     most: u16,
     /// Bytes of a frame.
@@ -69,8 +69,8 @@ impl Touch for Feed {
             if n == 0 {
                 return Ok(false);
             }
-            let said = format!("frame {frame}: ends after {n} bytes, must be {wanted}");
-            return Err(taxel_core::Error::Format(format!("standard input, {said}")).into());
+            let reason = format!("frame {frame}: ends after {n} bytes, must be {wanted}");
+            return Err(taxel_core::Error::Format(format!("standard input, {reason}")).into());
         }
         for (value, bytes) in ticks.iter_mut().zip(self.bytes.chunks_exact(2)) {
             *value = (u16::from_le_bytes([bytes[0], bytes[1]]) >> self.shift).min(self.most);

@@ -1,4 +1,4 @@
-//! A serial line without a wire: a pseudo-terminal under a stable name, as fast as its baud rate and no faster.
+//! An emulated serial line: a pseudo-terminal under a stable name, with the throughput of its baud rate.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -81,7 +81,7 @@ impl Line {
         Ok(Self { ours, _theirs: theirs, link, bytes_per_s, into: 0.0, out: 0.0, looked, waiting })
     }
 
-    /// What came since this was asked last, as far as the line has carried it.
+    /// Bytes that arrived since the last call, at the rate of the line.
     pub(super) fn read(&mut self) -> Vec<u8> {
         self.pass();
         let mut bytes = vec![0; self.into as usize];
@@ -96,8 +96,8 @@ impl Line {
         bytes
     }
 
-    /// Says something; it leaves as fast as the line carries it.
-    pub(super) fn say(&mut self, lines: &str) {
+    /// Sends bytes, at the rate of the line.
+    pub(super) fn send(&mut self, lines: &str) {
         let room = WAITING - self.waiting.len();
         self.waiting.extend(lines.bytes().take(room));
         self.pass();
@@ -117,7 +117,7 @@ impl Line {
     fn pass(&mut self) {
         let passed = self.looked.elapsed().as_secs_f64() * self.bytes_per_s;
         self.looked = Instant::now();
-        // A machine that looks late must not slow the line down for good.
+        // A machine that polls late must not slow the line down permanently.
         let most = GATHERS.max(passed);
         (self.into, self.out) = ((self.into + passed).min(most), (self.out + passed).min(most));
     }
@@ -157,14 +157,14 @@ mod tests {
         });
         assert!(begun.elapsed() >= Duration::from_millis(400), "960 bytes a second, 64 at once: {:?}", begun.elapsed());
         assert!(came.iter().all(|&byte| byte == 7));
-        line.say("ok REG4=0x000000A0\n");
+        line.send("ok REG4=0x000000A0\n");
         until(&mut line, |line| {
-            line.say("");
+            line.send("");
             line.waiting.is_empty()
         });
-        let mut said = [0; 64];
-        let n = host.read(&mut said).expect("an answer");
-        assert!("ok REG4=0x000000A0\n".as_bytes().starts_with(&said[..n]) && n > 0);
+        let mut received = [0; 64];
+        let n = host.read(&mut received).expect("an answer");
+        assert!("ok REG4=0x000000A0\n".as_bytes().starts_with(&received[..n]) && n > 0);
         drop(line);
         assert!(!link.exists());
     }

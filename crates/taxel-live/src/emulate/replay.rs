@@ -14,7 +14,7 @@ enum What {
     Pictures(Vec<u16>),
 }
 
-/// A recording as a touch: each frame holds what had come up to its start, by the recording's clock times a speed.
+/// A recording as a touch: each frame holds what had arrived up to its start, by the recording's clock times a speed.
 #[derive(Debug)]
 pub struct Replay {
     /// us from the first, ascending.

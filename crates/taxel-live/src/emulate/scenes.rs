@@ -22,7 +22,7 @@ pub struct Scenes {
     coming: channel::Receiver<Result<Prepared>>,
     over: bool,
     /// Touches that were not asked for yet.
-    told: usize,
+    reported: usize,
 }
 
 impl Scenes {
@@ -55,14 +55,14 @@ impl Scenes {
             }
         };
         std::thread::Builder::new().name("taxel-scenes".to_owned()).spawn(work).map_err(Error::socket("thread"))?;
-        Ok(Self { stage, coming, over: false, told: 0 })
+        Ok(Self { stage, coming, over: false, reported: 0 })
     }
 
     /// Touches of acts that were made ready since this was asked last, us from the first frame's start.
     pub fn take_contacts(&mut self) -> Vec<Contact> {
         let contacts = self.stage.contacts();
-        let new = contacts[self.told..].to_vec();
-        self.told = contacts.len();
+        let new = contacts[self.reported..].to_vec();
+        self.reported = contacts.len();
         new
     }
 

@@ -40,7 +40,7 @@ impl Sync {
         Ok(sync)
     }
 
-    /// Says how the line stands at a time of the board, us, where that has changed.
+    /// Writes the level of the line at a time of the board, us, where it has changed.
     pub(super) fn follow(&mut self, time_us: f64, high: bool) {
         if high != self.high {
             self.high = high;

@@ -5,8 +5,8 @@ use taxel_core::encode::Zeroing;
 use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::{EventsView, Result};
 
-/// Two copies of a readout. One gets the events that came and nothing else, so its detections are those of the recording. The
-/// other runs ahead of it by the host's clock while nothing comes, and is discarded when something does. So an event that comes
+/// Two copies of a readout. One gets the events that arrived and nothing else, so its detections are those of the recording. The
+/// other runs ahead of it by the host's clock while no data arrive, and is discarded when something does. So an event that comes
 /// later than the silence was assumed to last affects only detections that were output too early.
 pub(super) struct Ahead {
     certain: Box<ReadoutStream>,
@@ -32,7 +32,7 @@ impl Ahead {
         Ok(())
     }
 
-    /// Assumes that nothing comes before `t` us; adds to `out` the detections that follow.
+    /// Assumes that no data arrive before `t` us; adds to `out` the detections that follow.
     pub(super) fn quiet(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
         let ahead = self.ahead.get_or_insert_with(|| self.certain.clone());
         ahead.advance(t, &mut self.found)?;
@@ -46,7 +46,7 @@ impl Ahead {
         self.advance(t - FARTHEST_BACK_US, out)
     }
 
-    /// Knows that nothing comes before `t` us.
+    /// Knows that no data arrive before `t` us.
     pub(super) fn advance(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.certain.advance(t, &mut self.found)?;
         self.settle(out);
@@ -64,7 +64,7 @@ impl Ahead {
         self.certain.rest()
     }
 
-    /// How many events came out of order, or later than a silence that was certain.
+    /// How many events arrived out of order, or later than a silence that was certain.
     pub(super) fn late(&self) -> u64 {
         self.certain.late()
     }

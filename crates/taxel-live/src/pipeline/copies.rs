@@ -1,4 +1,4 @@
-//! Copies for other computers: datagrams as they came, the low-rate picture, detections.
+//! Copies for other computers: datagrams as they arrived, the low-rate picture, detections.
 //!
 //! The decoding thread gathers datagrams into parcels and hands them over where there is room; it never waits. What finds
 //! no room is counted in the parcels that follow.
@@ -9,14 +9,14 @@ use std::time::{Duration, Instant};
 use crossbeam_channel as channel;
 use serde_json::json;
 
-use super::said::Said;
 use super::shared::Shared;
+use super::sink::OutputDetection;
 use crate::capture::{Batch, Packer};
 use crate::recording::now_ns;
 
 /// So long a parcel gathers ...
 pub(super) const GATHER: Duration = Duration::from_millis(5);
-/// ... and after so long without one an empty parcel states up to when nothing came.
+/// ... and after so long without one an empty parcel states up to when nothing arrived.
 const STILL_HERE: Duration = Duration::from_millis(10);
 
 /// From picture to picture.
@@ -33,21 +33,25 @@ pub enum Copied {
     /// What the taxels hold: JSON.
     Picture(Vec<u8>),
     /// A detection: a line of JSON.
-    Said(Vec<u8>),
+    Detection(Vec<u8>),
 }
 
 /// The receiving end.
 pub struct Copies {
     shared: Arc<Shared>,
     parcels: channel::Receiver<Vec<u8>>,
-    said: channel::Receiver<Said>,
+    detections: channel::Receiver<OutputDetection>,
     pictured: Instant,
     decoded: u64,
 }
 
 impl Copies {
-    pub(super) fn new(shared: Arc<Shared>, parcels: channel::Receiver<Vec<u8>>, said: channel::Receiver<Said>) -> Self {
-        Self { shared, parcels, said, pictured: Instant::now(), decoded: 0 }
+    pub(super) fn new(
+        shared: Arc<Shared>,
+        parcels: channel::Receiver<Vec<u8>>,
+        detections: channel::Receiver<OutputDetection>,
+    ) -> Self {
+        Self { shared, parcels, detections, pictured: Instant::now(), decoded: 0 }
     }
 
     /// The next copy; `None` after `timeout` without one.
@@ -57,7 +61,7 @@ impl Copies {
         }
         channel::select! {
             recv(self.parcels) -> parcel => parcel.ok().map(Copied::Parcel),
-            recv(self.said) -> said => said.ok().and_then(detection),
+            recv(self.detections) -> output => output.ok().and_then(detection),
             default(timeout) => None,
         }
     }
@@ -65,7 +69,7 @@ impl Copies {
     /// Whether the pipeline has ended, and every copy was taken.
     #[must_use]
     pub fn is_over(&self) -> bool {
-        self.shared.has_ended() && self.parcels.is_empty() && self.said.is_empty()
+        self.shared.has_ended() && self.parcels.is_empty() && self.detections.is_empty()
     }
 
     /// A picture, where it is time and something came since the last.
@@ -80,18 +84,18 @@ impl Copies {
         }
         self.decoded = published.counters.decoded;
         let array = &self.shared.options.array;
-        let said = json!({
+        let picture = json!({
             "t_us": published.counters.board_us,
             "rows": array.rows,
             "columns": array.columns,
             "ticks": published.picture,
         });
-        Some(Copied::Picture(said.to_string().into_bytes()))
+        Some(Copied::Picture(picture.to_string().into_bytes()))
     }
 }
 
-fn detection(said: Said) -> Option<Copied> {
-    said.line().ok().map(Copied::Said)
+fn detection(output: OutputDetection) -> Option<Copied> {
+    output.line().ok().map(Copied::Detection)
 }
 
 /// The decoding thread's end.
@@ -109,7 +113,7 @@ pub(super) fn copier(received: u64) -> (Copier, channel::Receiver<Vec<u8>>) {
 }
 
 impl Copier {
-    /// Takes what came.
+    /// Takes what arrived.
     pub(super) fn take(&mut self, batch: &Batch, dropped_by_kernel: u64) {
         for (datagram, bytes) in batch.iter() {
             if self.packer.waiting() == 0 {
@@ -123,7 +127,7 @@ impl Copier {
         }
     }
 
-    /// Closes a parcel that has gathered for long enough, or states that nothing came before `silent_until`; false where no
+    /// Closes a parcel that has gathered for long enough, or states that nothing arrived before `silent_until`; false where no
     /// receiver is left.
     pub(super) fn tick(&mut self, silent_until: Option<i64>, dropped_by_kernel: u64) -> bool {
         let since = self.since.elapsed();

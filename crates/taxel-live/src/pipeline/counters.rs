@@ -13,7 +13,7 @@ use crate::capture;
 use crate::clock::Offset;
 use crate::latency::Quantiles;
 
-/// What came, what became of it, and what was lost where.
+/// What arrived, what became of it, and what was lost where.
 ///
 /// Once [`Live::stop`](super::Live::stop) has returned, `capture.datagrams = decoded + capture.dropped_by_queue` and
 /// `wire.bytes = 5 wire.words + wire.skipped`; `events = read_out + events_dropped` where there is a readout.
@@ -29,13 +29,13 @@ pub struct Counters {
     pub wire: wire::Counts,
     /// The version of the wire that the board speaks.
     pub wire_version: u8,
-    /// What came and what was missing of version 2.
+    /// What arrived and what was missing of version 2.
     pub wire_v2: wire::v2::Counts,
     /// Bytes of version 1 that were refused, because the board speaks version 2.
     pub wire_refused: u64,
     /// How often the board changed its version.
     pub wire_changes: u64,
-    /// Events of version 2 that came when time had gone on without them: their datagram was overtaken by more than a gap is
+    /// Events of version 2 that arrived when time had gone on without them: their datagram was overtaken by more than a gap is
     /// waited for.
     pub wire_late: u64,
     /// Events that it gave.
@@ -44,8 +44,8 @@ pub struct Counters {
     pub read_out: u64,
     /// Events that found no room before the readout.
     pub events_dropped: u64,
-    /// Events that came out of order, or more than 0.1 s after a silence that was assumed: the readout took them at
-    /// the time that it had come to.
+    /// Events that arrived out of order, or more than 0.1 s after a silence that was assumed: the readout took them at
+    /// the time that it had arrived to.
     pub late: u64,
     /// Detections that were output.
     pub detections: u64,
@@ -56,7 +56,7 @@ pub struct Counters {
     pub detections_dropped: u64,
     /// What went to each destination: `sent + lost + waiting = detections`.
     pub sent: Vec<Sent>,
-    /// What came of the recording's other sources.
+    /// What arrived of the recording's other sources.
     pub sources: BTreeMap<String, SourceCounts>,
     /// From the kernel's stamp to the end of decoding, a datagram each.
     pub decode_latency: Quantiles,
@@ -77,7 +77,7 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// Whether not even a datagram that was lost has come.
+    /// Whether not even a datagram that was lost has arrived.
     #[must_use]
     pub fn nothing_came(&self) -> bool {
         self.capture.messages + self.capture.dropped_by_kernel == 0
@@ -91,7 +91,7 @@ impl Counters {
         let dropped_by_queue = now.dropped_by_queue - before.dropped_by_queue;
         let datagrams = decoded + dropped_by_queue;
         let capture = capture::Counts {
-            // A message may have come whose datagrams wait.
+            // A message may have arrived whose datagrams wait.
             messages: if datagrams == 0 { 0 } else { (now.messages - before.messages).max(1) },
             datagrams,
             bytes: now.bytes - before.bytes,
@@ -129,15 +129,15 @@ impl Counters {
 pub struct Summary {
     /// At the end, with closed sums.
     pub counters: Counters,
-    /// One line: nothing lost after arrival, what was lost where, or that nothing came.
+    /// One line: nothing lost after arrival, what was lost where, or that nothing arrived.
     pub verdict: String,
-    /// The file, where something was recorded: one to which nothing came is removed, and replaces none.
+    /// The file, where something was recorded: one to which nothing arrived is removed, and replaces none.
     pub path: Option<PathBuf>,
     /// The fresh tare, where one was completed.
     pub tare: Option<Tare>,
 }
 
-/// What came of a source, and what was lost.
+/// What arrived of a source, and what was lost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum SourceCounts {
@@ -147,7 +147,7 @@ pub enum SourceCounts {
     Numbers {
         /// Lines, or samples given.
         lines: u64,
-        /// Those that could not be parsed; they are recorded as they came.
+        /// Those that could not be parsed; they are recorded as they arrived.
         strange: u64,
         /// The system's last error, where the line broke.
         trouble: Option<String>,

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use taxel_core::Events;
-use taxel_core::wire::{Decoder, Receiver, Took};
+use taxel_core::held::Held;
+use taxel_core::wire::{DatagramInfo, Decoder, Receiver};
 
 use super::counters::Counters;
-use super::handover::Quiet;
 use super::options::LiveOptions;
-use super::tap::UNKNOWN;
+use super::readout_queue::Quiet;
 use crate::capture::Datagram;
 use crate::clock::{BoardClock, leaves};
 
@@ -21,14 +21,13 @@ pub(super) struct DecodeStage {
     clock: BoardClock,
     /// Decoded and not handed on yet.
     events: Events,
-    /// By taxel index; [`UNKNOWN`] of a taxel without any event so far.
-    held: Vec<u16>,
+    held: Held,
     /// The board's time of the latest datagram, us.
     latest: Option<i64>,
     frame_us: f64,
     guard_frames: f64,
     gap_frames: f64,
-    /// Whether any intensity has come: from then on every piece has the column, so that a lost one is one missing value.
+    /// Whether any intensity has arrived: from then on every piece has the column, so that a lost one is one missing value.
     has_intensities: bool,
     decoded: u64,
     late: u64,
@@ -36,7 +35,7 @@ pub(super) struct DecodeStage {
 
 /// A datagram that was decoded.
 pub(super) struct Decoded {
-    pub(super) took: Took,
+    pub(super) info: DatagramInfo,
     pub(super) arrived_ns: i64,
     bytes: usize,
     /// Where its events and markers begin among those that were not handed on.
@@ -54,17 +53,17 @@ struct Promise {
 
 impl Promise {
     /// Notes a datagram. At a gap its promise waits for a frame: the missing datagrams may only be late.
-    fn note(&mut self, took: &Took, arrived_us: i64, gap_us: i64) {
-        if took.reset || took.missing < self.missing {
-            (self.missing, self.waits) = (took.missing, None);
-        } else if took.missing > self.missing {
-            (self.missing, self.waits) = (took.missing, Some(arrived_us + gap_us));
+    fn note(&mut self, info: &DatagramInfo, arrived_us: i64, gap_us: i64) {
+        if info.reset || info.missing < self.missing {
+            (self.missing, self.waits) = (info.missing, None);
+        } else if info.missing > self.missing {
+            (self.missing, self.waits) = (info.missing, Some(arrived_us + gap_us));
         }
         if self.waits.is_some_and(|until| arrived_us >= until) {
             self.waits = None;
         }
         if self.waits.is_none() {
-            self.until = took.until.or(self.until);
+            self.until = info.until.or(self.until);
         }
     }
 }
@@ -81,7 +80,7 @@ impl DecodeStage {
             promise: Promise::default(),
             clock: BoardClock::default(),
             events: Events::empty(options.array.clone()),
-            held: vec![UNKNOWN; options.array.len()],
+            held: Held::unknown(options.array.len()),
             latest: None,
             frame_us: options.registers.frame_us(),
             guard_frames: options.guard_frames,
@@ -92,13 +91,13 @@ impl DecodeStage {
         }
     }
 
-    /// Decodes a datagram. After a reset ([`Took::reset`]) the caller hands on the events before it
+    /// Decodes a datagram. After a reset ([`DatagramInfo::reset`]) the caller hands on the events before it
     /// ([`DecodeStage::split_at_reset`]) and goes on with [`DecodeStage::note`], as for every datagram.
     pub(super) fn push(&mut self, datagram: &Datagram, bytes: &[u8]) -> Decoded {
         let first = (self.events.len(), self.events.markers.len());
         let arrived_ns = datagram.arrived_ns;
-        let took = self.decoder.push(bytes, Some(arrived_ns / 1000), &mut self.events);
-        Decoded { took, arrived_ns, bytes: bytes.len(), first }
+        let info = self.decoder.push(bytes, Some(arrived_ns / 1000), &mut self.events);
+        Decoded { info, arrived_ns, bytes: bytes.len(), first }
     }
 
     /// Takes the events of a datagram that followed a reset away; those before it stay.
@@ -109,25 +108,25 @@ impl DecodeStage {
 
     /// The board was reset: no value that a taxel held is valid; goes on with the events that followed.
     pub(super) fn reset(&mut self, later: &Events) {
-        self.held.fill(UNKNOWN);
+        self.held.clear();
         self.events.append(later, later.len());
     }
 
     /// Counts a datagram, and takes from it the board's clock and its promise. `announced` is the time up to which the readout was
-    /// told that no more events come, us: events before it are late.
+    /// told that no more events will follow, us: events before it are late.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn note(&mut self, decoded: &Decoded, announced: Option<i64>) {
-        let Decoded { took, arrived_ns, bytes, first: (row, _) } = decoded;
+        let Decoded { info, arrived_ns, bytes, first: (row, _) } = decoded;
         self.decoded += 1;
-        self.latest = took.now.or(self.latest);
-        if took.version == 2 {
-            let announced = announced.filter(|_| !took.reset);
+        self.latest = info.now.or(self.latest);
+        if info.version == 2 {
+            let announced = announced.filter(|_| !info.reset);
             let late = self.events.t[*row..].iter().filter(|&&t| announced.is_some_and(|until| t < until));
             self.late += late.count() as u64;
-            self.promise.note(took, arrived_ns / 1000, (self.gap_frames * self.frame_us) as i64);
+            self.promise.note(info, arrived_ns / 1000, (self.gap_frames * self.frame_us) as i64);
         }
         let last = self.events.t[*row..].last().copied();
-        if let Some(left) = leaves(took, last, *bytes, self.frame_us()) {
+        if let Some(left) = leaves(info, last, *bytes, self.frame_us()) {
             self.clock.note(left, *arrived_ns);
         }
     }
@@ -140,13 +139,8 @@ impl DecodeStage {
 
     /// Takes the values of the events that are about to be handed on.
     pub(super) fn hold(&mut self) {
-        let Some(intensity) = &self.events.intensity else { return };
-        self.has_intensities = true;
-        for k in 0..self.events.t.len() {
-            if intensity.present[k] {
-                self.held[self.events.array.index(self.events.x[k], self.events.y[k])] = intensity.ticks[k];
-            }
-        }
+        self.has_intensities |= self.events.intensity.is_some();
+        self.held.push(self.events.view());
     }
 
     /// The time before which the board has newly promised to send no more events, us.
@@ -154,7 +148,11 @@ impl DecodeStage {
         self.promise.until.take()
     }
 
-    pub(super) fn events(&mut self) -> &mut Events {
+    pub(super) fn events(&self) -> &Events {
+        &self.events
+    }
+
+    pub(super) fn events_mut(&mut self) -> &mut Events {
         &mut self.events
     }
 
@@ -187,7 +185,7 @@ impl DecodeStage {
         counters.marked_start = self.events.markers.last().map(|m| m.start).or(counters.marked_start);
     }
 
-    /// Expects a version of the wire that the board was told to speak; returns whether that is another one.
+    /// Expects a version of the wire that the board was set to; returns whether that is another one.
     pub(super) fn expect(&mut self, version: u8) -> bool {
         let other = version != self.decoder.version();
         if other {
@@ -201,8 +199,8 @@ impl DecodeStage {
         self.decoded
     }
 
-    /// By taxel index; [`UNKNOWN`] of a taxel without any event so far.
-    pub(super) fn held(&self) -> &[u16] {
+    /// The values that the taxels hold.
+    pub(super) fn held(&self) -> &Held {
         &self.held
     }
 
@@ -225,14 +223,14 @@ impl DecodeStage {
         (self.decoder.version() == 1).then(|| TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)))
     }
 
-    /// The board's time before which all has come, by the host's clock, where nothing arrived up to `until_ns`.
+    /// The board's time before which all has arrived, by the host's clock, where nothing arrived up to `until_ns`.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn quiet(&self, until_ns: Option<i64>) -> Option<Quiet> {
         if self.decoder.version() != 1 {
             return None;
         }
         let guard = (self.guard_frames * self.frame_us) as i64;
-        // What a frame sees leaves at its end: all events before the start of the frame that ends now have come.
+        // What a frame sees leaves at its end: all events before the start of the frame that ends now have arrived.
         Some(Quiet::Believed(self.clock.offset()?.board_us(until_ns?) - self.frame_us() - guard))
     }
 }

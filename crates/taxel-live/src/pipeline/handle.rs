@@ -12,9 +12,9 @@ use super::copies::Copies;
 use super::counters::{Counters, Summary};
 use super::options::{LiveOptions, Record};
 use super::recordings::Recordings;
-use super::said::Said;
 use super::shared::{Request, Shared};
-use super::tap::Outlet;
+use super::sink::OutputDetection;
+use super::viewer_queue::ViewerEvents;
 use crate::Result;
 use crate::capture::Origin;
 use crate::locked::lock;
@@ -72,35 +72,35 @@ impl Handle {
         self.shared.request(Request::Registers(registers));
     }
 
-    /// Gives a viewer the events from the next batch on.
+    /// Returns copies of the events from the next batch on, for a viewer.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` where the pipeline has ended.
-    pub fn look(&self) -> Result<Outlet> {
-        let (give, outlet) = channel::bounded(1);
-        self.shared.request(Request::Tap(give));
-        self.shared.wait(&outlet)
+    pub fn events(&self) -> Result<ViewerEvents> {
+        let (give, events) = channel::bounded(1);
+        self.shared.request(Request::View(give));
+        self.shared.wait(&events)
     }
 
-    /// Copies what comes, for other computers, from the next batch on.
+    /// Copies what arrives, for other computers, from the next batch on.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` where the pipeline has ended.
     pub fn copy(&self) -> Result<Copies> {
         let (give, parcels) = channel::bounded(1);
-        let said = self.hear(COPIED_WAITING);
+        let detections = self.detections(COPIED_WAITING);
         self.shared.request(Request::Copy(give));
-        Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, said))
+        Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, detections))
     }
 
-    /// Gives each detection from here on; so many may wait, and a slow receiver misses some.
+    /// Returns a queue of the detections from now on; at most `waiting` wait, and a slow receiver misses some.
     #[must_use]
-    pub fn hear(&self, waiting: usize) -> channel::Receiver<Said> {
-        let (say, said) = channel::bounded(waiting);
-        lock(&self.shared.subscribers).push(say);
-        said
+    pub fn detections(&self, waiting: usize) -> channel::Receiver<OutputDetection> {
+        let (sender, receiver) = channel::bounded(waiting);
+        lock(&self.shared.subscribers).push(sender);
+        receiver
     }
 
     /// Records what arrives from now on, of all sources, beginning with the registers and the held values. A recording that

@@ -5,10 +5,11 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::Events;
+use taxel_core::held::Held;
 
 use super::copies::{Copier, GATHER, copier};
 use super::shared::Shared;
-use super::tap::{Outlet, Tap, UNKNOWN, tap};
+use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::capture::Batch;
 
 /// How often a new picture is published.
@@ -16,7 +17,7 @@ const PICTURE_EVERY: Duration = Duration::from_millis(100);
 
 pub(super) struct Observers {
     shared: Arc<Shared>,
-    taps: Vec<Tap>,
+    viewers: Vec<ViewerQueue>,
     copiers: Vec<Copier>,
     /// How many datagrams were received before the next one.
     received: u64,
@@ -25,15 +26,15 @@ pub(super) struct Observers {
 
 impl Observers {
     pub(super) fn new(shared: Arc<Shared>) -> Self {
-        Self { shared, taps: vec![], copiers: vec![], received: 0, pictured: Instant::now() }
+        Self { shared, viewers: vec![], copiers: vec![], received: 0, pictured: Instant::now() }
     }
 
     /// Adds a viewer of the events, where it still waits for that.
-    pub(super) fn add_tap(&mut self, give: &channel::Sender<Outlet>, held: &[u16]) {
+    pub(super) fn add_viewer(&mut self, give: &channel::Sender<ViewerEvents>, held: &Held) {
         let counters = &self.shared.published().counters;
-        let (tap, outlet) = tap(&self.shared.options.array, held.to_vec(), counters.board_us, counters.events);
-        if give.send(outlet).is_ok() {
-            self.taps.push(tap);
+        let (queue, events) = viewer_queue(&self.shared.options.array, held, counters.board_us, counters.events);
+        if give.send(events).is_ok() {
+            self.viewers.push(queue);
         }
     }
 
@@ -50,13 +51,14 @@ impl Observers {
         if self.copiers.is_empty() { wait } else { wait.min(GATHER) }
     }
 
-    pub(super) fn events(&mut self, events: &Events) {
-        self.taps.iter_mut().for_each(|tap| tap.take(events));
+    /// Copies events, whose values are among those that the taxels hold.
+    pub(super) fn events(&mut self, events: &Events, held: &Held) {
+        self.viewers.iter_mut().for_each(|queue| queue.push(events, held));
     }
 
-    /// The board was reset.
-    pub(super) fn reset(&mut self) {
-        self.taps.iter_mut().for_each(Tap::forget);
+    /// The board was reset, and its taxels hold no value.
+    pub(super) fn reset(&mut self, held: &Held) {
+        self.viewers.iter_mut().for_each(|queue| queue.reset(held));
     }
 
     /// Copies a batch for other computers, and sends what is due.
@@ -75,27 +77,23 @@ impl Observers {
     }
 
     /// Sends viewers what is due.
-    pub(super) fn tick(&mut self) {
-        self.taps.retain_mut(Tap::tick);
+    pub(super) fn tick(&mut self, held: &Held) {
+        self.viewers.retain_mut(|queue| queue.tick(held));
     }
 
     /// Publishes the picture where it is time; returns whether it was.
-    pub(super) fn picture(&mut self, held: &[u16]) -> bool {
+    pub(super) fn picture(&mut self, held: &Held) -> bool {
         if self.pictured.elapsed() < PICTURE_EVERY {
             return false;
         }
         self.pictured = Instant::now();
-        let mut published = self.shared.published();
-        // In a picture 0 is also a taxel without any event so far.
-        for (shown, &held) in published.picture.iter_mut().zip(held) {
-            *shown = if held == UNKNOWN { 0 } else { held };
-        }
+        self.shared.published().picture.iter_mut().zip(held.picture()).for_each(|(shown, value)| *shown = value);
         true
     }
 
     /// Sends the last of what waits.
-    pub(super) fn finish(&mut self) {
-        self.tick();
+    pub(super) fn finish(&mut self, held: &Held) {
+        self.tick(held);
         let dropped = self.shared.receiver.counts().dropped_by_kernel;
         self.copiers.iter_mut().for_each(|copier| copier.finish(dropped));
     }

@@ -1,4 +1,4 @@
-//! Hands detections to their sinks, to the recording and to whoever waits for them: one after the other, by any thread that is
+//! Hands detections to their sinks, to the recording and to waiting receivers: one after the other, by any thread that is
 //! free to.
 
 use std::collections::VecDeque;
@@ -7,8 +7,8 @@ use std::sync::Mutex;
 use crossbeam_channel::Sender;
 use taxel_core::detect::Detection;
 
-use super::said::{Said, Sink};
 use super::shared::Shared;
+use super::sink::{OutputDetection, Sink};
 use crate::locked::lock;
 use crate::recording::now_ns;
 use crate::{Error, Result};
@@ -16,7 +16,7 @@ use crate::{Error, Result};
 /// How many detections wait while a sink is slow; more are lost, and counted.
 const WAITING: usize = 1 << 14;
 
-/// Hands detections on in their order, one at a time: a thread that finds another one doing so leaves them to it.
+/// Outputs detections in order, one at a time; a thread that finds another one outputting leaves them to it.
 pub(super) struct DetectionOutput(Mutex<State>);
 
 struct State {
@@ -28,19 +28,19 @@ struct State {
 /// Where detections go.
 struct Receivers {
     sinks: Vec<Box<dyn Sink>>,
-    /// Of [`Live::next`](super::Live::next).
-    queue: Sender<Said>,
-    /// A sink has failed, which ends the pipeline: nothing more is handed on.
+    /// The queue of [`Live::next`](super::Live::next).
+    queue: Sender<OutputDetection>,
+    /// A sink has failed, which ends the pipeline: nothing more is output.
     failed: bool,
 }
 
 impl DetectionOutput {
-    pub(super) fn new(sinks: Vec<Box<dyn Sink>>, queue: Sender<Said>) -> Self {
+    pub(super) fn new(sinks: Vec<Box<dyn Sink>>, queue: Sender<OutputDetection>) -> Self {
         let receivers = Some(Receivers { sinks, queue, failed: false });
         Self(Mutex::new(State { waiting: VecDeque::new(), receivers }))
     }
 
-    /// Takes detections; returns whether no thread is handing any on.
+    /// Adds detections; returns whether no thread is outputting any.
     pub(super) fn add(&self, shared: &Shared, found: &mut Vec<Detection>) -> bool {
         let mut state = lock(&self.0);
         let room = WAITING.saturating_sub(state.waiting.len()).min(found.len());
@@ -54,7 +54,7 @@ impl DetectionOutput {
         state.receivers.is_some()
     }
 
-    /// Hands on what waits, and what comes meanwhile, unless another thread does.
+    /// Hands on what waits, and what arrives in the meantime, unless another thread does.
     pub(super) fn run(&self, shared: &Shared) {
         let mut state = lock(&self.0);
         let Some(mut receivers) = state.receivers.take() else { return };
@@ -75,20 +75,26 @@ impl DetectionOutput {
 impl Receivers {
     /// To the sinks first, then into the recording and to those that wait for it.
     fn take(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
-        let said_ns = now_ns();
+        let output_ns = now_ns();
         let offset = shared.published().counters.offset;
-        let said = Said { said: offset.map_or(detection.known, |o| o.board_us(said_ns)), detection, said_ns };
-        self.sinks.iter_mut().try_for_each(|sink| sink.take(&said)).map_err(Error::Sink)?;
+        let output = OutputDetection {
+            output_us: offset.map_or(detection.known, |o| o.board_us(output_ns)),
+            detection,
+            output_ns,
+        };
+        self.sinks.iter_mut().try_for_each(|sink| sink.take(&output)).map_err(Error::Sink)?;
         if let Some(recorder) = &*lock(&shared.recorder) {
             // An error that ends only the recording is found, and kept, by the decoding thread too.
-            recorder.detection(&said).or_else(|error| if recorder.since().is_some() { Ok(()) } else { Err(error) })?;
+            recorder
+                .detection(&output)
+                .or_else(|error| if recorder.since().is_some() { Ok(()) } else { Err(error) })?;
         }
-        shared.picture_around([said.detection.t, said.detection.known]);
+        shared.picture_around([output.detection.t, output.detection.known]);
         lock(&shared.subscribers).retain(|subscriber| {
-            !matches!(subscriber.try_send(said.clone()), Err(crossbeam_channel::TrySendError::Disconnected(_)))
+            !matches!(subscriber.try_send(output.clone()), Err(crossbeam_channel::TrySendError::Disconnected(_)))
         });
-        let late_ns = (said.said - said.detection.known) * 1000;
-        let dropped = self.queue.try_send(said).is_err();
+        let late_ns = (output.output_us - output.detection.known) * 1000;
+        let dropped = self.queue.try_send(output).is_err();
         let mut published = shared.published();
         published.counters.detections += 1;
         published.counters.detections_dropped += u64::from(dropped);

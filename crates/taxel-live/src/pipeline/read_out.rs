@@ -4,8 +4,8 @@ use taxel_core::Events;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 
-use super::handover::{Quiet, Taken};
 use super::reader::Reader;
+use super::readout_queue::{Quiet, Taken};
 use super::shared::Shared;
 
 pub(super) struct ReadOutStage {
@@ -17,7 +17,7 @@ pub(super) struct ReadOutStage {
     separated: Option<Box<Reader>>,
     /// Without a reader nothing is found.
     nothing: Vec<Detection>,
-    /// The time up to which the readout was told by promises of version 2 that no more events come, us.
+    /// The time up to which no more events will follow by the promises of version 2 that the readout has received, us.
     announced: Option<i64>,
 }
 
@@ -73,7 +73,7 @@ impl ReadOutStage {
                 reader.take(shared, events, Taken { quiet: promised.map(Quiet::Promised), last: false });
             }
             None => {
-                let dropped = shared.handover.put(events, promised);
+                let dropped = shared.readout_queue.put(events, promised);
                 shared.published().counters.events_dropped = dropped;
             }
         }
@@ -84,23 +84,23 @@ impl ReadOutStage {
     pub(super) fn quiet(&mut self, shared: &Shared, quiet: Quiet) {
         match &mut self.reader {
             Some(reader) => reader.wait(shared, Taken { quiet: Some(quiet), last: false }),
-            None => shared.handover.quiet(quiet),
+            None => shared.readout_queue.quiet(quiet),
         }
     }
 
     pub(super) fn zero(&mut self, shared: &Shared, zeroings: &[Zeroing]) {
         match &mut self.reader {
             Some(reader) => reader.zero(zeroings),
-            None if self.is_on => shared.handover.zero(zeroings),
+            None if self.is_on => shared.readout_queue.zero(zeroings),
             None => {}
         }
     }
 
-    /// Nothing will come any more.
+    /// No more data will arrive.
     pub(super) fn close(&mut self, shared: &Shared, quiet: Option<Quiet>) {
         match &mut self.reader {
             Some(reader) => reader.wait(shared, Taken { quiet, last: true }),
-            None => shared.handover.close(quiet),
+            None => shared.readout_queue.close(quiet),
         }
     }
 }

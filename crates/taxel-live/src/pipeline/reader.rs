@@ -5,9 +5,9 @@ use taxel_core::detect::{Detection, FrameTime, Readout, ReadoutStream};
 use taxel_core::encode::{Tare, Zeroing};
 
 use super::ahead::Ahead;
-use super::handover::{Quiet, Taken};
 use super::options::LiveOptions;
 use super::output::DetectionOutput;
+use super::readout_queue::{Quiet, Taken};
 use super::rest::Rest;
 use super::shared::Shared;
 
@@ -89,7 +89,7 @@ impl Reader {
             if last {
                 break;
             }
-            let taken = shared.handover.take(&mut self.events, &mut self.zeroings);
+            let taken = shared.readout_queue.take(&mut self.events, &mut self.zeroings);
             self.process(shared, taken);
             last = taken.last;
         }
@@ -102,7 +102,7 @@ impl Reader {
         self.events.clear();
     }
 
-    /// Nothing came, but time has.
+    /// Nothing arrived, but time has.
     pub(super) fn wait(&mut self, shared: &Shared, taken: Taken) {
         self.events.clear();
         self.process(shared, taken);

@@ -7,7 +7,7 @@ use super::shared::Shared;
 use crate::Result;
 use crate::capture::Batch;
 
-/// While it records and nothing is read out, what comes within so long is received together: it costs half the CPU.
+/// While it records and nothing is read out, what arrives within so long is received together: it costs half the CPU.
 const TOGETHER: Duration = Duration::from_millis(1);
 
 pub(super) struct ReceiveStage {
@@ -21,7 +21,7 @@ impl ReceiveStage {
         Self { shared, batch: Batch::new() }
     }
 
-    /// From now on a thread of its own receives; without a readout it may gather what comes.
+    /// From now on a thread of its own receives; without a readout it may gather what arrives.
     pub(super) fn separate(&self, reads_out: bool) -> Result<()> {
         self.shared.receiver.apart(if reads_out { Duration::ZERO } else { TOGETHER })
     }
@@ -43,7 +43,7 @@ impl ReceiveStage {
         self.shared.receiver.silent_until()
     }
 
-    /// Whether nothing will come any more.
+    /// Whether no more data will arrive.
     pub(super) fn is_done(&self) -> bool {
         self.shared.receiver.is_done()
     }

@@ -1,4 +1,4 @@
-//! The third stage: into the recording that runs, where one does, go datagrams as they came, what became of the board, markers,
+//! The third stage: into the recording that runs, where one does, go datagrams as they arrived, what became of the board, markers,
 //! pictures and counts.
 
 use std::sync::Arc;
@@ -6,15 +6,15 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use taxel_core::encode::Zeroing;
-use taxel_core::wire::{Receiver, Registers, Took};
+use taxel_core::held::Held;
+use taxel_core::wire::{DatagramInfo, Receiver, Registers};
 use taxel_core::{Events, Marker};
 
 use super::counters::Counters;
 use super::decode::fresh_decoder;
+use super::picture_buffer::PictureBuffer;
 use super::recorder::Recorder;
 use super::shared::{Ended, Shared};
-use super::stills::Stills;
-use super::tap::UNKNOWN;
 use crate::Result;
 use crate::capture::Batch;
 use crate::locked::lock;
@@ -28,8 +28,8 @@ pub(super) struct RecordStage {
     /// Decodes from a recording's first datagram on, as a reader will, until the offset between its clock and the pipeline's is
     /// known.
     origin: Option<Box<Receiver>>,
-    stills: Stills,
-    /// Datagrams that had been decoded when the last still was considered.
+    picture_buffer: PictureBuffer,
+    /// Datagrams that had been decoded when the last picture was considered.
     considered: u64,
     /// Whether the recording has the fresh tare.
     tared: bool,
@@ -39,7 +39,14 @@ pub(super) struct RecordStage {
 
 impl RecordStage {
     pub(super) fn new(shared: Arc<Shared>) -> Self {
-        Self { shared, origin: None, stills: Stills::new(), considered: 0, tared: false, counted: Instant::now() }
+        Self {
+            shared,
+            origin: None,
+            picture_buffer: PictureBuffer::new(),
+            considered: 0,
+            tared: false,
+            counted: Instant::now(),
+        }
     }
 
     pub(super) fn runs(&self) -> bool {
@@ -67,21 +74,21 @@ impl RecordStage {
     }
 
     /// What a datagram showed of the board: a reset, or another version of the wire.
-    pub(super) fn board(&self, took: &Took, at_ns: i64) -> Result<()> {
-        if took.version == 1 && !took.changed {
+    pub(super) fn board(&self, info: &DatagramInfo, at_ns: i64) -> Result<()> {
+        if info.version == 1 && !info.changed {
             return Ok(());
         }
-        let wire = took.changed.then_some(Change::Wire { version: took.version, asked: false });
+        let wire = info.changed.then_some(Change::Wire { version: info.version, asked: false });
         self.with(|recorder| {
-            recorder.takes(took.version)?;
-            for change in wire.into_iter().chain(took.reset.then_some(Change::Reset)) {
-                recorder.board_change(&BoardChange { at_ns, t_us: took.now, change })?;
+            recorder.takes(info.version)?;
+            for change in wire.into_iter().chain(info.reset.then_some(Change::Reset)) {
+                recorder.board_change(&BoardChange { at_ns, t_us: info.now, change })?;
             }
             Ok(())
         })
     }
 
-    /// The board was told to speak another version of the wire; `t_us` is its latest time.
+    /// The board was set to another version of the wire; `t_us` is its latest time.
     pub(super) fn asked_for_version(&self, version: u8, t_us: Option<i64>) -> Result<()> {
         let change = Change::Wire { version, asked: true };
         self.with(|recorder| recorder.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))
@@ -100,7 +107,7 @@ impl RecordStage {
         Ok(())
     }
 
-    /// Decodes a datagram by the recording's own clock, which begins with its first stamp: once that has come, of an event or a
+    /// Decodes a datagram by the recording's own clock, which begins with its first stamp: once that has arrived, of an event or a
     /// marker, the offset to the pipeline's clock is known. `stamps` are the first of each as the pipeline decoded them.
     pub(super) fn find_origin(&mut self, bytes: &[u8], at_ns: i64, stamps: (Option<i64>, Option<i64>)) -> Result<()> {
         let Some(origin) = &mut self.origin else { return Ok(()) };
@@ -119,13 +126,13 @@ impl RecordStage {
     }
 
     /// Ends the recording that runs, and begins the next one, where there is one, with the values that the taxels hold. What has
-    /// come so far belongs to the former, what comes from here on to the latter.
-    pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &[u16]) -> Result<Ended> {
+    /// come so far belongs to the former, what arrives from now on to the latter.
+    pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &Held) -> Result<Ended> {
         let now = self.shared.counters();
         let ended = lock(&self.shared.recorder).take();
         self.origin = None;
         if let Some(mut next) = next {
-            if let Err(error) = next.begin(&now, held) {
+            if let Err(error) = next.begin(&now, held.values()) {
                 *lock(&self.shared.recorder) = ended;
                 return Err(error);
             }
@@ -155,31 +162,29 @@ impl RecordStage {
         }
     }
 
-    /// Takes a still where it is time for one, and records those that the recording gets; at its end the last one.
-    pub(super) fn pictures(&mut self, decoded: u64, held: &[u16], last: bool) -> Result<()> {
+    /// Buffers a picture where it is time for one, and records those that the recording gets; at its end the last one.
+    pub(super) fn pictures(&mut self, decoded: u64, held: &Held, last: bool) -> Result<()> {
         let now = Instant::now();
-        if !(last || self.stills.is_due(now)) {
+        if !(last || self.picture_buffer.is_due(now)) {
             return Ok(());
         }
         let times = std::mem::take(&mut *lock(&self.shared.picture_times));
         if !self.runs() {
-            self.stills.clear();
+            self.picture_buffer.clear();
             return Ok(());
         }
         let new = decoded != self.considered;
         self.considered = decoded;
         if let (true, Some(t_us)) = (new, self.shared.published().counters.board_us) {
-            // In a picture 0 is also a taxel without any event so far.
-            let held = held.iter().map(|&held| if held == UNKNOWN { 0 } else { held });
-            self.stills.take(now, now_ns(), t_us, held);
+            self.picture_buffer.push(now, now_ns(), t_us, held.picture());
         }
-        times.into_iter().for_each(|t| self.stills.around(t));
+        times.into_iter().for_each(|t| self.picture_buffer.around(t));
         let columns = self.shared.options.array.columns;
-        let mut stills = std::mem::replace(&mut self.stills, Stills::new());
+        let mut picture_buffer = std::mem::replace(&mut self.picture_buffer, PictureBuffer::new());
         let outcome = self.with(|recorder| {
-            stills.give().try_for_each(|still| recorder.picture(still.at_ns, still.t_us, columns, &still.held))
+            picture_buffer.take_wanted().try_for_each(|one| recorder.picture(one.at_ns, one.t_us, columns, &one.held))
         });
-        self.stills = stills;
+        self.picture_buffer = picture_buffer;
         outcome
     }
 

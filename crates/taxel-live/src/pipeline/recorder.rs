@@ -11,7 +11,7 @@ use taxel_core::{Marker, problem};
 
 use super::counters::Counters;
 use super::options::{LiveOptions, Record};
-use super::said::Said;
+use super::sink::OutputDetection;
 use super::source::Source;
 use crate::capture::{Batch, Origin};
 use crate::locked::lock;
@@ -22,7 +22,7 @@ use crate::{Error, Result};
 /// out of it.
 ///
 /// The file is locked from the reservation on. One that is to be replaced is changed when there is something to replace it with,
-/// and not before: where nothing comes, it stays.
+/// and not before: where no data arrive, it stays.
 pub(super) struct Recorder {
     record: Record,
     header: Header,
@@ -308,13 +308,13 @@ impl Recorder {
         self.track(|track| track.marker(now_ns(), Marker { t, ..marker }))
     }
 
-    pub(super) fn detection(&self, said: &Said) -> Result<()> {
-        let found = &said.detection;
+    pub(super) fn detection(&self, output: &OutputDetection) -> Result<()> {
+        let found = &output.detection;
         let (Some(t), Some(known)) = (self.timed(found.t), self.timed(found.known)) else { return Ok(()) };
-        self.track(|track| track.detection(said.said_ns, &Detection { t, known, ..found.clone() }))
+        self.track(|track| track.detection(output.output_ns, &Detection { t, known, ..found.clone() }))
     }
 
-    /// The rest that is subtracted from the pictures from here on.
+    /// The rest that is subtracted from the pictures from now on.
     pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
         self.track(|track| {
             track.tare(tare);

@@ -106,7 +106,7 @@ impl Recordings {
 
 /// Has the decoding thread of one board record into `next`, or into nothing; returns the recorder before it.
 fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
-    // Set before the request, so that the recording runs for whoever asks after this call.
+    // Set before the request, so that the recording runs for callers that ask after this call.
     shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
     let (give, ended) = channel::bounded(1);
     shared.request(Request::Record(next.map(Box::new), give));

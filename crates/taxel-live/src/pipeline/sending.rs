@@ -1,6 +1,6 @@
-//! Detections on their way to other programs and machines: a line of JSON each, by UDP, into a pipe, over a serial line.
+//! Sends detections to other programs and machines: each as a line of JSON, by UDP, into a pipe or over a serial line.
 //!
-//! A line leaves from the thread that made it where there is room; what finds none waits, bounded, for a thread of its own.
+//! The thread that made a line writes it where there is room; other lines wait in a bounded queue for a separate thread.
 //! A reader that is too slow, or absent, loses lines, which are counted; the pipeline never waits for it.
 
 use std::collections::VecDeque;
@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use taxel_core::problem;
 
-use super::said::{Said, Sink};
+use super::sink::{OutputDetection, Sink};
 use crate::locked::lock;
 use crate::{Error, Result, address};
 
@@ -137,14 +137,14 @@ impl Sending {
         Ok(Self { line, thread: Some(thread.map_err(Error::socket("thread"))?) })
     }
 
-    /// What may be looked at while it works, and after.
+    /// The counts, readable while it works and afterwards.
     pub(super) fn line(&self) -> Arc<Line> {
         Arc::clone(&self.line)
     }
 }
 
 impl Sink for Sending {
-    fn take(&mut self, said: &Said) -> io::Result<()> {
+    fn take(&mut self, detection: &OutputDetection) -> io::Result<()> {
         let mut state = lock(&self.line.state);
         if state.device.is_none() && matches!(self.line.to, Destination::Pipe(_)) {
             // It may have a reader by now; a serial line takes longer to open, which the other thread does.
@@ -154,7 +154,7 @@ impl Sink for Sending {
             state.counts.lost += 1;
             return Ok(());
         }
-        state.waiting.push_back(said.line()?);
+        state.waiting.push_back(detection.line()?);
         if state.waiting.len() == 1 {
             state.write();
         }
@@ -226,7 +226,7 @@ impl SendingState {
         }
     }
 
-    /// Hands over what there is room for.
+    /// Writes as many lines as there is room for.
     fn write(&mut self) {
         while let (Some(device), Some(line)) = (&mut self.device, self.waiting.front()) {
             match device.write(&line[self.gone..]) {
@@ -257,7 +257,7 @@ impl SendingState {
         }
     }
 
-    /// Gives up what waits: late, it would only mislead.
+    /// Discards waiting lines: late detections would mislead.
     fn lose(&mut self, why: Option<String>) {
         self.counts.lost += self.waiting.len() as u64;
         self.counts.trouble = why.or(self.counts.trouble.take());
@@ -333,14 +333,14 @@ mod tests {
 
     #[test]
     fn destinations_are_read_as_they_are_written() {
-        for (text, said) in [
+        for (text, shown) in [
             ("udp:127.0.0.1:9000", "udp:127.0.0.1:9000"),
             ("udp:[::1]:9", "udp:[::1]:9"),
             ("pipe:/tmp/out", "pipe:/tmp/out"),
             ("serial:/dev/ttyACM0", "serial:/dev/ttyACM0@115200"),
             ("serial:/dev/ttyACM0@9600", "serial:/dev/ttyACM0@9600"),
         ] {
-            assert_eq!(text.parse::<Destination>().unwrap().to_string(), said);
+            assert_eq!(text.parse::<Destination>().unwrap().to_string(), shown);
         }
         for text in
             ["", "udp", "udp:", "udp:9000", "pipe:", "serial:", "serial:/dev/x@", "serial:/dev/x@fast", "file:x"]

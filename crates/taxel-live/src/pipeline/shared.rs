@@ -11,12 +11,12 @@ use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 
 use super::counters::Counters;
-use super::handover::Handover;
 use super::options::LiveOptions;
+use super::readout_queue::ReadoutQueue;
 use super::recorder::{Host, Recorder};
-use super::said::Said;
 use super::sending::Line;
-use super::tap::Outlet;
+use super::sink::OutputDetection;
+use super::viewer_queue::ViewerEvents;
 use crate::capture::Receiver;
 use crate::latency::Latencies;
 use crate::locked::lock;
@@ -49,7 +49,7 @@ pub(super) struct Shared {
     pub(super) options: LiveOptions,
     pub(super) begun: Instant,
     pub(super) receiver: Receiver,
-    pub(super) handover: Handover,
+    pub(super) readout_queue: ReadoutQueue,
     pub(super) published: Mutex<Published>,
     pub(super) recorder: Mutex<Option<Recorder>>,
     /// The error that ended a recording early which was begun while the pipeline ran.
@@ -62,12 +62,12 @@ pub(super) struct Shared {
     /// Whether a recording runs that was begun while the pipeline ran.
     pub(super) records: AtomicBool,
     /// Further queues that get each detection; a slow one misses some.
-    pub(super) subscribers: Mutex<Vec<channel::Sender<Said>>>,
+    pub(super) subscribers: Mutex<Vec<channel::Sender<OutputDetection>>>,
     /// Where detections go.
     pub(super) sending: Vec<Arc<Line>>,
     /// The registers as they are now.
     pub(super) registers: Mutex<Registers>,
-    /// The version of the wire that the board was newly told to speak; 0 where it was not.
+    /// The version of the wire that the board was newly set to; 0 where it was not.
     pub(super) expected: AtomicU8,
     pub(super) ended: AtomicBool,
 }
@@ -80,7 +80,7 @@ pub(super) enum Request {
     /// End the recording that runs, and record into this one, where there is one, from the next datagram on.
     Record(Option<Box<Recorder>>, channel::Sender<Result<Ended>>),
     /// Give a viewer the events.
-    Tap(channel::Sender<Outlet>),
+    View(channel::Sender<ViewerEvents>),
     /// Give datagrams for another computer.
     Copy(channel::Sender<channel::Receiver<Vec<u8>>>),
     /// The registers were written.
@@ -105,7 +105,7 @@ impl Shared {
         lock(&self.picture_times).extend(times);
     }
 
-    /// Everything that came was processed.
+    /// Everything that arrived was processed.
     pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Release);
     }
@@ -142,7 +142,7 @@ impl Shared {
         }
     }
 
-    /// Writes a note, with the time of now or without one.
+    /// Writes a note, with the current time or without one.
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
         let board_us = self.published().counters.board_us.filter(|_| timed);
         match &*lock(&self.recorder) {

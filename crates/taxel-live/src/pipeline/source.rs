@@ -1,5 +1,5 @@
 //! What a further source of a recording is, as it is written: another board, lines of numbers from a serial line or a pipe, numbers
-//! that a program gives; and its lines, as they come.
+//! that a program gives; and its lines, as they arrive.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -61,13 +61,13 @@ pub enum Place {
     Pipe(PathBuf),
 }
 
-/// Lines that were opened to read their columns, with what came after the first. The reader goes on there: to open them again would
-/// lose what came, and a pipe without a reader ends the program that writes to it.
+/// Lines that were opened to read their columns, with the bytes after the first one. The reader continues there: reopening would lose
+/// those bytes, and a pipe without a reader ends the program that writes to it.
 #[derive(Clone, Default)]
-pub struct Opened(Arc<Mutex<Option<Tap>>>);
+pub struct Opened(Arc<Mutex<Option<LineReader>>>);
 
 impl Opened {
-    pub(super) fn take(&self) -> Option<Tap> {
+    pub(super) fn take(&self) -> Option<LineReader> {
         lock(&self.0).take()
     }
 }
@@ -212,14 +212,14 @@ fn named_or_read(named: Option<Stream>, place: &Place) -> Result<(Stream, Opened
 
 /// Opens lines and waits for the first that states the columns: a line of names, or of numbers, which are then called a, b, c ...
 fn first_line(place: &Place) -> Result<(Stream, Opened)> {
-    let mut tap = Tap::open(place)?;
+    let mut reader = LineReader::open(place)?;
     let until = Instant::now() + FIRST_LINE;
     // A serial line that is opened in the middle of a line gives the rest of that line first.
     let mut skip = matches!(place, Place::Serial(..));
     let mut numbers = None;
     while Instant::now() < until {
-        let ended = tap.fill().map_err(|error| tap.broken(error))?;
-        while let Some(line) = tap.line() {
+        let ended = reader.fill().map_err(|error| reader.broken(error))?;
+        while let Some(line) = reader.line() {
             if std::mem::take(&mut skip) {
                 continue;
             }
@@ -230,11 +230,11 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
             if found.iter().all(|field| field.parse::<f64>().is_ok()) {
                 numbers = Some(found.len());
                 // It is data, too.
-                tap.bytes.splice(0..0, format!("{line}\n").into_bytes());
+                reader.bytes.splice(0..0, format!("{line}\n").into_bytes());
                 break;
             }
             let stream = Stream::of_columns(found.into_iter().map(str::to_owned).collect());
-            return Ok((stream, Opened(Arc::new(Mutex::new(Some(tap))))));
+            return Ok((stream, Opened(Arc::new(Mutex::new(Some(reader))))));
         }
         if numbers.is_some() || ended {
             break;
@@ -243,7 +243,7 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
     match numbers {
         Some(n) => {
             let stream = Stream::of_columns((0..n).map(|k| format!("column_{k}")).collect());
-            Ok((stream, Opened(Arc::new(Mutex::new(Some(tap))))))
+            Ok((stream, Opened(Arc::new(Mutex::new(Some(reader))))))
         }
         None => {
             let waited = FIRST_LINE.as_secs();
@@ -252,8 +252,8 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
     }
 }
 
-/// Lines of text from a serial line, a pipe or the standard input, as they come.
-pub(super) struct Tap {
+/// Lines of text from a serial line, a pipe or the standard input, as they arrive.
+pub(super) struct LineReader {
     place: Place,
     file: Option<Box<dyn ReadsAsItComes>>,
     bytes: Vec<u8>,
@@ -264,7 +264,7 @@ pub(super) struct Tap {
 trait ReadsAsItComes: Read + AsRawFd + Send {}
 impl<T: Read + AsRawFd + Send> ReadsAsItComes for T {}
 
-impl Tap {
+impl LineReader {
     pub(super) fn open(place: &Place) -> Result<Self> {
         Ok(Self { place: place.clone(), file: Some(open(place)?), bytes: vec![], came_ns: 0 })
     }
@@ -273,7 +273,7 @@ impl Tap {
         matches!(self.place, Place::Serial(..))
     }
 
-    /// Waits a little for more; returns whether nothing can come any more.
+    /// Waits a little for more; returns whether no more data can arrive.
     pub(super) fn fill(&mut self) -> io::Result<bool> {
         let is_input = self.place == Place::Pipe(PathBuf::from("-"));
         let Some(file) = &mut self.file else {
@@ -300,7 +300,7 @@ impl Tap {
         Ok(false)
     }
 
-    /// The next whole line of what came; of one that is too long what there is.
+    /// The next whole line of what arrived; of one that is too long what there is.
     pub(super) fn line(&mut self) -> Option<String> {
         let end =
             self.bytes.iter().position(|&byte| byte == b'\n').or((self.bytes.len() > LONGEST).then_some(LONGEST))?;
@@ -313,7 +313,7 @@ impl Tap {
         Error::file(path)(error)
     }
 
-    /// Opens the line again, and discards the part of a line that had come.
+    /// Opens the line again, and discards the part of a line that had arrived.
     pub(super) fn again(&mut self) {
         self.bytes.clear();
         self.file = open(&self.place).ok();

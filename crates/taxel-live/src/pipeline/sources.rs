@@ -15,7 +15,7 @@ use super::counters::{Counters, SourceCounts};
 use super::options::LiveOptions;
 use super::recorder::{Host, Part};
 use super::shared::Shared;
-use super::source::{Place, Source, SourceKind, Tap};
+use super::source::{LineReader, Place, Source, SourceKind};
 use crate::locked::lock;
 use crate::recording::{self, Stream, Track, fields};
 use crate::{Error, Result};
@@ -37,7 +37,7 @@ pub(super) struct Numbers {
 #[derive(Default)]
 struct Kept {
     track: Option<Track>,
-    /// Lines, and strange ones, that came before it.
+    /// Lines, and strange ones, that arrived before it.
     before: (u64, u64),
 }
 
@@ -55,7 +55,7 @@ impl Numbers {
         }
     }
 
-    /// Records numbers that came.
+    /// Records numbers that arrived.
     pub(super) fn sample(&self, arrived_ns: i64, values: &[f64]) -> Result<()> {
         if !self.stream.takes(values) {
             let columns = self.stream.columns.join(", ");
@@ -75,7 +75,7 @@ impl Numbers {
         kept.track.as_ref().map_or(Ok(()), |track| keep(track, number))
     }
 
-    /// Records a line that came.
+    /// Records a line that arrived.
     fn line(&self, arrived_ns: i64, line: &str) -> Result<()> {
         match self.stream.parse(line) {
             Some(values) => self.sample(arrived_ns, &values),
@@ -88,7 +88,7 @@ impl Numbers {
         }
     }
 
-    /// Records what comes from here on into this part of a recording, or none; ends the part before with its counts, and returns
+    /// Records what arrives from now on into this part of a recording, or none; ends the part before with its counts, and returns
     /// those.
     pub(super) fn keep_in(&self, track: Option<Track>) -> SourceCounts {
         let mut kept = lock(&self.track);
@@ -117,27 +117,27 @@ impl Numbers {
 
     /// Reads lines until the end, in a thread of its own; a line that breaks is opened again. `begun`: they were opened before,
     /// and read up to the beginning of a line.
-    pub(super) fn read(self: &Arc<Self>, place: &Place, begun: Option<Tap>) -> Result<JoinHandle<()>> {
+    pub(super) fn read(self: &Arc<Self>, place: &Place, begun: Option<LineReader>) -> Result<JoinHandle<()>> {
         let whole = begun.is_some();
-        let (numbers, mut tap) = (Arc::clone(self), begun.map_or_else(|| Tap::open(place), Ok)?);
+        let (numbers, mut reader) = (Arc::clone(self), begun.map_or_else(|| LineReader::open(place), Ok)?);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
             // A serial line that is opened in the middle of a line gives the rest of that line first.
             let mut first = !whole;
             while !numbers.ends.load(Ordering::Acquire) {
-                let ended = match tap.fill() {
+                let ended = match reader.fill() {
                     Ok(ended) => ended,
                     Err(error) => {
-                        *lock(&numbers.trouble) = Some(tap.broken(error).to_string());
-                        tap.again();
+                        *lock(&numbers.trouble) = Some(reader.broken(error).to_string());
+                        reader.again();
                         first = true;
                         continue;
                     }
                 };
-                let at_ns = tap.came_ns;
-                while let Some(line) = tap.line() {
+                let at_ns = reader.came_ns;
+                while let Some(line) = reader.line() {
                     let cut = std::mem::take(&mut first) && numbers.stream.parse(&line).is_none();
-                    let kept = if cut && tap.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
+                    let kept = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
                     if let Err(error) = kept {
                         if !numbers.ends.load(Ordering::Acquire)
                             && let Some(host) = numbers.part.host.upgrade()

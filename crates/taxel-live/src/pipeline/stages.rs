@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
+use taxel_core::held::UNKNOWN;
 use taxel_core::problem;
 
 use super::decode::DecodeStage;
@@ -16,7 +17,6 @@ use super::receive::ReceiveStage;
 use super::record::RecordStage;
 use super::recorder::Recorder;
 use super::shared::{Ended, Request, Shared};
-use super::tap::UNKNOWN;
 use crate::Result;
 use crate::capture::Batch;
 use crate::locked::lock;
@@ -34,7 +34,7 @@ pub(super) enum Next {
     Output,
     /// The readout is to continue in a thread of its own.
     Separate(Box<Reader>),
-    /// Nothing will come any more.
+    /// No more data will arrive.
     Over,
 }
 
@@ -125,7 +125,7 @@ impl Stages {
         };
         self.observers.datagrams(&batch, silent_until);
         self.receive.reuse(batch);
-        self.observers.tick();
+        self.observers.tick(self.decode.held());
         self.record.pictures(self.decode.decoded(), self.decode.held(), false)?;
         if self.observers.picture(self.decode.held()) {
             self.record.progress()?;
@@ -139,22 +139,22 @@ impl Stages {
     fn process(&mut self, batch: &Batch) -> Result<()> {
         for (datagram, bytes) in batch.iter() {
             let mut decoded = self.decode.push(datagram, bytes);
-            if decoded.took.reset {
+            if decoded.info.reset {
                 let later = self.decode.split_at_reset(&mut decoded);
                 self.hand_on()?;
-                self.observers.reset();
                 self.decode.reset(&later);
-                if decoded.took.version == 2 {
+                self.observers.reset(self.decode.held());
+                if decoded.info.version == 2 {
                     self.read_out.reset();
                 }
             }
             let now = now_ns();
             self.decode.note(&decoded, self.read_out.announced());
-            self.record.board(&decoded.took, decoded.arrived_ns)?;
+            self.record.board(&decoded.info, decoded.arrived_ns)?;
             self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
             self.shared.published().decode_latency.note(now - decoded.arrived_ns);
             if self.decode.events().len() >= HAND_ON {
-                // So much waits only where reading out takes longer than what comes leaves it.
+                // So much waits only where reading out takes longer than what arrives leaves it.
                 self.read_out.separate();
                 self.hand_on()?;
             }
@@ -165,7 +165,7 @@ impl Stages {
     /// Hands the decoded events on to the other stages.
     fn hand_on(&mut self) -> Result<()> {
         self.decode.hold();
-        self.observers.events(self.decode.events());
+        self.observers.events(self.decode.events(), self.decode.held());
         self.record.markers(&self.decode.events().markers)?;
         {
             let mut published = self.shared.published();
@@ -173,18 +173,18 @@ impl Stages {
             self.decode.publish(&mut published.counters);
         }
         let promised = self.decode.take_promise();
-        self.read_out.push(&self.shared, self.decode.events(), promised);
+        self.read_out.push(&self.shared, self.decode.events_mut(), promised);
         self.decode.clear();
         Ok(())
     }
 
-    /// Nothing will come any more: hands on what waits in each stage.
+    /// No more data will arrive: hands on what waits in each stage.
     fn finish(&mut self) -> Result<()> {
         self.decode.finish();
         self.hand_on()?;
         self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
         let quiet = self.decode.quiet(self.receive.silent_until()).filter(|_| self.read_out.is_on());
-        self.observers.finish();
+        self.observers.finish(self.decode.held());
         self.read_out.close(&self.shared, quiet);
         self.answer()
     }
@@ -195,7 +195,7 @@ impl Stages {
         for request in requests {
             match request {
                 Request::Record(next, give) => drop(give.send(self.switch_recording(next))),
-                Request::Tap(give) => self.observers.add_tap(&give, self.decode.held()),
+                Request::View(give) => self.observers.add_viewer(&give, self.decode.held()),
                 Request::Copy(give) => self.observers.add_copier(&give),
                 Request::Zero(taxels, give) => drop(give.send(self.zero(&taxels))),
                 Request::Registers(registers) => {
@@ -216,7 +216,7 @@ impl Stages {
         self.record.switch(next, self.decode.held())
     }
 
-    /// The board was told to speak this version of the wire.
+    /// The board was set to this version of the wire.
     fn expect_version(&mut self, version: u8) -> Result<()> {
         if self.decode.expect(version) {
             self.record.asked_for_version(version, self.decode.latest())?;
@@ -240,10 +240,11 @@ impl Stages {
             let mut zeroing = Zeroing { t, x, y, rest: 0.0, before: None };
             zeroing.check(array)?;
             let place = array.index(x, y);
-            if self.decode.held()[place] == UNKNOWN {
+            let held = self.decode.held().values()[place];
+            if held == UNKNOWN {
                 return Err(problem!("taxel at row {y}, column {x}: no event so far, so its value is unknown").into());
             }
-            zeroing.rest = self.decode.held()[place].into();
+            zeroing.rest = held.into();
             let tared = published.rest.get(place).copied().flatten();
             zeroing.before = published.zeroed.get(&place).map(|earlier| earlier.rest).or(tared);
             zeroings.push(zeroing);

@@ -1,11 +1,11 @@
-//! The pipeline's threads, as leader and followers (Schmidt et al., Pattern-Oriented Software Architecture 2, 2000): one thread at
-//! a time has the stages. As long as nothing is recorded it receives, decodes, reads out and hands detections on, so that one
-//! wake-up lies between a datagram and a callback. It puts the stages down before it calls a callback and takes them up again after;
-//! where a callback takes longer than [`TAKE_OVER`], the other thread takes them, and goes on receiving: what comes meanwhile
-//! waits in the kernel's buffer.
+//! The pipeline's threads, in the pattern *leader/followers* (Schmidt et al., Pattern-Oriented Software Architecture 2, 2000): one
+//! thread at a time owns the stages. While nothing is recorded it receives, decodes, reads out and outputs detections, so that
+//! there is one wake-up between a datagram and a callback. It releases the stages before it calls a callback, and acquires them
+//! again afterwards; where a callback takes longer than [`TAKE_OVER`], the other thread acquires them and continues to receive:
+//! what arrives in the meantime waits in the kernel's buffer.
 //!
-//! A disk may hold up a recording, and a readout may be slower than what comes: then one thread receives (or takes what a third
-//! one received), decodes and records, and the other reads out, from there on.
+//! A disk may delay a recording, and a readout may be slower than the events arrive: then one thread receives (or reads what a
+//! third one received), decodes and records, and the other reads out from then on.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
@@ -16,10 +16,10 @@ use super::shared::Shared;
 use super::stages::{Next, Stages};
 use crate::locked::lock;
 
-/// How often the follower looks whether the stages were put down: so long a callback may hold up what comes.
+/// How often the follower checks whether the stages were released: a callback may delay receiving by this.
 const TAKE_OVER: Duration = Duration::from_millis(2);
 
-/// The stages and the output, which the threads take turns at.
+/// The stages and the output, which one thread at a time owns.
 pub(super) struct Threads {
     turn: Mutex<Turn>,
     changed: Condvar,
@@ -27,7 +27,7 @@ pub(super) struct Threads {
 }
 
 struct Turn {
-    /// `None` while a thread, the leader, has them.
+    /// `None` while a thread, the leader, owns them.
     stages: Option<Box<Stages>>,
     /// A readout that is to continue in a thread of its own.
     reader: Option<Reader>,
@@ -63,7 +63,7 @@ impl Threads {
         }
     }
 
-    /// Leads until there are detections to hand on, or all is over.
+    /// Runs the stages until there are detections to output, or the pipeline has ended.
     fn lead(&self, mut stages: Box<Stages>, shared: &Shared) {
         loop {
             let next = stages.run();
@@ -88,7 +88,7 @@ impl Threads {
     }
 }
 
-/// However a thread ends, the other one does not wait for it.
+/// Ends the wait of the other thread, however this one ends.
 struct Leaving<'a> {
     threads: &'a Threads,
     shared: &'a Shared,
@@ -101,7 +101,7 @@ impl Drop for Leaving<'_> {
         if std::thread::panicking() {
             turn.over = true;
             self.shared.receiver.stop();
-            self.shared.handover.close(None);
+            self.shared.readout_queue.close(None);
         }
         if turn.left == 0 {
             self.shared.end();

@@ -1,4 +1,4 @@
-//! The manual's raw recordings (Appendix 1, section 3): `NAME.lsa` holds all bytes as they came and nothing else, an empty
+//! The manual's raw recordings (Appendix 1, section 3): `NAME.lsa` holds all bytes as they arrived and nothing else, an empty
 //! `NAME.lss` marks it as complete. The manual's program overwrites without a warning; this one refuses.
 
 use std::fs::File;
@@ -160,8 +160,8 @@ pub fn decode_lsa(
     let bytes = std::fs::read(path).map_err(Error::file(path))?;
     if wire::v2::begins(&bytes) {
         let name = path.display();
-        let said = "begins with a datagram of wire version 2; a .lsa holds version 1";
-        return Err(taxel_core::Error::Format(format!("{name}: {said}: record version 2 to a .mcap file")).into());
+        let reason = "begins with a datagram of wire version 2; a .lsa holds version 1";
+        return Err(taxel_core::Error::Format(format!("{name}: {reason}: record version 2 to a .mcap file")).into());
     }
     let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(differences);
     let mut events = Events::empty(array);

@@ -41,7 +41,7 @@ pub struct Reader {
     rebuilt: Rebuilt,
 }
 
-/// What reading some blocks leaves for the next: the file's own channels, where numbers have come to.
+/// What reading some blocks leaves for the next: the file's own channels, where numbers have arrived to.
 #[derive(Debug, Clone, Default)]
 pub struct Place {
     topics: BTreeMap<u16, Option<Topic>>,
@@ -58,7 +58,7 @@ impl Place {
     }
 }
 
-/// A recording's datagrams as they came, one after the other.
+/// A recording's datagrams as they arrived, one after the other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Datagrams {
     /// When each came, ns since 1970.
@@ -78,7 +78,7 @@ pub struct Decoded {
     pub events: Events,
     /// What the decoder saw and dropped.
     pub counts: wire::Counts,
-    /// What came and what was missing of version 2.
+    /// What arrived and what was missing of version 2.
     pub version_2: wire::v2::Counts,
     /// When each datagram came, ns since 1970.
     pub arrived_ns: Vec<i64>,
@@ -276,7 +276,7 @@ impl Reader {
         Ok((all, bad))
     }
 
-    /// All datagrams as they came.
+    /// All datagrams as they arrived.
     ///
     /// # Errors
     ///
@@ -331,9 +331,9 @@ impl Reader {
             if message.topic == Topic::Datagrams {
                 let before = decoded.events.len();
                 let arrived = Some(message.at_ns / 1000);
-                let took = sender.push(message.data, arrived, &mut decoded.events);
+                let info = sender.push(message.data, arrived, &mut decoded.events);
                 let last = decoded.events.t.get(before..).and_then(<[i64]>::last).copied();
-                let left = leaves(&took, last, message.data.len(), frame_us).map_or(i64::MIN, |t| t + header.origin_us);
+                let left = leaves(&info, last, message.data.len(), frame_us).map_or(i64::MIN, |t| t + header.origin_us);
                 decoded.left.push(left);
                 decoded.arrived_ns.push(message.at_ns);
                 decoded.number.push(message.number);

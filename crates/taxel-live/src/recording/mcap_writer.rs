@@ -63,7 +63,7 @@ impl std::ops::Deref for Writer {
 }
 
 impl Writer {
-    /// Begins a recording of the header's source and of those that it names; the file is readable from here on.
+    /// Begins a recording of the header's source and of those that it names; the file is readable from now on.
     ///
     /// # Errors
     ///
@@ -84,7 +84,7 @@ impl Writer {
             source: 0,
             stream: header.stream.clone(),
             columns: header.array.columns.into(),
-            pictures: Mutex::default(),
+            pictures: Mutex::new(Pictures::new(header.array.len())),
         };
         Self { track, header: header.clone() }
     }
@@ -127,7 +127,7 @@ impl Writer {
             source: k + 1,
             stream: self.header.sources[k].stream.clone(),
             columns: self.header.sources[k].array.columns.into(),
-            pictures: Mutex::default(),
+            pictures: Mutex::new(Pictures::new(self.header.sources[k].array.len())),
         })
     }
 
@@ -163,7 +163,7 @@ impl Writer {
 }
 
 impl Track {
-    /// Writes numbers of a stream as they came, one for each of its columns: arrival by the host's clock (ns since 1970), our
+    /// Writes numbers of a stream as they arrived, one for each of its columns: arrival by the host's clock (ns since 1970), our
     /// arrival number.
     ///
     /// # Errors
@@ -177,7 +177,7 @@ impl Track {
         self.push(Topic::Samples, arrived_ns, number, stream.message(values).to_string().as_bytes())
     }
 
-    /// Writes a line of a stream that could not be read, as it came.
+    /// Writes a line of a stream that could not be read, as it arrived.
     ///
     /// # Errors
     ///
@@ -193,7 +193,7 @@ impl Track {
         state.ends.insert(name.to_owned(), Counts { recorded, ..counts });
     }
 
-    /// Writes a datagram as it came: arrival by the host's clock (ns since 1970), our arrival number, bytes.
+    /// Writes a datagram as it arrived: arrival by the host's clock (ns since 1970), our arrival number, bytes.
     ///
     /// # Errors
     ///
@@ -302,7 +302,7 @@ impl Track {
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 
-    /// Subtracts a tare's rest from the pictures from here on; before, the lowest value that each taxel held so far.
+    /// Subtracts a tare's rest from the pictures from now on; before, the lowest value that each taxel held so far.
     pub fn tare(&self, tare: &Tare) {
         self.pictures().tare(tare);
     }

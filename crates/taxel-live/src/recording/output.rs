@@ -36,8 +36,8 @@ impl OutputFile {
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
-                    let said = "is being recorded by another program; end that first, or name another file";
-                    return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, said)));
+                    let text = "is being recorded by another program; end that first, or name another file";
+                    return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, text)));
                 }
                 // A file system without locks, as some of networks: what is lost there is found at the end.
                 Err(TryLockError::Error(error))
@@ -64,7 +64,7 @@ impl OutputFile {
         self.new
     }
 
-    /// Empties it: what it held before is replaced from here on.
+    /// Empties it: what it held before is replaced from now on.
     ///
     /// # Errors
     ///
@@ -100,8 +100,8 @@ impl OutputFile {
         if self.is_in_place()? {
             return Ok(());
         }
-        let said = format!("was removed, renamed or replaced while it was recorded; LOST: {}", written());
-        Err(Error::file(&self.path)(IoError::new(ErrorKind::NotFound, said)))
+        let text = format!("was removed, renamed or replaced while it was recorded; LOST: {}", written());
+        Err(Error::file(&self.path)(IoError::new(ErrorKind::NotFound, text)))
     }
 
     /// Removes the file where it is new: nothing is to be kept in it. An earlier one stays.

@@ -1,8 +1,9 @@
 //! The low-rate picture: held values as grey, so that a viewer shows a touch and not the rest of the sensor.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 use taxel_core::encode::Tare;
+use taxel_core::rest::{Rest, Value};
 
 /// White is the largest value of so long, us.
 const SCALE_US: i64 = 10_000_000;
@@ -11,13 +12,9 @@ const SCALE_US: i64 = 10_000_000;
 const LATE_US: i64 = 1_000_000;
 
 /// What pictures are made of: what each taxel reads at rest, and how strongly it was pressed lately.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Pictures {
-    tare: Option<Vec<f64>>,
-    /// What taxels rest at that were zeroed since, by index.
-    zeroed: BTreeMap<usize, f64>,
-    /// The lowest value that each taxel held so far; `None` before its first event.
-    lowest: Vec<Option<u16>>,
+    rest: Rest<f64>,
     /// Largest values above rest with their times, us: falling values, so that the first is the largest of all.
     peaks: VecDeque<(i64, f64)>,
 }
@@ -34,40 +31,37 @@ pub(super) struct Grey {
 }
 
 impl Pictures {
-    /// Takes a tare's rest off from here on.
+    /// Pictures of so many taxels, above the lowest value of each.
+    pub(super) fn new(taxels: usize) -> Self {
+        Self { rest: Rest::lowest(vec![f64::NO_REST; taxels]), peaks: VecDeque::new() }
+    }
+
+    /// Subtracts a tare's rest from now on.
     pub(super) fn tare(&mut self, tare: &Tare) {
         // A taxel without any event so far reads 0 and rests there.
-        self.tare = Some(tare.rest.iter().map(|rest| rest.unwrap_or(0.0)).collect());
-        self.zeroed.clear();
+        self.rest = Rest::measured(tare.rest.iter().map(|rest| rest.unwrap_or(0.0)).collect());
         self.peaks.clear();
     }
 
-    /// Takes this off a taxel from here on.
+    /// Subtracts this from the values of a taxel from now on.
     pub(super) fn zero(&mut self, taxel: usize, rest: f64) {
-        self.zeroed.insert(taxel, rest);
+        if taxel < self.rest.values().len() {
+            self.rest.set(taxel, rest);
+        }
     }
 
     /// The grey picture of the values at `t_us`; 0 is a taxel without any event so far.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn take(&mut self, t_us: i64, held: &[u16]) -> Grey {
-        self.lowest.resize(held.len(), None);
-        for (lowest, &value) in self.lowest.iter_mut().zip(held) {
-            if value > 0 {
-                *lowest = Some(lowest.map_or(value, |low| low.min(value)));
-            }
+        if self.rest.values().len() != held.len() {
+            self.rest = Self::new(held.len()).rest;
         }
-        let tare = self.tare.as_ref().filter(|rest| rest.len() == held.len());
-        let above: Vec<f64> = held
-            .iter()
-            .enumerate()
-            .map(|(k, &value)| {
-                let zeroed = if self.zeroed.is_empty() { None } else { self.zeroed.get(&k) };
-                let rest = zeroed.copied().or(tare.map(|rest| rest[k]));
-                let rest = rest.unwrap_or_else(|| f64::from(self.lowest[k].unwrap_or(0)));
-                if value > 0 { (f64::from(value) - rest).max(0.0) } else { 0.0 }
-            })
-            .collect();
-        let rest = if tare.is_some() { "tare" } else { "lowest so far" };
+        let mut above = vec![0.0; held.len()];
+        for (taxel, &value) in held.iter().enumerate().filter(|(_, value)| **value > 0) {
+            self.rest.follow(taxel, value.into());
+            above[taxel] = self.rest.above(taxel, value.into());
+        }
+        let rest = if self.rest.is_lowest() { "lowest so far" } else { "tare" };
         let peak = above.iter().copied().fold(0.0, f64::max);
         let late = self.peaks.back().is_some_and(|&(t, _)| (1..=LATE_US).contains(&t.saturating_sub(t_us)));
         // Time that steps far back begins the scale anew.
@@ -93,7 +87,7 @@ mod tests {
 
     #[test]
     fn rest_is_black_and_the_largest_of_the_last_ten_seconds_white() {
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new(3);
         let first = pictures.take(0, &[100, 50, 0]);
         assert_eq!(first, Grey { bytes: vec![0, 0, 0], rest: "lowest so far", full: 1.0 });
         let pressed = pictures.take(100_000, &[160, 80, 0]);
@@ -108,21 +102,21 @@ mod tests {
 
     #[test]
     fn a_picture_that_comes_late_keeps_the_scale() {
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new(1);
         pictures.take(0, &[100]);
         assert_eq!(pictures.take(1_000_000, &[140]).full, 40.0);
         assert_eq!(pictures.take(1_500_000, &[120]).full, 40.0);
-        // Of half a second ago, weaker and stronger than what came since.
+        // Of half a second ago, weaker and stronger than what arrived since.
         assert_eq!(pictures.take(1_400_000, &[110]).bytes, [64]);
         assert_eq!(pictures.take(1_450_000, &[180]).full, 80.0);
         assert_eq!(pictures.take(1_600_000, &[140]).bytes, [128]);
-        // A clock that begins anew.
+        // A clock that restarts.
         assert_eq!(pictures.take(0, &[140]).bytes, [255]);
     }
 
     #[test]
     fn a_zeroed_taxel_is_black_until_it_is_pressed() {
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new(2);
         pictures.take(0, &[100, 100]);
         assert_eq!(pictures.take(1, &[130, 140]).bytes, [191, 255]);
         pictures.zero(0, 130.0);
@@ -135,7 +129,7 @@ mod tests {
         let array = Array { rows: 1, columns: 3, ..Array::thesis() };
         let rest = vec![Some(90.5), None, Some(20.0)];
         let tare = Tare { array, rest, start_us: 0, stop_us: 1, note: String::new() };
-        let mut pictures = Pictures::default();
+        let mut pictures = Pictures::new(3);
         pictures.take(0, &[100, 50, 20]);
         pictures.tare(&tare);
         let grey = pictures.take(100_000, &[110, 39, 20]);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use taxel_core::held::HeldOverTime;
 use taxel_core::{EventsView, Result};
 
 /// From one picture to the next where events come, us.
@@ -14,9 +15,7 @@ const NEAR_US: i64 = 10_000;
 #[derive(Debug)]
 pub struct Pictures {
     times: std::vec::IntoIter<i64>,
-    /// Time, taxel and ticks of each event with an intensity, by time.
-    events: std::iter::Peekable<std::vec::IntoIter<(i64, usize, u16)>>,
-    held: Vec<u16>,
+    held: HeldOverTime<u16>,
 }
 
 impl Pictures {
@@ -27,30 +26,21 @@ impl Pictures {
     ///
     /// `Problem` where columns are unequal or a taxel lies outside the array.
     pub fn new(events: EventsView<'_>, around: &[i64]) -> Result<Self> {
-        events.check()?;
-        let (array, mut read) = (events.array, vec![]);
-        if let Some(intensities) = &events.intensity {
-            for k in (0..events.len()).filter(|&k| intensities.present[k]) {
-                read.push((events.t[k], array.index(events.x[k], events.y[k]), intensities.ticks[k]));
-            }
-        }
-        read.sort_by_key(|&(t, ..)| t);
+        // In a picture 0 is also a taxel without any event so far.
+        let held = HeldOverTime::new(events, None, vec![0; events.array.len()])?;
         let ends = |t: i64, every: i64| -(-t).div_euclid(every) * every;
-        let mut times: BTreeSet<i64> = read.iter().map(|&(t, ..)| ends(t, EVERY_US)).collect();
-        if let (Some(&(first, ..)), Some(&last)) = (read.first(), times.last()) {
+        let mut times: BTreeSet<i64> = held.times().map(|t| ends(t, EVERY_US)).collect();
+        if let (Some(first), Some(&last)) = (held.times().next(), times.last()) {
             let near = around.iter().map(|&t| ends(t, NEAR_US)).flat_map(|t| [t - NEAR_US, t]);
             times.extend(near.filter(|t| (first..=last).contains(t)));
         }
         let times: Vec<i64> = times.into_iter().collect();
-        Ok(Self { times: times.into_iter(), events: read.into_iter().peekable(), held: vec![0; array.len()] })
+        Ok(Self { times: times.into_iter(), held })
     }
 
     /// The next picture: its time, us, and what each taxel holds then, by index; 0 of one without any event so far.
     pub fn next_picture(&mut self) -> Option<(i64, &[u16])> {
         let time = self.times.next()?;
-        while let Some((_, taxel, ticks)) = self.events.next_if(|&(t, ..)| t <= time) {
-            self.held[taxel] = ticks;
-        }
-        Some((time, &self.held))
+        Some((time, self.held.at(time)))
     }
 }

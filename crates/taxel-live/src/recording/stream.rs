@@ -102,7 +102,7 @@ pub fn fields(line: &str) -> impl Iterator<Item = &str> {
     line.split([',', ';', '\t', ' ']).filter(|field| !field.is_empty())
 }
 
-/// The samples of a stream, as they came.
+/// The samples of a stream, as they arrived.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Samples {
     /// When each came, ns since 1970.
@@ -155,8 +155,8 @@ impl<'a> Sampling<'a> {
 
     /// The stamp and the values of a message; a number that JSON cannot hold is not one.
     fn parse(&self, data: &[u8]) -> Option<(Option<f64>, Vec<f64>)> {
-        let said: Value = serde_json::from_slice(data).ok()?;
-        let named = said.get("values")?.as_object()?;
+        let message: Value = serde_json::from_slice(data).ok()?;
+        let named = message.get("values")?.as_object()?;
         let values = self.stream.values().map(|name| Some(named.get(name)?.as_f64().unwrap_or(f64::NAN)));
         let stamp = match &self.stream.time {
             None => None,

@@ -1,6 +1,7 @@
 //! Counts by taxel from which dead, stuck and noisy ones are found.
 
-use taxel_live::pipeline::{Change, UNKNOWN};
+use taxel_core::held::UNKNOWN;
+use taxel_live::pipeline::Change;
 
 /// Events and held values of each taxel so far.
 #[derive(Debug, Clone)]

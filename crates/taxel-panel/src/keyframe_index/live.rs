@@ -10,9 +10,10 @@ use super::{ChangeReader, KeyframeIndex, Read};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{SPAN, TimeColumns};
+use taxel_core::held::UNKNOWN;
 use taxel_live::Result;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::{Change, Piece, UNKNOWN};
+use taxel_live::pipeline::{Change, Piece};
 
 /// How far back a live source can be viewed, us ...
 pub(crate) const REACH_US: i64 = 60_000_000;

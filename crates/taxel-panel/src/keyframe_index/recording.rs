@@ -16,7 +16,8 @@ use super::event_rate::EventRate;
 use super::{Activity, ChangeReader, KeyframeIndex, Read};
 use crate::array_state::{ArrayState, Keyframe};
 use crate::time_columns::{COLUMN_US, TimeColumns, column_of};
-use taxel_live::pipeline::{Change, UNKNOWN};
+use taxel_core::held::UNKNOWN;
+use taxel_live::pipeline::Change;
 use taxel_live::recording::{Ending, Header, NOTHING_LOST, Place, Reader, Remarks, Topic, begin_with};
 use taxel_live::{Error, Result};
 

@@ -14,7 +14,7 @@ use crate::request::{Answer, Refusal};
 use crate::taxel_history::TaxelHistory;
 use crate::time_columns::{COLUMN_US, column_of};
 
-/// Narrow columns that lag this far behind begin anew from the last keyframe, which is less to decode, us.
+/// Narrow columns that lag this far behind restart from the last keyframe, which is less to decode, us.
 const NARROW_LAG_US: i64 = 1_000_000;
 
 /// See the module.
@@ -29,12 +29,12 @@ pub(super) struct Following {
 }
 
 impl Following {
-    /// Drops the history and the narrow columns, which begin anew with the next picture.
+    /// Drops the history and the narrow columns, which restart with the next picture.
     pub(super) fn restart(&mut self) {
         (self.history, self.narrow) = (None, None);
     }
 
-    /// Drops the history, which begins anew with the next picture.
+    /// Drops the history, which restarts with the next picture.
     pub(super) fn restart_history(&mut self) {
         self.history = None;
     }

@@ -140,7 +140,7 @@ impl Viewport {
 
     // ------------------------------------------------------------------------------------------ pictures
 
-    /// Moves a playing view on; returns whether it has come to the end of its recording.
+    /// Moves a playing view on; returns whether it has arrived to the end of its recording.
     pub(super) async fn play_on(&mut self) -> bool {
         let Some(t) = self.playback.now() else { return false };
         match self.with_player(move |player| player.advance(t)).await {

@@ -26,7 +26,7 @@ const SESSIONS: usize = 4;
 
 /// What one datagram was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Heard {
+pub enum Outcome {
     /// Decoded.
     Intact {
         /// Nothing before this comes with a higher number, us; none where nothing is promised.
@@ -145,7 +145,7 @@ impl Decoder {
     /// `arrived` is the host's clock in us. After a reset it shows how much time has passed, else time goes on from the latest
     /// that was received.
     #[inline]
-    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
+    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Outcome {
         self.push_table(datagram, arrived, out)
     }
 
@@ -154,14 +154,14 @@ impl Decoder {
     /// # Errors
     ///
     /// `Problem` where a column has fewer entries than [`stream_rows`] asks for, and nothing was read.
-    pub fn fill(&mut self, datagram: &[u8], arrived: Option<i64>, room: Room<'_>) -> Result<(Columns, Heard)> {
+    pub fn fill(&mut self, datagram: &[u8], arrived: Option<i64>, room: Room<'_>) -> Result<(Columns, Outcome)> {
         let mut laid = Laid::new(check_room(room, datagram.len())?);
         let heard = self.push_table(datagram, arrived, &mut laid);
         Ok((laid.end(), heard))
     }
 
     #[inline]
-    fn push_table(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Heard {
+    fn push_table(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Outcome {
         let latest = self.latest;
         let taken = self.plain(std::iter::once(datagram), stream_rows(datagram.len()), out);
         match self.sessions.last() {
@@ -169,13 +169,13 @@ impl Decoder {
                 let Taken { base, span, .. } = taken;
                 self.last_arrival = arrived.map(|now| (now, latest.max(base))).or(self.last_arrival);
                 let until = (span > 0).then(|| base + i64::from(span));
-                Heard::Intact { until, missing: session.missing(), reset: false }
+                Outcome::Intact { until, missing: session.missing(), reset: false }
             }
             _ => self.push_any(datagram, arrived, out),
         }
     }
 
-    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Heard {
+    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Outcome {
         match Header::read(datagram) {
             Ok((header, body)) => self.push_read(&header, body, arrived, out),
             Err(refused) => {
@@ -186,7 +186,7 @@ impl Decoder {
                     Refused::Foreign => &mut self.counts.foreign,
                     Refused::Checksum => &mut self.counts.checksum,
                 } += 1;
-                Heard::Refused(refused)
+                Outcome::Refused(refused)
             }
         }
     }
@@ -198,11 +198,11 @@ impl Decoder {
         body: &[u8],
         arrived: Option<i64>,
         out: &mut impl Table,
-    ) -> Heard {
+    ) -> Outcome {
         self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
             self.counts.foreign += 1;
-            return Heard::Refused(Refused::Foreign);
+            return Outcome::Refused(Refused::Foreign);
         }
         let (which, reset) = match self.sessions.last() {
             // As nearly all come.
@@ -213,11 +213,11 @@ impl Decoder {
         match session.note(session.number_of(header.sequence)) {
             None => {
                 self.counts.old += 1;
-                return Heard::Repeated;
+                return Outcome::Repeated;
             }
             Some(false) => {
                 self.counts.repeated += 1;
-                return Heard::Repeated;
+                return Outcome::Repeated;
             }
             Some(true) => {}
         }
@@ -242,7 +242,7 @@ impl Decoder {
         }
         let until = (header.span > 0).then(|| base + i64::from(header.span));
         self.latest = self.latest.max(until.unwrap_or(i64::MIN));
-        Heard::Intact { until, missing, reset }
+        Outcome::Intact { until, missing, reset }
     }
 
     /// Takes datagrams as far as they are plain and of a few words, where the machine has the instructions; `out` has room for

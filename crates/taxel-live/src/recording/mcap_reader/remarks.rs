@@ -4,6 +4,7 @@ use serde_json::Value;
 use taxel_core::Marker;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
+use taxel_core::held::UNKNOWN;
 use taxel_core::wire::{self, Registers};
 
 use super::message::Message;
@@ -113,7 +114,7 @@ fn held(data: &[u8]) -> Option<Vec<u16>> {
 /// Gives a decoder the values that the taxels held before the recording's first datagram.
 pub fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
     if let Some(held) = held(data) {
-        receiver.begin_with(held.iter().map(|ticks| (*ticks != u16::MAX).then_some(*ticks)));
+        receiver.begin_with(held.iter().map(|ticks| (*ticks != UNKNOWN).then_some(*ticks)));
     }
 }
 

@@ -105,11 +105,11 @@ impl<'a> Walk<'a> {
                     self.unpacked += size;
                     let most = limits::unpacked(self.length);
                     if self.unpacked > most {
-                        let said = "bytes (1000 times the file and 256 MiB)";
+                        let limit = "bytes (1000 times the file and 256 MiB)";
                         return Err(Error::format(
                             self.path,
                             &format!(
-                                "chunk at byte {at}: the chunks up to here say that they unpack to more than {most} {said}"
+                                "chunk at byte {at}: the chunks up to here say that they unpack to more than {most} {limit}"
                             ),
                         ));
                     }

@@ -38,7 +38,7 @@ pub(super) struct WriteQueue {
     /// Whether the thread that writes waits for the operating system.
     pub(super) at_disk: Arc<AtomicBool>,
     state: Mutex<Pending>,
-    /// Wakes the thread: the end has come, or the queue fills a chunk.
+    /// Wakes the thread: the end has arrived, or the queue fills a chunk.
     work: Condvar,
     /// Wakes callers: there is room in the queue again, or writing has failed.
     room: Condvar,

@@ -94,7 +94,7 @@ fn a_straggler_of_before_a_reset_changes_nothing_that_is_held_since() {
     }
     let held = decoder.held();
     let heard = events.len();
-    assert!(matches!(decoder.push(late, None, &mut events), Heard::Intact { reset: false, .. }));
+    assert!(matches!(decoder.push(late, None, &mut events), Outcome::Intact { reset: false, .. }));
     assert!(events.len() > heard, "its events are events");
     assert_eq!(decoder.held(), held);
 }

@@ -8,15 +8,13 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use std::sync::Arc;
+use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::{Array, Events, Marker};
 
-/// The value of a taxel without any event so far, and of a change without a value.
-pub const UNKNOWN: u16 = u16::MAX;
-
 /// From piece to piece while a viewer is connected ...
-const LOOKED_AT: Duration = Duration::from_millis(8);
+const WATCHED: Duration = Duration::from_millis(8);
 /// ... and while none is: a viewer that looks back begins where a piece does.
-const UNSEEN: Duration = Duration::from_millis(100);
+const UNWATCHED: Duration = Duration::from_millis(100);
 
 /// How often a piece begins with the held values.
 const HELD_EVERY: Duration = Duration::from_millis(100);
@@ -37,7 +35,7 @@ pub struct Change {
     pub t: i64,
     /// Its index.
     pub taxel: u32,
-    /// The value that came with it, ticks; [`UNKNOWN`] where none did.
+    /// The value that arrived with it, ticks; [`UNKNOWN`] where none did.
     pub ticks: u16,
     /// More pressure.
     pub up: bool,
@@ -54,7 +52,7 @@ pub struct Piece {
     pub held: Option<Vec<u16>>,
     /// The board's time before the first of them; `None` before anything came.
     pub since: Option<i64>,
-    /// Events that came before them, those included that are missing.
+    /// Events that arrived before them, those included that are missing.
     pub before: u64,
     /// Events that are missing between the last piece and this one.
     pub missing: u64,
@@ -66,12 +64,12 @@ pub struct Piece {
 
 /// The receiving end.
 #[derive(Debug)]
-pub struct Outlet {
+pub struct ViewerEvents {
     pieces: Receiver<Piece>,
-    looked_at: Arc<AtomicBool>,
+    watched: Arc<AtomicBool>,
 }
 
-impl Outlet {
+impl ViewerEvents {
     /// The next piece, where one waits.
     #[must_use]
     pub fn next(&self) -> Option<Piece> {
@@ -79,62 +77,62 @@ impl Outlet {
     }
 
     /// Sets whether a viewer is connected: then pieces come often enough for sixty pictures a second, else ten times.
-    pub fn look(&self, somebody: bool) {
-        self.looked_at.store(somebody, Ordering::Relaxed);
+    pub fn set_watched(&self, watched: bool) {
+        self.watched.store(watched, Ordering::Relaxed);
     }
 }
 
 /// The decoding thread's end.
 #[derive(Debug)]
-pub(super) struct Tap {
+pub(super) struct ViewerQueue {
     pieces: Sender<Piece>,
-    looked_at: Arc<AtomicBool>,
+    watched: Arc<AtomicBool>,
     piece: Piece,
-    held: Vec<u16>,
     latest: Option<i64>,
     events: u64,
     /// When a piece last began with the held values.
-    told: Instant,
+    held_at: Instant,
     sent: Instant,
     columns: usize,
 }
 
-/// A tap for an array whose taxels hold these values, and its receiving end.
-pub(super) fn tap(array: &Array, held: Vec<u16>, latest: Option<i64>, events: u64) -> (Tap, Outlet) {
+/// A queue for an array whose taxels hold these values, and its receiving end.
+pub(super) fn viewer_queue(
+    array: &Array,
+    held: &Held,
+    latest: Option<i64>,
+    events: u64,
+) -> (ViewerQueue, ViewerEvents) {
     let (sender, pieces) = bounded(WAITING);
-    let looked_at = Arc::new(AtomicBool::new(true));
+    let watched = Arc::new(AtomicBool::new(true));
     let now = Instant::now();
-    let first = Piece { held: Some(held.clone()), since: latest, before: events, ..Piece::default() };
-    let tap = Tap {
+    let first = Piece { held: Some(held.values().to_vec()), since: latest, before: events, ..Piece::default() };
+    let queue = ViewerQueue {
         pieces: sender,
-        looked_at: Arc::clone(&looked_at),
+        watched: Arc::clone(&watched),
         piece: first,
-        held,
         latest,
         events,
-        told: now,
+        held_at: now,
         sent: now,
         columns: usize::from(array.columns),
     };
-    (tap, Outlet { pieces, looked_at })
+    (queue, ViewerEvents { pieces, watched })
 }
 
-impl Tap {
-    /// Takes the next events.
-    pub(super) fn take(&mut self, events: &Events) {
+impl ViewerQueue {
+    /// Takes the next events, whose values are among those that the taxels hold.
+    pub(super) fn push(&mut self, events: &Events, held: &Held) {
         let room = MOST - self.piece.changes.len().min(MOST);
-        let taken = events.len().min(room);
+        let copied = events.len().min(room);
         for k in 0..events.len() {
             let taxel = usize::from(events.y[k]) * self.columns + usize::from(events.x[k]);
             let ticks = match &events.intensity {
                 Some(intensity) if intensity.present[k] => intensity.ticks[k],
                 _ => UNKNOWN,
             };
-            if ticks != UNKNOWN {
-                self.held[taxel] = ticks;
-            }
             self.latest = self.latest.max(Some(events.t[k]));
-            if k < taken {
+            if k < copied {
                 // An array has 65 536 positions at most where it is live; files have 2^22.
                 #[allow(clippy::cast_possible_truncation)]
                 let taxel = taxel as u32;
@@ -150,18 +148,18 @@ impl Tap {
         self.events += events.len() as u64;
         let room = MARKERS.saturating_sub(self.piece.markers.len());
         self.piece.markers.extend(events.markers.iter().take(room));
-        if taken < events.len() {
-            // Too much waits: it is dropped, and the next piece begins anew with the held values.
-            let missing = self.piece.missing + (self.piece.changes.len() + events.len() - taken) as u64;
+        if copied < events.len() {
+            // Too much waits: it is dropped, and the next piece restarts with the held values.
+            let missing = self.piece.missing + (self.piece.changes.len() + events.len() - copied) as u64;
             let reset = self.piece.reset;
-            self.begin(true);
+            self.begin(Some(held));
             (self.piece.missing, self.piece.reset) = (missing, reset);
         }
     }
 
     /// Hands over what waits, where it is time; false where the receiving end is gone.
-    pub(super) fn tick(&mut self) -> bool {
-        let every = if self.looked_at.load(Ordering::Relaxed) { LOOKED_AT } else { UNSEEN };
+    pub(super) fn tick(&mut self, held: &Held) -> bool {
+        let every = if self.watched.load(Ordering::Relaxed) { WATCHED } else { UNWATCHED };
         let nothing = self.piece.changes.is_empty() && self.piece.held.is_none() && self.piece.markers.is_empty();
         if nothing || self.sent.elapsed() < every {
             return true;
@@ -169,7 +167,7 @@ impl Tap {
         match self.pieces.try_send(std::mem::take(&mut self.piece)) {
             Ok(()) => {
                 self.sent = Instant::now();
-                self.begin(self.told.elapsed() >= HELD_EVERY);
+                self.begin(Some(held).filter(|_| self.held_at.elapsed() >= HELD_EVERY));
                 true
             }
             Err(TrySendError::Full(piece)) => {
@@ -181,22 +179,22 @@ impl Tap {
     }
 
     /// The board was reset: its taxels hold no value until their next event.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn reset(&mut self, held: &Held) {
         let waits = std::mem::take(&mut self.piece);
         let (missing, markers) = match self.pieces.try_send(waits) {
             Err(TrySendError::Full(piece)) => (piece.missing + piece.changes.len() as u64, piece.markers),
             Ok(()) | Err(TrySendError::Disconnected(_)) => (0, vec![]),
         };
-        self.held.fill(UNKNOWN);
-        self.begin(true);
+        self.begin(Some(held));
         self.piece = Piece { missing, markers, reset: true, ..std::mem::take(&mut self.piece) };
     }
 
-    fn begin(&mut self, with_held: bool) {
-        let held = with_held.then(|| self.held.clone());
-        if with_held {
-            self.told = Instant::now();
+    /// Begins a piece, with these held values where there are any.
+    fn begin(&mut self, held: Option<&Held>) {
+        if held.is_some() {
+            self.held_at = Instant::now();
         }
+        let held = held.map(|held| held.values().to_vec());
         self.piece = Piece { held, since: self.latest, before: self.events, ..Piece::default() };
     }
 }
@@ -220,25 +218,27 @@ mod tests {
     }
 
     #[test]
-    fn who_does_not_read_loses_events_and_not_the_picture() {
+    fn a_viewer_that_does_not_read_loses_events_and_not_the_picture() {
         let array = Array::thesis();
-        let (mut tap, outlet) = tap(&array, vec![UNKNOWN; array.len()], None, 0);
+        let mut held = Held::unknown(array.len());
+        let (mut queue, viewer) = viewer_queue(&array, &held, None, 0);
         let many: Vec<i64> = (0..1000).collect();
         let mut sent = 0_u64;
         while sent < 3 * MOST as u64 {
-            tap.take(&events(&many, 7));
+            held.push(events(&many, 7).view());
+            queue.push(&events(&many, 7), &held);
             sent += 1000;
         }
-        tap.sent = Instant::now() - UNSEEN;
-        assert!(tap.tick());
-        let piece = outlet.next().expect("one waits");
+        queue.sent = Instant::now() - UNWATCHED;
+        assert!(queue.tick(&held));
+        let piece = viewer.next().expect("one waits");
         assert_eq!(piece.missing + piece.changes.len() as u64, sent);
         assert_eq!(piece.before + piece.changes.len() as u64, sent);
         assert_eq!(piece.held.expect("begins anew")[array.index(1, 2)], 7);
         assert!(piece.changes.len() <= MOST);
-        drop(outlet);
-        tap.take(&events(&[2000], 7));
-        tap.sent = Instant::now() - UNSEEN;
-        assert!(!tap.tick(), "the receiving end is gone");
+        drop(viewer);
+        queue.push(&events(&[2000], 7), &held);
+        queue.sent = Instant::now() - UNWATCHED;
+        assert!(!queue.tick(&held), "the receiving end is gone");
     }
 }

@@ -10,10 +10,10 @@ from taxel.labels import Labels, Note, beside
 from taxel.recording.contents import Contents, alone, once
 from taxel.recording.kinds import ENDINGS
 
-__all__ = ["calibration_beside", "has_calibration", "with_what_lies_beside"]
+__all__ = ["calibration_beside", "has_calibration", "with_sidecars"]
 
 
-def with_what_lies_beside(of: Contents) -> Contents:
+def with_sidecars(of: Contents) -> Contents:
     """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration that lie beside it."""
     sources: dict[str, Contents] = {}
     for name, one in (of.sources or {of.label: of}).items():

@@ -1,4 +1,4 @@
-"""The question of chapter 5, asked of a user's own sensor: how many bits, at which period, of how many taxels, when."""
+"""How many bits a sensor gives about labels (thesis chapter 5): by period, number of taxels, time and cost."""
 
 from __future__ import annotations
 

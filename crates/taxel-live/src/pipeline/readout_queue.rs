@@ -7,9 +7,9 @@ use taxel_core::{Array, Events};
 
 use crate::locked::lock;
 
-/// Events that wait for the readout, and how far the board's time has come without any.
+/// Events that wait for the readout, and how far the board's time has arrived without any.
 #[derive(Debug)]
-pub(super) struct Handover {
+pub(super) struct ReadoutQueue {
     state: Mutex<Waiting>,
     came: Condvar,
     limit: usize,
@@ -24,7 +24,7 @@ struct Waiting {
     closed: bool,
 }
 
-/// After the events that were handed over nothing comes before this time, us.
+/// After the events that were handed over no data arrive before this time, us.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Quiet {
     /// By the host's clock: an event that comes late may contradict it.
@@ -45,13 +45,13 @@ impl Quiet {
 /// What the readout processes at once, beside the events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Taken {
-    /// How far time has come after the events.
+    /// How far time has arrived after the events.
     pub quiet: Option<Quiet>,
-    /// Nothing will come any more.
+    /// No more data will arrive.
     pub last: bool,
 }
 
-impl Handover {
+impl ReadoutQueue {
     pub(super) fn new(array: &Array, limit: usize) -> Self {
         let events = Events::empty(array.clone());
         let state = Waiting { events, quiet: None, zeroings: vec![], dropped: 0, closed: false };
@@ -78,7 +78,7 @@ impl Handover {
         dropped
     }
 
-    /// Sets up to when nothing comes after the events that wait.
+    /// Sets up to when no data arrive after the events that wait.
     pub(super) fn quiet(&self, quiet: Quiet) {
         self.state().quiet = Some(quiet);
         self.came.notify_one();
@@ -90,7 +90,7 @@ impl Handover {
         self.came.notify_one();
     }
 
-    /// Ends it; `quiet` is up to when nothing came.
+    /// Ends it; `quiet` is up to when nothing arrived.
     pub(super) fn close(&self, quiet: Option<Quiet>) {
         let mut state = self.state();
         state.quiet = quiet.or(state.quiet);
@@ -133,14 +133,14 @@ mod tests {
 
     #[test]
     fn what_was_handed_over_in_pieces_is_taken_as_one() {
-        let handover = Handover::new(&Array::thesis(), 10);
+        let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
         for (t, ticks) in [(&[1, 2][..], None), (&[3], Some(7)), (&[4], None)] {
             let mut piece = events(t, ticks);
-            assert_eq!(handover.put(&mut piece, None), 0);
+            assert_eq!(readout_queue.put(&mut piece, None), 0);
             assert!(piece.is_empty());
         }
         let mut taken = Events::empty(Array::thesis());
-        assert_eq!(handover.take(&mut taken, &mut vec![]), Taken { quiet: None, last: false });
+        assert_eq!(readout_queue.take(&mut taken, &mut vec![]), Taken { quiet: None, last: false });
         assert_eq!(taken.t, [1, 2, 3, 4]);
         let intensity = taken.intensity.as_ref().expect("one had an intensity");
         assert_eq!(intensity.ticks, [0, 0, 7, 0]);
@@ -150,26 +150,26 @@ mod tests {
 
     #[test]
     fn what_finds_no_room_is_counted() {
-        let handover = Handover::new(&Array::thesis(), 3);
-        assert_eq!(handover.put(&mut events(&[1, 2], None), None), 0);
-        assert_eq!(handover.put(&mut events(&[3, 4, 5], None), None), 2);
+        let readout_queue = ReadoutQueue::new(&Array::thesis(), 3);
+        assert_eq!(readout_queue.put(&mut events(&[1, 2], None), None), 0);
+        assert_eq!(readout_queue.put(&mut events(&[3, 4, 5], None), None), 2);
         let mut taken = Events::empty(Array::thesis());
-        handover.take(&mut taken, &mut vec![]);
+        readout_queue.take(&mut taken, &mut vec![]);
         assert_eq!(taken.t, [1, 2, 3]);
     }
 
     #[test]
     fn silence_is_taken_once_and_only_where_nothing_came_after_it() {
-        let handover = Handover::new(&Array::thesis(), 10);
+        let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
         let mut taken = Events::empty(Array::thesis());
-        handover.quiet(Quiet::Believed(100));
-        assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Believed(100)));
-        handover.quiet(Quiet::Believed(200));
-        handover.put(&mut events(&[150], None), None);
-        assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, None);
-        handover.put(&mut events(&[], None), Some(300));
-        assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Promised(300)));
-        handover.close(None);
-        assert!(handover.take(&mut taken, &mut vec![]).last);
+        readout_queue.quiet(Quiet::Believed(100));
+        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Believed(100)));
+        readout_queue.quiet(Quiet::Believed(200));
+        readout_queue.put(&mut events(&[150], None), None);
+        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, None);
+        readout_queue.put(&mut events(&[], None), Some(300));
+        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Promised(300)));
+        readout_queue.close(None);
+        assert!(readout_queue.take(&mut taken, &mut vec![]).last);
     }
 }

@@ -1,0 +1,160 @@
+//! Selects the pictures of a recording: ten a second, and those around detections, markers and notes.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// How often a recording gets a picture where something comes.
+const PICTURE_EVERY: Duration = Duration::from_millis(100);
+
+/// How often a picture is stored until it is decided: a recording never gets more.
+const BUFFERED_EVERY: Duration = Duration::from_millis(10);
+
+/// How many are stored: half a second. An event of longer ago gets no picture before it.
+const BUFFERED: usize = 50;
+
+/// The pictures of the last half second, a hundredth of a second apart, until it is known whether the recording gets them.
+#[derive(Debug)]
+pub(super) struct PictureBuffer {
+    pictures: VecDeque<BufferedPicture>,
+    /// Times of events, us, after which no picture was stored yet.
+    awaited: Vec<i64>,
+    pushed: Option<Instant>,
+    wanted: Option<Instant>,
+}
+
+/// What the taxels held at a time.
+#[derive(Debug)]
+pub(super) struct BufferedPicture {
+    /// When it was pushed, ns since 1970.
+    pub(super) at_ns: i64,
+    /// The board's time of the last event in it, us.
+    pub(super) t_us: i64,
+    /// Ticks by taxel index; 0 of a taxel without any event so far.
+    pub(super) held: Vec<u16>,
+    state: PictureState,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum PictureState {
+    Undecided,
+    Wanted,
+    Recorded,
+}
+
+impl BufferedPicture {
+    fn want(&mut self) {
+        if self.state == PictureState::Undecided {
+            self.state = PictureState::Wanted;
+        }
+    }
+}
+
+impl PictureBuffer {
+    pub(super) fn new() -> Self {
+        Self { pictures: VecDeque::new(), awaited: vec![], pushed: None, wanted: None }
+    }
+
+    /// Whether the next may be pushed.
+    pub(super) fn is_due(&self, now: Instant) -> bool {
+        self.pushed.is_none_or(|pushed| now.saturating_duration_since(pushed) >= BUFFERED_EVERY)
+    }
+
+    /// Nothing is recorded: discards all.
+    pub(super) fn clear(&mut self) {
+        self.pictures.clear();
+        self.awaited.clear();
+    }
+
+    /// Stores the values that the taxels hold.
+    pub(super) fn push(&mut self, now: Instant, at_ns: i64, t_us: i64, held: impl Iterator<Item = u16>) {
+        let mut memory =
+            if self.pictures.len() >= BUFFERED { self.pictures.pop_front().map(|old| old.held) } else { None };
+        let values = memory.get_or_insert_default();
+        values.clear();
+        values.extend(held);
+        let mut picture =
+            BufferedPicture { at_ns, t_us, held: memory.unwrap_or_default(), state: PictureState::Undecided };
+        let asked = self.awaited.len();
+        self.awaited.retain(|&t| t > t_us);
+        let tenth = self.wanted.is_none_or(|wanted| now.saturating_duration_since(wanted) >= PICTURE_EVERY);
+        if tenth || self.awaited.len() < asked {
+            picture.want();
+        }
+        if tenth {
+            self.wanted = Some(now);
+        }
+        self.pushed = Some(now);
+        self.pictures.push_back(picture);
+    }
+
+    /// For an event at `t` us the recording gets the last picture before it and the first from it on.
+    pub(super) fn around(&mut self, t: i64) {
+        if let Some(before) = self.pictures.iter_mut().rev().find(|picture| picture.t_us < t) {
+            before.want();
+        }
+        match self.pictures.iter_mut().find(|picture| picture.t_us >= t) {
+            Some(after) => after.want(),
+            None if self.awaited.len() < BUFFERED => self.awaited.push(t),
+            None => {}
+        }
+    }
+
+    /// Those that the recording is to get, in order of time, once each.
+    pub(super) fn take_wanted(&mut self) -> impl Iterator<Item = &BufferedPicture> {
+        self.pictures.iter_mut().filter(|picture| picture.state == PictureState::Wanted).map(|picture| {
+            picture.state = PictureState::Recorded;
+            &*picture
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Takes a picture each 10 ms in `from..to` (hundredths of a second) and gives the board's times of those that are recorded.
+    fn recorded(picture_buffer: &mut PictureBuffer, begun: Instant, times: std::ops::Range<i64>) -> Vec<i64> {
+        let mut taken = vec![];
+        for k in times {
+            let now = begun + BUFFERED_EVERY * u32::try_from(k).unwrap();
+            assert!(picture_buffer.is_due(now));
+            picture_buffer.push(now, k, 10_000 * k, std::iter::once(k as u16));
+            assert!(!picture_buffer.is_due(now + BUFFERED_EVERY / 2));
+            taken.extend(picture_buffer.take_wanted().map(|picture| {
+                assert_eq!((picture.at_ns * 10_000, i64::from(picture.held[0]) * 10_000), (picture.t_us, picture.t_us));
+                picture.t_us
+            }));
+        }
+        taken
+    }
+
+    #[test]
+    fn a_recording_gets_ten_pictures_a_second_and_those_around_events_once() {
+        let (mut picture_buffer, begun) = (PictureBuffer::new(), Instant::now());
+        assert_eq!(recorded(&mut picture_buffer, begun, 0..37), [0, 100_000, 200_000, 300_000]);
+        // Within two pictures, at one of them, and one that comes later.
+        picture_buffer.around(123_456);
+        picture_buffer.around(150_000);
+        picture_buffer.around(365_000);
+        let taken: Vec<i64> = picture_buffer.take_wanted().map(|picture| picture.t_us).collect();
+        assert_eq!(taken, [120_000, 130_000, 140_000, 150_000, 360_000]);
+        picture_buffer.around(123_456);
+        assert_eq!(picture_buffer.take_wanted().count(), 0, "each once");
+        assert_eq!(recorded(&mut picture_buffer, begun, 37..45), [370_000, 400_000]);
+    }
+
+    #[test]
+    fn events_of_long_ago_and_many_of_them_cost_no_more_than_a_hundred_pictures_a_second() {
+        let (mut picture_buffer, begun) = (PictureBuffer::new(), Instant::now());
+        let mut taken = recorded(&mut picture_buffer, begun, 0..100).len();
+        assert_eq!(taken, 10);
+        for t in 0..1_200_000 {
+            picture_buffer.around(t);
+        }
+        taken = picture_buffer.take_wanted().count() + recorded(&mut picture_buffer, begun, 100..200).len();
+        assert!(taken <= BUFFERED + 100, "{taken}");
+        assert!(picture_buffer.pictures.len() <= BUFFERED && picture_buffer.awaited.len() <= BUFFERED);
+        picture_buffer.clear();
+        assert_eq!(picture_buffer.take_wanted().count(), 0);
+    }
+}

@@ -1,0 +1,104 @@
+//! What taxels hold, and what of it stands above rest, for Python.
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
+use taxel_core::problem;
+use taxel_core::rest::{Rest, touched_from};
+
+use crate::convert::{ArrayParts, EventsIn, EventsOut, array, from_events, slice, to_array, to_events};
+use crate::enter::{Shared, enter};
+
+/// What chosen taxels of a recording hold at any time; without values, each event is a step of 1 up or down.
+#[pyclass(frozen, module = "taxel._core")]
+struct HeldValues(Shared<HeldOverTime<f32>>);
+
+#[pymethods]
+impl HeldValues {
+    /// `taxels` are indices, all where it is None; `begins` is what they hold before their first event, 0 where it is None.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        events: EventsIn<'_>,
+        taxels: Option<PyReadonlyArray1<'_, u32>>,
+        begins: Option<PyReadonlyArray1<'_, f32>>,
+    ) -> PyResult<Self> {
+        let events = to_events(events)?;
+        let events = events.view()?;
+        let taxels = taxels.as_ref().map(|taxels| slice("taxels", taxels)).transpose()?;
+        let begins = begins.as_ref().map(|begins| slice("begins", begins)).transpose()?;
+        let held = enter(py, |_| {
+            if events.intensity.is_none() {
+                return HeldOverTime::by_steps(events, taxels);
+            }
+            let n = taxels.map_or(events.array.len(), <[u32]>::len);
+            HeldOverTime::new(events, taxels, begins.map_or_else(|| vec![0.0; n], <[f32]>::to_vec))
+        })?;
+        Ok(Self(Shared::new(held)))
+    }
+
+    /// The values at times, us, best ascending: one row a time.
+    fn at<'py>(&self, py: Python<'py>, times: PyReadonlyArray1<'py, i64>) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let times = slice("times", &times)?;
+        let values = self.0.enter(py, |held, stop| {
+            let (mut values, n) = (vec![], held.taxels());
+            if values.try_reserve_exact(times.len().saturating_mul(n)).is_err() {
+                return Err(problem!("{} pictures of {n} taxels do not fit the memory", times.len()));
+            }
+            for &t in times {
+                stop.check()?;
+                values.extend_from_slice(held.at(t));
+            }
+            Ok(values)
+        })?;
+        Ok(array(py, values))
+    }
+}
+
+/// Events at `t` us that report what the taxels hold (ticks by index, 65 535 where that is unknown).
+#[pyfunction]
+fn held_as_events<'py>(
+    py: Python<'py>,
+    held: PyReadonlyArray1<'py, u16>,
+    t: i64,
+    of: ArrayParts,
+) -> PyResult<EventsOut<'py>> {
+    Ok(from_events(py, as_events(slice("held", &held)?, t, &to_array(of)?)))
+}
+
+/// What pictures, one after the other in `values`, read above the rest of each taxel, infinite where that is unknown.
+#[pyfunction]
+fn above_rest<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f32>,
+    rest: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    let (values, rest) = (slice("values", &values)?, slice("rest", &rest)?);
+    let found = enter(py, |_| {
+        if rest.is_empty() || !values.len().is_multiple_of(rest.len()) {
+            return Err(problem!("{} values for {} taxels: must be whole pictures", values.len(), rest.len()));
+        }
+        let (rest, mut above) = (Rest::measured(rest.to_vec()), vec![]);
+        above.reserve(values.len());
+        for picture in values.chunks_exact(rest.values().len()) {
+            let above_rest = |(taxel, &value): (usize, &f32)| rest.above(taxel, value.into()) as f32;
+            above.extend(picture.iter().enumerate().map(above_rest));
+        }
+        Ok(above)
+    })?;
+    Ok(array(py, found))
+}
+
+/// What a touched taxel reads above rest at least, for a board's noise floor.
+#[pyfunction]
+fn touched_above(noise_floor: f64) -> f64 {
+    touched_from(0.0, noise_floor)
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("UNKNOWN", UNKNOWN)?;
+    module.add_class::<HeldValues>()?;
+    module.add_function(wrap_pyfunction!(held_as_events, module)?)?;
+    module.add_function(wrap_pyfunction!(above_rest, module)?)?;
+    module.add_function(wrap_pyfunction!(touched_above, module)?)
+}

@@ -1,0 +1,61 @@
+"""Options of a callable: a dataclass, whose fields make its signature and the options of the command line."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import field, fields
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+__all__ = ["about", "option", "with_fields_of", "with_options"]
+
+_P = ParamSpec("_P")
+_Self = TypeVar("_Self")
+_Options = TypeVar("_Options")
+_Result = TypeVar("_Result")
+
+
+def option(default: Any, about: str, *, least: float | None = None, most: float | None = None) -> Any:
+    """Return a field with its default, its text, and the range of its values."""
+    return field(default=default, metadata={"help": about, "min": least, "max": most})
+
+
+def about(options: Any, name: str) -> dict[str, Any]:
+    """Return the text and the range of an option, for the command line: help, min, max."""
+    found = {one.name: one.metadata for one in fields(options)}[name]
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def with_options(options: Callable[_P, _Options]) -> Callable[[Callable[[_Options], _Result]], Callable[_P, _Result]]:
+    """Let a function that is written for a dataclass of options take the fields of that dataclass."""
+
+    def decorate(work: Callable[[_Options], _Result]) -> Callable[_P, _Result]:
+        def call(*arguments: _P.args, **keywords: _P.kwargs) -> _Result:
+            return work(options(*arguments, **keywords))
+
+        functools.update_wrapper(call, work)
+        returned = inspect.signature(work).return_annotation
+        signature = inspect.signature(options).replace(return_annotation=returned)
+        call.__signature__ = signature  # type: ignore[attr-defined]
+        return call
+
+    return decorate
+
+
+def with_fields_of(
+    options: Callable[_P, _Options],
+) -> Callable[[Callable[[_Self, _Options], None]], Callable[Concatenate[_Self, _P], None]]:
+    """Let a constructor that is written for a dataclass of options take the fields of that dataclass."""
+
+    def decorate(begin: Callable[[_Self, _Options], None]) -> Callable[Concatenate[_Self, _P], None]:
+        def init(self: _Self, /, *arguments: _P.args, **keywords: _P.kwargs) -> None:
+            begin(self, options(*arguments, **keywords))
+
+        functools.update_wrapper(init, begin)
+        own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+        named = inspect.signature(options).parameters.values()
+        init.__signature__ = inspect.Signature([own, *named])  # type: ignore[attr-defined]
+        return init
+
+    return decorate

@@ -1,0 +1,123 @@
+"""How an emulated board works: each option once, for `emulate`, the command line and Rust."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import KW_ONLY, asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from taxel._base.arguments import flag, instance, number, text, whole
+from taxel._base.arguments import path as checked_path
+from taxel._base.options import option
+from taxel.array import Array
+from taxel.simulate.acts import Act, Contact
+from taxel.simulate.board import Version2, fitting, reading
+from taxel.simulate.circuit import Circuit
+from taxel.simulate.pipe import Pipe
+from taxel.simulate.replay import Replay
+from taxel.simulate.trouble import Faults, Flaws
+from taxel.wire import Registers
+from taxel.wire.registers import QUOTED_PRESETS
+
+if TYPE_CHECKING:
+    from taxel.simulate.emulator import EmulatorReport
+
+__all__ = ["EmulateOptions"]
+
+
+def _nothing(_: object) -> None:
+    """Ignore what a function that was left out would be called with."""
+
+
+def _path(name: str, path: str | os.PathLike[str]) -> str:
+    return str(Path(checked_path(name, path)))
+
+
+@dataclass(frozen=True)
+class EmulateOptions:
+    """Hold the options of `emulate`, which documents each, with their defaults."""
+
+    to: str
+    touch: Iterable[Act] | Replay | Pipe
+    _: KW_ONLY
+    seed: int = option(0, "Seed of scenes, taxels and noise.", least=0)
+    preset: str | None = option(
+        None, f"The registers: one of {QUOTED_PRESETS}. Default: the scene's, or those of the array at reset."
+    )
+    registers: Registers | None = None
+    tare_ms: float = option(
+        50.0, "How long the noise floor is 0 before the start marker, s. Default: 0.05, or the scene's."
+    )
+    array: Array | None = None
+    sensor: Mapping[str, float] | None = None
+    wire: Literal[1, 2] | None = option(None, "Version of the wire. Default: by the registers.", least=1, most=2)
+    previous: Literal["last_sent", "last_sample"] = "last_sent"
+    intensity: Literal["value", "difference", "nothing"] = "value"
+    version_2: Version2 | None = None
+    circuit: Circuit | None = option(
+        None,
+        "Simulate the circuit of shared lines; NAME is one of gain, switch_ohm, wire_ohm, offset_mv, "
+        "hysteresis_v, settle_us, amplifier_us; "
+        "one of them puts in the whole circuit, the others as usual. Takes the board to some 2.4 kHz.",
+    )
+    asynchronous: bool = option(False, "Taxels send by themselves, without a scan, with stamps of 1 us (wire 2).")
+    flaws: Flaws | None = option(
+        None, "A flaw of taxels: gain, threshold, hysteresis, drift, dead, stuck, loose, noise. May be repeated."
+    )
+    faults: Faults | None = option(
+        None,
+        "A fault of the network: a share of the datagrams is lost, repeated, reordered, cut or corrupted. "
+        "May be repeated.",
+    )
+    reset_every_s: float | None = option(None, "Interval between resets of the board, s. Default: none.", least=0.001)
+    drift_ppm: float = option(0.0, "How much faster the board's clock runs, parts per million.")
+    control: str | None = option(None, "Accept commands on this TCP port of loopback; 0 finds a free one.")
+    line: str | os.PathLike[str] | None = option(
+        None, "Accept commands on a serial line of this name (a link to a pseudo-terminal)."
+    )
+    baud: int = option(115_200, "Baud rate of --line. Default: 115200.", least=300, most=4_000_000)
+    sync: str | os.PathLike[str] | None = option(
+        None, "Write the sync line as text to a new file or a pipe: board us, 1 or 0, host ns."
+    )
+    overwrite: bool = option(False, "Replace the files that are written where they exist.")
+    source_port: int = option(0, "The UDP port to send from; 0: any.", least=0, most=65_535)
+    begun: Callable[[str | None], object] = _nothing
+    watch: Callable[[EmulatorReport], object] = _nothing
+    touched: Callable[[list[Contact]], object] = _nothing
+
+    def completed(self) -> EmulateOptions:
+        """Return them with the array of the touch and the registers that the board begins with."""
+        touch, registers = self.touch, self.registers
+        if isinstance(touch, Replay | Pipe):
+            array, preset = touch.array, touch.registers
+        else:
+            array = Array._of(self.array)
+            preset = partial(fitting, array=array)
+        registers = preset(self.preset) if registers is None else registers
+        registers = instance("registers", registers, Registers)
+        if self.wire is not None:
+            registers = registers.replace(wire_version=whole("wire", self.wire, 1, 2))
+        return replace(self, array=array, registers=registers)
+
+    def for_rust(self) -> dict[str, Any]:
+        """Return the completed options as Rust reads them."""
+        registers = instance("registers", self.registers, Registers)
+        return {
+            "registers": registers._held,
+            "tare_ms": None if isinstance(self.touch, Replay | Pipe) else number("tare_ms", self.tare_ms),
+            "previous": text("previous", self.previous, ("last_sent", "last_sample")),
+            "intensity": text("intensity", self.intensity, ("value", "difference", "nothing")),
+            "version_2": asdict(instance("version_2", self.version_2 or Version2(), Version2)),
+            "control": None if self.control is None else text("control", self.control),
+            "line": None if self.line is None else (_path("line", self.line), whole("baud", self.baud, 300, 4_000_000)),
+            "sync": None if self.sync is None else (_path("sync", self.sync), flag("overwrite", self.overwrite)),
+            **reading(self.circuit, self.asynchronous),
+            "flaws": None if self.flaws is None else instance("flaws", self.flaws, Flaws)._parts(),
+            "faults": None if self.faults is None else instance("faults", self.faults, Faults)._parts(),
+            "reset_every_s": None if self.reset_every_s is None else number("reset_every_s", self.reset_every_s),
+            "drift_ppm": number("drift_ppm", self.drift_ppm),
+            "source_port": whole("source_port", self.source_port, 0, 65_535),
+        }

@@ -1,0 +1,68 @@
+"""Faults planted in the logic, one line each: the comparison with the emulated board sees every one of them."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from logic import RTL
+from pair import Pair, answers
+from taxel.simulate import NOT_RETURNED
+from taxel.wire import Command
+
+#: File, what stands there, what stands there instead.
+FAULTS = [
+    ("taxel_change_detector.sv", "moved > 16'(of_compared", "moved >= 16'(of_compared"),
+    ("taxel_change_detector.sv", "<= fetched.value >= previous;", "<= fetched.value > previous;"),
+    ("taxel_change_detector.sv", "{channel, now.step[STEP_BITS-1:0]}", "{now.step[STEP_BITS-1:0], channel}"),
+    ("taxel_change_detector.sv", "if (step_end) ended <= read;", "if (read_done) ended <= read;"),
+    ("taxel_change_detector.sv", "&& !compared.not_returned && !of_compared", "&& !of_compared"),
+    ("taxel_comparator_column.sv", "first   <= sample[0];", "first   <= sample[1];"),
+    ("taxel_ramp_counter.sv", "last <= length[15:1];", "last <= length[15:1] - 15'd1;"),
+    ("taxel_comparator_array.sv", "if (begins) inverted_now <= inverted_next;", "inverted_now <= 1'b0;"),
+    ("taxel_time_stamper.sv", "CLOCKS - 1", "CLOCKS"),
+    ("taxel_mux_ctrl.sv", "read.stamp         <= stamp;", "if (frame_start) read.stamp <= stamp;"),
+    ("taxel_mux_ctrl.sv", "32'(EARLY + 1);", "32'(EARLY + 2);"),
+    ("taxel_mux_ctrl.sv", "read.noise_floor   <= active", "read.noise_floor   <= written"),
+    ("taxel_packer_v1.sv", "after + more > 9'(MOST)", "after + more >= 9'(MOST)"),
+    ("taxel_register_file.sv", "changed.record != written.record", "changed.record"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS, ids=[f"{file[6:-3]}-{k}" for k, (file, _, _) in enumerate(FAULTS)])
+def test_a_fault_is_seen(fault, tmp_path):
+    file, there, instead = fault
+    for source in RTL.glob("*.sv"):
+        shutil.copy(source, tmp_path)
+    text = (tmp_path / file).read_text()
+    assert text.count(there) == 1
+    (tmp_path / file).write_text(text.replace(there, instead))
+    assert differs(Pair(8, 8, source=tmp_path))
+
+
+def test_the_sources_without_a_fault_are_not_taken_for_one():
+    assert not differs(Pair(8, 8))
+
+
+def differs(pair: Pair) -> bool:
+    """Play frames in which every fault of the list shows; return whether the logic is told from the emulated board."""
+    rng = np.random.default_rng(3)
+    writes = [
+        Command(0, 0), Command(5, 7 << 16), Command(4, 33), Command(7, 1 << 16), Command(7, 1 << 16), Command(0, 4),
+        Command(5, 7 << 16 | 20 << 8), Command(0, 8), Command(1, 1777), Command(7, 0), Command(5, 7 << 16),
+    ]  # fmt: skip
+    ticks = np.zeros((8, 8), np.uint16)
+    for k in range(120):
+        moved = rng.integers(-4, 5, (8, 8)) + np.where(rng.random((8, 8)) < 0.3, rng.integers(-99, 99, (8, 8)), 0)
+        ticks = np.clip(ticks.astype(int) + moved, 0, 160).astype(np.uint16)
+        sent = ticks.copy()
+        sent[rng.random((8, 8)) < 0.02] = NOT_RETURNED
+        command = writes.pop(0).to_bytes() if writes and pair.answered and k > 3 else b""
+        # Some are complete around the last clock at which a write acts in the next frame.
+        frame = round(pair.board.registers.frame_us * 100)
+        pair.frame(sent, command, frame - 420 + int(rng.integers(-6, 7)) if command else 0)
+    for _ in range(40):
+        pair.frame(np.zeros((8, 8), np.uint16))
+    same = pair.received == pair.expected[: len(pair.received)] and len(pair.expected) - len(pair.received) <= 2
+    return not (same and answers(pair.serial) == pair.answers)

@@ -1,0 +1,92 @@
+"""Boards that tests play, programs that they run, and how they wait for them."""
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from taxel import Array, Events, Neuron, Readout, wire
+from taxel.encode import ChangeEvents
+from taxel.live import Live
+
+LOOPBACK = "127.0.0.1"
+
+
+SMALL = Array(4, 4, pitch_mm=2.0, name="small")
+
+
+def presses(presses: int) -> Events:
+    """Each 40 ms a taxel rises by 40 ticks in 2 ms and falls again."""
+    t, ticks, p = [], [], []
+    for press in range(presses):
+        for k in range(20):
+            t.append(press * 40_000 + k * 200 // 100 * 100)
+            ticks.append(60 + 4 * (k if k < 10 else 20 - k))
+            p.append(k < 10)
+    n = len(t)
+    return Events(t, np.full(n, 1), np.full(n, 2), p, array=SMALL, intensity=np.array(ticks))
+
+
+def datagrams(events: Events) -> list[bytes]:
+    return [wire.encode(events[events.t == t]) for t in np.unique(events.t)]
+
+
+def touch() -> Readout:
+    weights = np.where(np.arange(32) < 16, 0.5, 0.0)
+    return Readout(ChangeEvents(), {"touch": (Neuron(tau=2.0, refractory=15.0), weights)})
+
+
+def play(events: Events, port: int, *, pace: float = 0.0) -> int:
+    """Send a datagram a stamp; return how many."""
+    sent = datagrams(events)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        for one in sent:
+            link.sendto(one, (LOOPBACK, port))
+            if pace:
+                time.sleep(pace)
+    return len(sent)
+
+
+def wait_for(live: Live, decoded: int) -> None:
+    until = time.monotonic() + 30
+    while live.counters["decoded"] < decoded:
+        assert time.monotonic() < until, live.counters
+        time.sleep(0.002)
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "taxel", *map(str, arguments)]
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        link.bind((LOOPBACK, 0))
+        return int(link.getsockname()[1])
+
+
+def listening(process: subprocess.Popen[str]) -> None:
+    """Wait until a command says that it listens."""
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "listening" in line:
+            return
+    raise AssertionError("ended before it listened")
+
+
+def recording(file: Path, port: int, *more: object) -> subprocess.Popen[str]:
+    """Begin ``taxel record``."""
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--array", "4x4", *more)
+    return subprocess.Popen(
+        arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def wait_until(done: Callable[[], bool]) -> None:
+    until = time.monotonic() + 30
+    while not done():
+        assert time.monotonic() < until
+        time.sleep(0.005)

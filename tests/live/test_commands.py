@@ -1,0 +1,218 @@
+"""The commands `taxel record` and `taxel live`: when they end, what they print and with which exit code."""
+
+import json
+import re
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Array, Events, Neuron, Readout, wire
+from taxel.encode import ContactArea
+from taxel.live import Live, send
+from taxel.simulate import Board, Scene, emulate
+from taxel.wire import Registers
+
+from .boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, touch
+
+
+def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path: Path) -> None:
+    port, file, events = free_port(), tmp_path / "walk.mcap", presses(3)
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--array", "4x4")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        listening(process)
+        play(events, port)
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert said.splitlines()[-1].startswith("nothing lost after arrival")
+    np.testing.assert_array_equal(taxel.open(file).events.to_numpy(), events.to_numpy())
+    again = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert again.returncode == 2
+    said = f"taxel: {file}: exists already; say --overwrite, or name another"
+    assert again.stderr.strip().splitlines() == [said]
+
+
+def test_taxel_record_says_how_much_a_board_of_version_2_sent(tmp_path: Path) -> None:
+    port = free_port()
+    arguments = command("record", tmp_path / "two.mcap", "--host", LOOPBACK, "--port", port, "--markers")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        listening(process)
+        report = emulate(f"{LOOPBACK}:{port}", [Scene.draw(seed=3)], seed=1, tare_ms=20.0, wire=2)
+        said, _ = process.communicate(timeout=60)
+    counted, verdict = said.splitlines()
+    assert f"{report.datagrams} datagrams, {report.bytes} bytes, " in counted
+    assert counted.endswith(" 2 markers")
+    assert verdict == "nothing lost"
+
+
+def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
+    port, file = free_port(), tmp_path / "marked.mcap"
+    marked = Events([], [], [], [], array=SMALL, markers=[(1000, True), (5000, False)])
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--markers", "--seconds", 60, "--json")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            while process.poll() is None:
+                link.sendto(wire.encode(marked), (LOOPBACK, port))
+                time.sleep(0.05)
+        said, _ = process.communicate(timeout=60)
+    summary = json.loads(said)
+    assert process.returncode == 0
+    assert summary["counters"]["markers"] >= 2
+    assert summary["path"] == str(file)
+
+
+def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> None:
+    port = free_port()
+    automatic = ["--length", 0.3, "--countdown", 0, "--start-index", 7, "--trials", 2]
+    arguments = command("record", tmp_path / "step.lsa", "--host", LOOPBACK, "--port", port, *automatic)
+    with (
+        subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        while process.poll() is None:
+            link.sendto(wire.encode(presses(1)), (LOOPBACK, port))
+            time.sleep(0.01)
+        said, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["step7.lsa", "step7.lss", "step8.lsa", "step8.lss"]
+    assert said.count("nothing lost after arrival") == 2
+    again = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert (again.returncode, again.stderr.strip()) == (
+        2,
+        f"taxel: {tmp_path / 'step7.lsa'}: exists already; say --overwrite, or name another",
+    )
+
+
+def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
+    with Live(0, host=LOOPBACK) as holder:
+        port = holder.address[1]
+        with pytest.raises(OSError, match="in use"):
+            Live(port, host=LOOPBACK)
+        arguments = command("record", tmp_path / "a.mcap", "--host", LOOPBACK, "--port", port)
+        done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (3, f"taxel: UDP {LOOPBACK}:{port}: address already in use\n")
+    assert not (tmp_path / "a.mcap").exists()
+
+
+@pytest.mark.parametrize("differences", [False, True])
+def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, differences: bool) -> None:
+    port, events = free_port(), presses(5)
+    if differences:
+        moved = np.diff(events.intensity.astype(int), prepend=0)
+        said = Events(events.t, events.x, events.y, moved >= 0, array=SMALL, intensity=np.abs(moved))
+    else:
+        said = events
+    touch().save(tmp_path / "touch.json")
+    files = ["--readout", tmp_path / "touch.json", "--record", tmp_path / "live.mcap"]
+    arguments = command("live", *files, "--host", LOOPBACK, "--port", port, "--array", "4x4", "--json")
+    # The datagrams do not keep the board's time: here the host's clock moves nothing on.
+    arguments += ["--guard-frames", "1e6", *(["--differences"] if differences else [])]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+        while not (tmp_path / "live.mcap").exists():
+            assert process.poll() is None
+            time.sleep(0.02)
+        play(said, port)
+        assert process.stdout is not None
+        lines = [json.loads(process.stdout.readline()) for _ in range(4)]
+        process.send_signal(signal.SIGINT)
+        lines += [json.loads(line) for line in process.stdout]
+    assert process.returncode == 0
+    keys = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired"}
+    assert [set(line) for line in lines] == [keys | {"said_us", "said_ns"}] * 5
+    heard_again = ("detect", tmp_path / "live.mcap", "--readout", tmp_path / "touch.json", "--json")
+    again = subprocess.run(command(*heard_again), capture_output=True, text=True, check=True)
+    detected = json.loads(again.stdout)["detections"]
+    assert detected == [{key: line[key] for key in keys} for line in lines], "one schema"
+    recorded = taxel.open(tmp_path / "live.mcap")
+    np.testing.assert_array_equal([line["t_us"] for line in lines], recorded.detections.t)
+    np.testing.assert_array_equal(recorded.events.intensity, events.intensity)
+
+
+def test_taxel_live_prints_a_line_a_detection_where_nobody_watches(tmp_path: Path) -> None:
+    port = free_port()
+    touch().save(tmp_path / "touch.json")
+    arguments = command("live", "--readout", tmp_path / "touch.json", "--host", LOOPBACK, "--port", port)
+    arguments += ["--array", "4x4", "--guard-frames", "1e6"]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        listening(process)
+        play(presses(6), port)
+        assert process.stdout is not None
+        # The guard lets each press be told by the next one; the last one is told at the end, where it had come by then.
+        lines = [process.stdout.readline() for _ in range(5)]
+        process.send_signal(signal.SIGINT)
+        rest = process.stdout.read().splitlines()
+    assert process.returncode == 0
+    told = re.compile(r" +\d+\.\d{4} s  touch +said -?\d+\.\d\d ms after it was known")
+    assert all(told.match(line) for line in lines), lines
+    last = [line for line in rest if told.match(line)]
+    assert rest[len(last)].startswith(f"{5 + len(last)} detections, "), rest
+
+
+def test_taxel_live_says_which_taxels_its_tare_does_not_know(tmp_path: Path) -> None:
+    """Begun in the middle of a stream, it hears of the taxels that change and of no others."""
+    port = free_port()
+    Readout(ContactArea(), {"contact": (Neuron(tau=0.5), np.ones(10))}).save(tmp_path / "touch.json")
+    arguments = command("live", "--readout", tmp_path / "touch.json", "--host", LOOPBACK, "--port", port)
+    arguments += ["--array", "4x4", "--tare", 0.05, "--seconds", 60]
+    with subprocess.Popen(
+        list(map(str, arguments)), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+    ) as process:
+        listening(process)
+        play(presses(5), port)
+        assert process.stderr is not None
+        said = next(line for line in process.stderr if "the tare knows" in line)
+        process.send_signal(signal.SIGINT)
+        process.stderr.read()
+    assert said.startswith("taxel: the tare knows 1 of 16 taxels")
+
+
+def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
+    touch().save(tmp_path / "touch.json")
+    arguments = command("live", "--readout", tmp_path / "touch.json", "--save-tare", tmp_path / "tare.json")
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "taxel: --save-tare without a fresh tare: give --tare SECONDS\n"
+
+
+def test_taxel_live_to_which_nothing_came_names_no_latency(tmp_path: Path) -> None:
+    touch().save(tmp_path / "touch.json")
+    port = free_port()
+    here = ["--host", LOOPBACK, "--port", port, "--array", "4x4", "--seconds", 0.2]
+    arguments = command("live", "--readout", tmp_path / "touch.json", *here)
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert f"nothing arrived at UDP {LOOPBACK}:{port}" in done.stdout
+    assert "p50" not in done.stdout
+    with Live(0, host=LOOPBACK) as live:
+        assert live.counters["decode_latency"] == {"count": 0, "p50_us": None, "p99_us": None, "max_us": None}
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_board_with_more_taxels_than_the_array_is_said_while_it_runs(tmp_path: Path, version: int) -> None:
+    port, file = free_port(), tmp_path / "walk.mcap"
+    n = 500
+    far = Events(np.arange(n) * 100, np.full(n, 40), np.full(n, 2), np.ones(n, bool), array=Array(64, 64))
+    board = Board(Registers(wire_version=2))
+    pressed = [datagram for ticks in (0, 90) for datagram in board.frame(np.full(4096, ticks, np.uint16))]
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--array", "8x8")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        listening(process)
+        assert process.stderr is not None
+        if version == 1:
+            play(far, port)
+        else:
+            send(pressed, LOOPBACK, port)
+        said = next(line for line in process.stderr if line.startswith("taxel: "))
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+    assert "words name taxels outside 8 x 8" in said
+    assert "--array" in said
+    assert process.returncode == 2
+    assert file.exists(), "the bytes are kept"

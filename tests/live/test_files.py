@@ -1,0 +1,162 @@
+"""Files of recordings: locked while they are written, whole or not there, never lost without a word."""
+
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+import taxel
+from taxel.live import Live
+
+from .boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, recording, wait_for, wait_until
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is always full")
+@pytest.mark.parametrize("name", ["full.mcap", "full.lsa"])
+def test_a_full_disk_is_one_clear_error(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).symlink_to("/dev/full")
+
+    def record() -> None:
+        with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / name, overwrite=True) as live:
+            play(presses(300), live.address[1])
+            list(live)
+
+    with pytest.raises(OSError, match="No space left on device"):
+        record()
+
+
+@pytest.mark.parametrize("kind", ["mcap", "lsa"])
+def test_a_recording_to_which_nothing_came_is_not_kept(tmp_path: Path, kind: str) -> None:
+    port, file = free_port(), tmp_path / f"walk.{kind}"
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--seconds", 0.2)
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert done.stdout.startswith(f"nothing arrived at UDP {LOOPBACK}:{port} in 0.")
+    assert "nothing lost" not in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("kind", ["mcap", "lsa"])
+def test_an_earlier_recording_stays_where_nothing_came_to_replace_it(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / f"walk.{kind}"
+    with Live(0, host=LOOPBACK, array=SMALL, record=file) as live:
+        wait_for(live, play(presses(2), live.address[1]))
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with Live(0, host=LOOPBACK, array=SMALL, record=file, overwrite=True) as live:
+        pass
+    summary = live.stop()
+    assert summary.nothing_came
+    assert summary.path is None
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+    with Live(0, host=LOOPBACK, array=SMALL, record=file, overwrite=True) as live:
+        wait_for(live, play(presses(1), live.address[1]))
+    assert live.stop().path == file
+    assert len(taxel.open(file, array=SMALL).events if kind == "lsa" else taxel.open(file).events) == len(presses(1))
+
+
+@pytest.mark.parametrize("kind", ["mcap", "lsa"])
+@pytest.mark.parametrize("later", [False, True])
+def test_a_second_recorder_does_not_take_the_file_of_a_running_one(tmp_path: Path, kind: str, later: bool) -> None:
+    port, file = free_port(), tmp_path / f"walk.{kind}"
+    if later:
+        # The first replaces a file, and has not begun to: nothing has come.
+        file.write_bytes(b"an earlier one")
+    with recording(file, port, "--overwrite") as first:
+        listening(first)
+        if not later:
+            play(presses(2), port)
+            wait_until(lambda: file.stat().st_size > 0)
+        done = subprocess.run(
+            command("record", file, "--host", LOOPBACK, "--port", free_port(), "--overwrite", "--seconds", 0.1),
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        said = "is being recorded by another program; end that first, or name another file"
+        assert (done.returncode, done.stderr) == (3, f"taxel: {file}: {said}\n")
+        play(presses(2), port)
+        time.sleep(0.3)
+        first.send_signal(signal.SIGINT)
+        out, _ = first.communicate(timeout=60)
+    assert first.returncode == 0, out
+    recorded = taxel.open(file, array=SMALL) if kind == "lsa" else taxel.open(file)
+    assert len(recorded.events) == (2 - later) * len(presses(2))
+
+
+def test_a_lock_dies_with_its_process(tmp_path: Path) -> None:
+    port, file = free_port(), tmp_path / "walk.mcap"
+    with recording(file, port) as first:
+        listening(first)
+        play(presses(2), port)
+        first.kill()
+    with Live(0, host=LOOPBACK, array=SMALL, record=file, overwrite=True) as live:
+        wait_for(live, play(presses(1), live.address[1]))
+    assert len(taxel.open(file).events) == len(presses(1))
+
+
+@pytest.mark.parametrize("kind", ["mcap", "lsa"])
+@pytest.mark.parametrize("what", ["removed", "renamed", "replaced", "folder"])
+def test_a_recording_whose_file_is_gone_at_its_end_is_said_to_be_lost(tmp_path: Path, kind: str, what: str) -> None:
+    folder = tmp_path / "here"
+    folder.mkdir()
+    file = folder / f"walk.{kind}"
+    live = Live(0, host=LOOPBACK, array=SMALL, record=file)
+    sent = play(presses(2), live.address[1])
+    wait_for(live, sent)
+    if what == "removed":
+        file.unlink()
+    elif what == "renamed":
+        file.rename(folder / "other")
+    elif what == "replaced":
+        (folder / "other").write_text("of another program")
+        (folder / "other").rename(file)
+    else:
+        shutil.rmtree(folder)
+    lost = f"{sent} datagrams and lines" if kind == "mcap" else f"{10 * len(presses(2))} bytes"
+    with pytest.raises(OSError, match=f"was removed, renamed or replaced while it was recorded; LOST: {lost}"):
+        live.stop()
+    if what == "replaced":
+        assert file.read_text() == "of another program"
+    assert not list(folder.glob("*.lss"))
+
+
+@pytest.mark.parametrize("more", [["--seconds", 1.5], ["--length", 1.5, "--countdown", 0, "--trials", 1]])
+def test_taxel_record_says_that_its_file_is_gone(tmp_path: Path, more: list[object]) -> None:
+    (tmp_path / "here").mkdir()
+    port, file = free_port(), tmp_path / "here" / "walk.mcap"
+    with recording(file, port, *more) as process:
+        listening(process)
+        sent = play(presses(2), port)
+        wait_until(lambda: any((tmp_path / "here").iterdir()))
+        time.sleep(0.2)
+        shutil.rmtree(tmp_path / "here")
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 3
+    assert "nothing lost" not in out
+    assert err.splitlines()[-1].endswith(
+        f"was removed, renamed or replaced while it was recorded; LOST: {sent} datagrams and lines"
+    )
+
+
+def test_two_recordings_of_one_program_do_not_share_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "walk.mcap"
+    with (
+        Live(0, host=LOOPBACK, array=SMALL, record_later=True) as one,
+        Live(0, host=LOOPBACK, record_later=True) as two,
+    ):
+        one.record(file)
+        with pytest.raises(OSError, match="is being recorded by another program"):
+            two.record(file, overwrite=True)
+        wait_for(one, play(presses(1), one.address[1]))
+        assert one.end_recording().path == file
+        two.record(file, overwrite=True)
+        assert two.end_recording().path is None
+    assert len(taxel.open(file).events) == len(presses(1))
+
+
+def test_what_was_noted_is_kept_though_nothing_came(tmp_path: Path) -> None:
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "noted.mcap") as live:
+        live.note("the cable is out")
+    assert live.stop().path == tmp_path / "noted.mcap"
+    assert [note.text for note in taxel.open(tmp_path / "noted.mcap").notes] == ["the cable is out"]

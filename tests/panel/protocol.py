@@ -1,0 +1,142 @@
+"""A client of the panel's server, written from docs/panel-protocol.md alone, and what the tests of the server share."""
+
+from __future__ import annotations
+
+import json
+import socket
+import struct
+import time
+from contextlib import contextmanager
+from types import SimpleNamespace
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from panel.browser import free_port, running
+
+websockets = pytest.importorskip("websockets", reason="the test extra brings websockets")
+
+
+client = pytest.importorskip("websockets.sync.client")
+
+
+#: How long what must happen may take on a busy machine, s.
+SOON = 60.0
+
+
+class Client:
+    """Somebody else's page."""
+
+    def __init__(self, panel, **changed):
+        self.host, self.token = "{}:{}".format(*panel.address), panel.token
+        how = {"origin": f"http://{self.host}", "subprotocols": ["taxel.panel.1", f"token.{panel.token}"], **changed}
+        self.door = client.connect(f"ws://{self.host}/socket", max_size=None, open_timeout=SOON, **how)
+        self.socket = self.door.__enter__()
+        self.pictures, self.said, self.ids, self.asked = [], [], 0, 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *raised):
+        self.door.__exit__(*raised)
+
+    def send(self, **message):
+        self.socket.send(json.dumps(message))
+
+    def next(self):
+        message = self.socket.recv(timeout=SOON)
+        if isinstance(message, bytes):
+            self.pictures.append(message)
+            self.send(type="credit", n=1)
+            return message
+        self.said.append(json.loads(message))
+        return self.said[-1]
+
+    def until(self, kind, **wanted):
+        until = time.monotonic() + SOON
+        while time.monotonic() < until:
+            message = self.next()
+            if isinstance(message, bytes):
+                if kind == "picture":
+                    return message
+            elif message["type"] == kind and all(message[key] == value for key, value in wanted.items()):
+                return message
+        raise AssertionError(f"no {kind} {wanted}; the last were {[m['type'] for m in self.said[-20:]]}")
+
+    def since_asked(self, kind, **wanted):
+        """What may also have been told before the last question was answered."""
+        for message in self.said[self.asked :]:
+            if message["type"] == kind and all(message[key] == value for key, value in wanted.items()):
+                return message
+        return self.until(kind, **wanted)
+
+    def ask(self, kind, **message):
+        self.ids += 1
+        self.asked = len(self.said)
+        self.send(type=kind, id=self.ids, **message)
+        while True:
+            answer = self.next()
+            if not isinstance(answer, bytes) and answer["type"] in ("done", "refused") and answer["id"] == self.ids:
+                return answer
+
+
+def head(picture):
+    names = ("magic", "bytes", "flags", "number", "rows", "columns", "t_us", "made_ns", "events", "watched")
+    names += ("column_us", "first", "count", "none")
+    values = struct.unpack_from("<4sHHIHHqqQIIqII", picture)
+    sections = struct.unpack_from("<16I", picture, 64)
+    return dict(zip(names, values, strict=True)), list(zip(sections[::2], sections[1::2], strict=True))
+
+
+def section(picture, k, dtype):
+    start, size = head(picture)[1][k]
+    return np.frombuffer(picture, dtype, count=size // np.dtype(dtype).itemsize, offset=start)
+
+
+def word(t_us, x, y, ticks, more=True):
+    """A change and its intensity, version 1 of the wire (docs/wire.md)."""
+    t = t_us // 100 % 65_536
+    first = [0x80 | more << 6, t]
+    second = [0xA0 | more << 6, ticks]
+    return b"".join(bytes([a | b >> 14, b >> 7 & 127, b & 127, x, y]) for a, b in (first, second))
+
+
+def marker(t_us):
+    """The start of a recording, version 1 of the wire."""
+    t = t_us // 100 % 65_536
+    return bytes([0xC8 | t >> 14, t >> 7 & 127, t & 127, 0, 0])
+
+
+def say(live, *datagrams):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+        for datagram in datagrams:
+            board.sendto(datagram, live.address)
+
+
+def heard(live, events):
+    until = time.monotonic() + SOON
+    while live.counters["events"] < events:
+        assert time.monotonic() < until, live.counters
+        time.sleep(0.01)
+
+
+@contextmanager
+def page_of_a_board(folder, *options):
+    """A client of the command's panel, which hears an emulated board and holds its serial line."""
+    port = str(free_port())
+    with running("emulate", "--port", port, "--control", "0", *options, folder=folder) as emulated:
+        control = emulated.wait_for(r"commands are taken at (\S+)")
+        panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
+        with running(*panel, folder=folder) as server:
+            url = urlsplit(server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+            door = SimpleNamespace(address=(url.hostname, url.port), token=url.fragment.removeprefix("token="))
+            with Client(door) as page:
+                yield page
+
+
+def spikes_of(page, columns):
+    """The section of spikes, by column of time, of the last picture."""
+    picture = page.pictures[-1]
+    first, rows = head(picture)[0]["first"], head(picture)[0]["rows"]
+    ups = section(picture, 6, "u1").reshape(-1, rows)
+    return {column: list(np.flatnonzero(ups[column - first])) for column in columns}

@@ -1,0 +1,173 @@
+"""Who may use the panel's server: origins, tokens, limits of connections, refusals."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import socket
+import threading
+import time
+
+import pytest
+from panel.protocol import (
+    SOON,
+    Client,
+    heard,
+    websockets,
+    word,
+)
+
+from taxel.live import send
+
+
+def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):
+    host = "{}:{}".format(*panel.address)
+    foreign = "http://evil.example"
+    for how in (
+        {"subprotocols": ["taxel.panel.1", f"token.{'0' * 64}"]},
+        {"subprotocols": ["taxel.panel.1"]},
+        {"subprotocols": [f"token.{panel.token}"]},
+        {"origin": foreign},
+        {"origin": None},
+        {"origin": "null"},
+        {"origin": f"https://{host}"},
+    ):
+        with pytest.raises(websockets.exceptions.InvalidStatus) as refused:
+            Client(panel, **how)
+        assert refused.value.response.status_code == (401 if "subprotocols" in how else 403), how
+    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13"}
+    for path, headers, status in (
+        ("/", {}, 200),
+        ("/", {"Host": "evil.example"}, 421),
+        ("/", {"Host": f"localhost:{panel.address[1]}"}, 200),
+        ("/", {"Host": "localhost:1"}, 421),
+        ("/socket", {"Origin": f"http://{host}", **upgrade}, 401),
+        ("/../Cargo.toml", {}, 404),
+        ("/%2e%2e/Cargo.toml", {}, 404),
+        ("//etc/passwd", {}, 404),
+        ("/vendor", {}, 404),
+        ("/index.html/", {}, 404),
+    ):
+        line = http.client.HTTPConnection(*panel.address, timeout=SOON)
+        line.putrequest("GET", path, skip_host="Host" in headers)
+        for name, value in headers.items():
+            line.putheader(name, value)
+        line.endheaders()
+        answer = line.getresponse()
+        assert answer.status == status, (path, headers)
+        assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
+        line.close()
+    line = http.client.HTTPConnection(*panel.address, timeout=SOON)
+    line.request("POST", "/", b"")
+    assert line.getresponse().status == 405
+
+
+def test_connections_that_say_nothing_are_so_many_and_no_more(live, panel):
+    with Client(panel) as page, contextlib.ExitStack() as idle:
+        crowd = [idle.enter_context(socket.create_connection(panel.address, SOON)) for _ in range(600)]
+        assert page.ask("recordings")["type"] == "done", "who was in is served"
+
+        def closed():
+            count = 0
+            for one in crowd:
+                one.setblocking(False)
+                with contextlib.suppress(BlockingIOError):
+                    count += one.recv(1) == b""
+            return count
+
+        until = time.monotonic() + SOON
+        while closed() < 600 - 511:
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        assert closed() == 600 - 511
+        idle.close()
+        while True:
+            # They are gone as soon as the server has seen it.
+            with contextlib.suppress(OSError, websockets.exceptions.InvalidHandshake), Client(panel) as other:
+                assert other.until("hello")["live"]
+                break
+            assert time.monotonic() < until
+            time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "nonsense",
+        "[]",
+        "{}",
+        '{"type":7}',
+        '{"type":"fly"}',
+        '{"type":"credit","n":-1}',
+        '{"type":"watch","taxel":[64,0]}',
+        '{"type":"open","name":"../secret.mcap"}',
+        '{"type":"open","name":"/etc/passwd"}',
+        '{"type":"open","name":"not there.mcap"}',
+        '{"type":"record","name":"../x"}',
+        '{"type":"seek","t_us":1e300}',
+        '{"type":"set","values":{"noise_floor":5}}',
+        '{"type":"set","values":{"speed":5}}',
+        '{"type":"play","speed":NaN}',
+        '{"type":"encode","encoder":{"name":"none"}}',
+        '{"type":"mark","label":"a","t_us":5}',
+        '{"type":"stop"}',
+        '{"type":"cut","start_us":0,"stop_us":1,"name":"x.mcap"}',
+        '{"type":"credit","n":1,"id":[1]}',
+        "[" * 20_000,
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_the_next_is_heard(panel, message):
+    with Client(panel) as page:
+        page.socket.send(message)
+        assert page.until("refused")["reason"]
+        assert page.ask("recordings")["type"] == "done"
+
+
+@pytest.mark.parametrize(("message", "code"), [("x" * 70_000, 1009), (b"bytes", 1003)])
+def test_what_no_page_sends_ends_the_connection(panel, message, code):
+    with Client(panel) as page:
+        page.socket.send(message)
+        with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
+            page.until("nothing")
+    assert closed.value.rcvd.code == code
+
+
+def test_who_is_refused_over_and_over_is_let_go(panel):
+    with Client(panel) as page:
+        for _ in range(101):
+            page.socket.send("nonsense")
+        with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
+            page.until("nothing")
+    assert closed.value.rcvd.code == 1008
+
+
+def test_a_hundred_visitors_half_of_whom_never_read_cost_no_event_and_no_picture_of_another(live, panel):
+    visitors = [Client(panel) for _ in range(99)]
+    try:
+        for k, visitor in enumerate(visitors):
+            visitor.send(type="credit", n=8)
+            if k % 2:
+                for _ in range(20):
+                    visitor.send(type="credit", n=8)
+        frames = [b"".join(word(t * 200, x, t % 64, 48 + (t + x) % 60) for x in range(60)) for t in range(200)]
+        sent = {}
+        sender = threading.Thread(
+            target=lambda: sent.update(send(frames, *live.address, each=1, period_us=500.0, seconds=3.0))
+        )
+        with Client(panel) as page:
+            page.send(type="credit", n=2)
+            sender.start()
+            before = len(page.pictures)
+            while sender.is_alive():
+                page.until("picture")
+            sender.join()
+            assert len(page.pictures) - before >= 10, "a page that reads goes on being shown pictures"
+            heard(live, sent["datagrams"] * 60)
+            counters = page.until("counters")
+            assert counters["viewers"] == 100
+            assert counters["lost"]["kernel"] == counters["lost"]["queue"] == 0
+            assert counters["reach_bytes"] < 512 << 20
+    finally:
+        for visitor in visitors:
+            visitor.socket.socket.close()
+    assert live.counters["events"] == sent["datagrams"] * 60

@@ -1,0 +1,96 @@
+"""The panel's board: its ports, registers, presets and resets."""
+
+from __future__ import annotations
+
+import socket
+from types import SimpleNamespace
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from panel.browser import running
+from panel.protocol import (
+    Client,
+    head,
+    page_of_a_board,
+    say,
+    section,
+)
+
+import taxel
+import taxel.device
+from taxel.simulate import Board, Version2
+from taxel.wire import Registers
+
+
+def test_the_ports_and_addresses_of_the_machine_are_told(panel):
+    with Client(panel) as page:
+        assert page.ask("places")["type"] == "done"
+        told = next(m for m in page.said if m["type"] == "places")
+        assert [port["place"] for port in told["serial"]] == [port.place for port in taxel.device.ports()]
+        assert {"host": "127.0.0.1", "name": "lo"} in told["addresses"]
+        for address in told["addresses"]:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+                own.bind((address["host"], 0))
+
+
+def test_the_command_stays_while_a_page_begins_its_board_anew(tmp_path):
+    with running("live", "--panel", "--port", "0", "--host", "127.0.0.1", folder=tmp_path) as server:
+        url = urlsplit(server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        with Client(
+            SimpleNamespace(address=(url.hostname, url.port), token=url.fragment.removeprefix("token="))
+        ) as page:
+            for n in range(12):
+                assert page.ask("delta_intensity", on=n % 2 == 0)["type"] == "done"
+                # The command looks every tenth of a second, at any moment of it.
+                assert page.ask("listen", host="127.0.0.1", port=0)["type"] == "done"
+        # Nothing came; that is all there is to complain of.
+        assert server.end() == 3, "".join([*server.said, *iter(server.lines.get, "")])
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_registers_are_read_again_when_the_board_was_reset(tmp_path, version):
+    # Version 2 tells of it by a new session, version 1 by nothing but the greeting on the board's line.
+    with page_of_a_board(tmp_path, "--wire", str(version), "--reset-every", "3") as page:
+        page.send(type="credit", n=1)
+        page.until("registers", known=True)
+        while page.ask("set", values={"noise_floor": 9})["type"] != "done":
+            pass  # it is being reset just now
+        floors = []
+        while not floors or floors[-1] != 3:
+            said = page.until("registers", known=True)
+            floors.append(said["values"]["noise_floor"])
+        assert set(floors) <= {3, 9}
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_preset_by_name_leaves_the_version_of_the_wire(tmp_path, version):
+    with page_of_a_board(tmp_path, "--wire", str(version)) as page:
+        page.send(type="credit", n=1)
+        for name, floor in (("2 kHz", 10), ("5.2 kHz", 3)):
+            assert page.ask("preset_apply", name=name)["type"] == "done"
+            said = page.since_asked("registers", known=True, preset=name)
+            assert (said["values"]["noise_floor"], said["values"]["wire_version"]) == (floor, version)
+
+
+def test_a_board_that_was_reset_is_shown_anew(live, panel):
+    board = Board(Registers(wire_version=2), version_2=Version2(states_us=0))
+
+    def said(columns, ticks):
+        pictures = np.zeros((8, 64, 64), np.uint16)
+        pictures[1:, 5, :columns] = ticks + 4 * np.arange(7)[:, None]
+        return [datagram for picture in pictures for datagram in board.frame(picture.ravel())]
+
+    with Client(panel) as page:
+        page.send(type="credit", n=1)
+        say(live, *said(40, 60))
+        while np.sum(section(page.until("picture"), 0, "<u2") != 65_535) != 40:
+            pass
+        while head(page.until("picture"))[0]["flags"] & 4:
+            pass
+        here = len(page.pictures)
+        board.reset()
+        say(live, *said(5, 80))
+        while np.sum(section(page.until("picture"), 0, "<u2") != 65_535) != 5:
+            pass
+        assert any(head(picture)[0]["flags"] & 4 for picture in page.pictures[here:])

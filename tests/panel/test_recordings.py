@@ -1,0 +1,240 @@
+"""Recordings of the panel: made, labelled, shown again and cut."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+
+import numpy as np
+import pytest
+from panel.protocol import (
+    Client,
+    head,
+    heard,
+    marker,
+    say,
+    section,
+    spikes_of,
+    word,
+)
+
+import taxel
+import taxel.device
+from taxel.cli import main
+from taxel.live import Live, Panel, send
+
+
+def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # noqa: PLR0915  one story
+    playing = threading.Event()
+    clock = {"t": 7_000_000}
+
+    def play():
+        # Beyond one turn of the board's clock, so that a recording begun now has to find its place.
+        while not playing.is_set():
+            t = clock["t"] = clock["t"] + 1000
+            send([word(t, t // 1000 % 64, 7, 40 + t // 1000 % 50)], *live.address, seconds=0.0005)
+            time.sleep(0.001)
+
+    board = threading.Thread(target=play)
+    with Client(panel) as page:
+        send([word(3_000_000, 9, 9, 77)], *live.address, seconds=0.0005)
+        heard(live, 1)
+        board.start()
+        try:
+            assert page.ask("record", name="step", index=1, length_s=0.5, label="heel")["type"] == "done"
+            assert page.ask("record", name="other")["type"] == "refused"
+            last = page.since_asked("recorder", state="idle")
+        finally:
+            playing.set()
+            board.join()
+        assert last["last"]["file"] == "step1.mcap"
+        assert last["index"] == 2
+        again = page.ask("record", name="step", index=1)
+        assert again["type"] == "refused"
+        assert "exists" in again["reason"]
+        recording = taxel.open(tmp_path / "step1.mcap")
+        assert recording.verdict.startswith("nothing lost")
+        assert [(note.text, note.t) for note in recording.notes] == [("heel", None)]
+        # On the clock that the board was heard on, not from its own first stamp.
+        assert recording.events.t[0] > 6_553_600
+        page.send(type="credit", n=2)
+        assert page.ask("open", name="step1.mcap")["type"] == "done"
+        opened = next(m for m in page.said if m["type"] == "opened")
+        assert (opened["events"], opened["start_us"]) == (len(recording.events), recording.events.t[0])
+        middle = int(recording.events.t[len(recording.events) // 2])
+        assert page.ask("seek", t_us=middle)["type"] == "done"
+        while head(page.until("picture"))[0]["t_us"] != middle:
+            pass
+        picture = section(page.pictures[-1], 0, "<u2").reshape(64, 64)
+        seen = recording.events.t <= middle
+        for x in range(64):
+            here = seen & (recording.events.x == x)
+            if here.any():
+                assert picture[7, x] == recording.events.intensity[here][-1]
+        assert picture[9, 9] == 77, "what was held when it began"
+        assert page.ask("mark", label="contact", t_us=middle)["type"] == "done"
+        labels = next(m for m in reversed(page.said) if m["type"] == "labels")["labels"]
+        before = (tmp_path / "step1.mcap").read_bytes()
+        assert page.ask("rename", label_id=labels[0]["label_id"], label="lift")["type"] == "done"
+        assert page.ask("move", label_id=labels[0]["label_id"], t_us=middle + 5)["type"] == "done"
+        assert (tmp_path / "step1.notes.csv").read_text() == f"label,t_us\nlift,{middle + 5}\n"
+        assert (tmp_path / "step1.mcap").read_bytes() == before
+        notes = taxel.open(tmp_path / "step1.mcap").notes
+        assert [(n.text, n.t) for n in notes][1:] == [("lift", middle + 5)]
+        assert page.ask("cut", start_us=opened["start_us"], stop_us=middle, name="half.mcap")["type"] == "done"
+        assert len(taxel.open(tmp_path / "half.mcap").events) == int((recording.events.t < middle).sum())
+        assert page.ask("delete", label_id=labels[0]["label_id"])["type"] == "done"
+        assert page.ask("step", frames=-1)["type"] == "done"
+        earlier = recording.events.t[recording.events.t < middle].max()
+        assert next(m for m in reversed(page.said) if m["type"] == "transport")["t_us"] == earlier
+
+
+def test_a_recording_of_the_panel_holds_all_sources_of_the_board(tmp_path):
+    sources = {"imu": "given,columns=t_us:ax"}
+    with (
+        Live(0, host="127.0.0.1", record_later=True, sources=sources) as live,
+        Panel(live, folder=tmp_path) as panel,
+        Client(panel) as page,
+    ):
+        live.sample("imu", [1.0, 0.0])
+        page.ask("record", name="walk")
+        page.since_asked("recorder", state="recording")
+        live.sample("imu", [2.0, 0.5])
+        sent = send([bytes.fromhex("c000050304")], *live.address, seconds=0.01)["datagrams"]
+        page.until("counters", events=sent)
+        live.sample("imu", [3.0, 1.5])
+        page.ask("stop")
+        done = page.since_asked("recorder", state="idle")
+        assert (done["error"], done["last"]["file"]) == (None, "walk.mcap")
+    recording = taxel.open(tmp_path / "walk.mcap")
+    assert len(recording.sources["board"].events) == sent
+    assert recording.sources["imu"].frames().values.reshape(-1).tolist() == [0.5, 1.5]
+
+
+@pytest.mark.parametrize("first", ["event", "marker"])
+def test_a_recording_of_a_later_wrap_has_the_times_of_the_page(live, tmp_path, first):
+    with Panel(live, folder=tmp_path) as panel, Client(panel) as page:
+        # Version 1 says times modulo 6.5536 s: two wraps pass before it records.
+        for n in range(7):
+            say(live, word(2_000_000 * (n + 1), 3, 5, n + 1))
+            heard(live, n + 1)
+        assert page.ask("record", name="late")["type"] == "done"
+        page.since_asked("recorder", state="recording")
+        if first == "marker":
+            say(live, marker(14_100_000))
+            while not live.counters["markers"]:
+                time.sleep(0.01)
+        say(live, word(14_200_000, 3, 5, 9))
+        heard(live, 8)
+        assert page.ask("stop")["type"] == "done"
+        last = page.since_asked("recorder", state="idle")
+        assert last["error"] is None, last
+        found = taxel.open(tmp_path / "late.mcap").events
+        assert list(found.t) == [14_200_000]
+        assert found.markers == (((14_100_000, True),) if first == "marker" else ())
+
+
+def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
+    # Row 2 rises by 20 ticks at each whole second, and falls half a second later; a quiet row tells that it is there.
+    t = np.arange(0, 10_000_000, 500_000)
+    p = np.arange(len(t)) % 2 == 0
+    events = taxel.Events(t, 0 * t + 3, 0 * t + 2, p, intensity=np.where(p, 70, 50), array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "steps.mcap")
+    with Panel(tmp_path / "steps.mcap") as panel, Client(panel) as page:
+        page.send(type="credit", n=2)
+        assert page.ask("open", name="steps.mcap")["type"] == "done"
+        assert page.ask("encode", encoder={"name": "change_events"})["type"] == "done"
+        for column_us in (4000, 1000, 125, 64_000, 256_000):
+            assert page.ask("zoom", column_us=column_us)["type"] == "done"
+            for t_us in (9_000_000, 6_500_000, 100, 8_250_000):
+                assert page.ask("seek", t_us=t_us)["type"] == "done"
+                while True:
+                    about = head(page.until("picture"))[0]
+                    if about["t_us"] == t_us and about["flags"] & 4:
+                        break
+                assert about["column_us"] == column_us
+                last = t_us // column_us
+                assert about["first"] + about["count"] - 1 == last
+                assert about["first"] <= max(0, last - 1249) + 1
+                shown = range(about["first"], last + 1)
+                raster = section(page.pictures[-1], 2, "u1").reshape(-1, 8)
+                sums = section(page.pictures[-1], 3, "<u4").reshape(-1, 4)[:, 0]
+                for column in shown:
+                    ups, downs = (
+                        sum(t // column_us == column and t <= t_us for t in t[p == which]) for which in (True, False)
+                    )
+                    assert raster[column - shown[0], 2] == ups | downs << 4, (column_us, t_us, column)
+                    held = t[t <= min(t_us, (column + 1) * column_us - 1)]
+                    assert sums[column - shown[0]] == (20 if len(held) and p[len(held) - 1] and held[-1] else 0)
+                # The first change has nothing to be compared with; that of now is a spike when its sample is over.
+                changed = {int(k) for k in t[(t < t_us) & (t > 0)] // column_us} & set(shown)
+                assert spikes_of(page, changed) == {column: [2] for column in changed}
+                assert (
+                    not section(page.pictures[-1], 6, "u1")
+                    .reshape(-1, 8)[[c - shown[0] for c in shown if c not in changed]]
+                    .any()
+                )
+        assert page.ask("zoom", column_us=3000)["field"] == "column_us"
+        assert page.ask("zoom", column_us=512_000)["field"] == "column_us"
+        told = [m for m in page.said if m["type"] == "spikes"]
+        assert {round(t_ms) for m in told for t_ms in m["t_ms"]} <= {int(k) // 1000 for k in t}
+        assert {m["encoder"] for m in told} == {"change_events"}
+
+
+def test_a_recording_alone_is_viewed_and_the_address_names_it(tmp_path):
+    events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "two.mcap")
+    with Panel(tmp_path / "two.mcap") as panel:
+        assert panel.url.endswith("&open=two.mcap")
+        with Client(panel) as page:
+            hello = page.until("hello")
+            assert (hello["live"], hello["open"]) == (False, "two.mcap")
+            assert page.ask("open", name="two.mcap")["type"] == "done"
+            assert page.ask("record", name="x")["type"] == "refused"
+    with pytest.raises(FileNotFoundError):
+        Panel(tmp_path / "none.mcap")
+
+
+def test_the_command_shows_a_recording_and_says_where(tmp_path, capsys):
+    events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "two.mcap")
+    with pytest.raises(SystemExit) as ended:
+        main(["view", str(tmp_path / "two.mcap"), "--no-open", "--seconds", "0.2", "--json"])
+    assert ended.value.code in (0, None)
+    assert json.loads(capsys.readouterr().out)["url"].startswith("http://127.0.0.1:")
+
+
+def test_a_taxel_is_zeroed_for_all_and_the_next_recording_begins_with_it(live, tmp_path):
+    with Panel(live, folder=tmp_path) as panel, Client(panel) as page, Client(panel) as other:
+        assert page.until("zeroed")["taxels"] == []
+        page.send(type="credit", n=1)
+        assert page.ask("zero", taxels=[[3, 5]])["type"] == "refused"
+        say(live, word(4000, 3, 5, 48), word(5000, 3, 5, 90))
+        heard(live, 2)
+        for wrong in ([], [[3]], [[3, -1]], "all", [[3, 5], [4, 5]], [[64, 5]]):
+            assert page.ask("zero", taxels=wrong)["type"] == "refused"
+        assert page.ask("zero", taxels=[[3, 5]])["type"] == "done"
+        for one in (page, other):
+            # It may have been told before the command was answered.
+            while not (all_told := [m for m in one.said if m["type"] == "zeroed" and m["taxels"]]):
+                one.until("zeroed")
+            (told,) = all_told[-1]["taxels"]
+            assert (told["taxel"], told["rest"], told["before"]) == ([3, 5], 90.0, None)
+        # The picture's rest is the new one, and a lower value does not move it.
+        say(live, word(6000, 3, 5, 80), word(7000, 3, 5, 95))
+        heard(live, 4)
+        page.send(type="credit", n=8)
+        while not (rest := section(page.until("picture"), 5, "<u2")).size or rest[5 * 64 + 3] != 90:
+            page.send(type="credit", n=1)
+        assert page.ask("record", name="after")["type"] == "done"
+        page.since_asked("recorder", state="recording")
+        say(live, word(8000, 3, 5, 99))
+        heard(live, 5)
+        assert page.ask("stop")["type"] == "done"
+        page.since_asked("recorder", state="idle")
+        (kept,) = taxel.open(tmp_path / "after.mcap").zeroings
+        assert (kept.x, kept.y, kept.rest) == (3, 5, 90.0)
+        assert page.ask("open", name="after.mcap")["type"] == "done"
+        opened = next(m for m in reversed(page.said) if not isinstance(m, bytes) and m["type"] == "opened")
+        assert [z["taxel"] for z in opened["zeroed"]] == [[3, 5]]
