@@ -93,8 +93,7 @@ class Simulated:
         low, high = inner[k - 1], inner[k]
         if values[k] < 0:
             return float(high)
-        while high - low > max(1e-10, 2 * np.spacing(abs(high))):
-            middle = (low + high) / 2
+        while high - low > 1e-10 and low < (middle := (low + high) / 2) < high:
             low, high = (low, middle) if self.above(middle)[0] >= 0 else (middle, high)
         return float(high)
 

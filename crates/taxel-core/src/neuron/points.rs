@@ -85,6 +85,11 @@ impl Grid {
         t <= now + rounding_ms(now)
     }
 
+    /// Whether a time is that of a point, to rounding.
+    pub(crate) fn is_at_point(&self, t: f64) -> bool {
+        self.place(t).rest.abs() <= rounding_ms(t)
+    }
+
     /// The first point that is not before a time, to rounding.
     pub(crate) fn first_from(&self, t: f64) -> f64 {
         let nearest = self.place(t).point;

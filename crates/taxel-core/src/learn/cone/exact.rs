@@ -96,7 +96,8 @@ impl Exact {
     /// The first condition that these weights violate, with its pattern and time: silence with half its margin; the target
     /// rows on the grid; the spikes of the neuron itself, run on the patterns.
     ///
-    /// On the grid without a margin the neuron is not run: it fires where a silent row holds with equality.
+    /// On the grid the neuron is not run without a margin, as it fires where a silent row holds with equality, nor where a
+    /// target is not a point.
     pub(super) fn unmet(&self, weights: &[f64]) -> Result<Option<String>> {
         let unit = self.statement.unit;
         let worst = self.silence.broken(weights, KEPT_SHARE, self.rounding(weights)).into_iter();
@@ -110,22 +111,30 @@ impl Exact {
             let ((pattern, target), t, miss) = (self.targets.names[k], self.targets.times[k], miss * unit);
             return Ok(Some(format!("pattern {pattern}: target {target} ({t} ms) is missed by {miss:.1e} mV")));
         }
-        if self.is_grid() && self.statement.margin.height == 0.0 { Ok(None) } else { self.misfire(weights) }
+        if self.can_fire_at_targets() { self.misfire(weights) } else { Ok(None) }
     }
 
-    /// The first target at which the neuron itself, run on the patterns, does not fire, or the first spike elsewhere. On the grid
-    /// a neuron fires at a target at the first point that is not before it.
+    /// Whether the neuron itself can fire at every target and nowhere else.
+    fn can_fire_at_targets(&self) -> bool {
+        let Statement { neuron, margin, examples, .. } = &self.statement;
+        let all_at_points = || {
+            examples.iter().all(|example| {
+                let grid = Grid::new(example.start, neuron.step_ms);
+                example.targets.iter().all(|&target| grid.is_at_point(target))
+            })
+        };
+        !self.is_grid() || margin.height > 0.0 && all_at_points()
+    }
+
+    /// The first target at which the neuron itself, run on the patterns, does not fire, or the first spike elsewhere.
     fn misfire(&self, weights: &[f64]) -> Result<Option<String>> {
         for (p, example) in self.statement.examples.iter().enumerate() {
-            let grid = Grid::new(example.start, self.statement.neuron.step_ms);
-            let due = |&target: &f64| if self.is_grid() { grid.time(grid.first_from(target)) } else { target };
-            let wanted: Vec<f64> = example.targets.iter().map(due).collect();
             let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, example.start)?);
             for &(t, train) in example.inputs.iter().take_while(|input| input.0 <= example.end) {
                 stream.push(t, train, &mut fired)?;
             }
-            stream.advance(largest(wanted.last().copied().into_iter().chain([example.end])), &mut fired);
-            let wanted = wanted.into_iter().map(Some).chain(std::iter::repeat(None));
+            stream.advance(example.end, &mut fired);
+            let wanted = example.targets.iter().map(Some).chain(std::iter::repeat(None));
             let fired = fired.iter().map(|spike| Some(spike.t)).chain(std::iter::repeat(None));
             let most = example.targets.len() + 1;
             for (target, spike) in wanted.zip(fired).take(most) {
