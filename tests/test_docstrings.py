@@ -19,6 +19,8 @@ import taxel
 
 #: Rooms whose docstrings are not whole yet.
 NOT_YET = {
+    # device: its methods need a board for an example
+    "taxel.device",
     # encode
     "taxel.encode",
     # wire

@@ -48,7 +48,7 @@ def test_without_the_wheel_one_line_says_how_to_get_it(monkeypatch, capsys):
         assert ended.value.code == 3
         said = capsys.readouterr()
         assert said.err.count("\n") == 1
-        assert "say make bridge in a checkout" in said.err
+        assert "run make bridge in a checkout" in said.err
 
 
 def test_what_only_a_remote_board_takes_is_refused_without_one(capsys):

@@ -182,12 +182,16 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
             self.held.clone_from(&self.states[earlier]);
             self.applied = earlier * self.stride;
         }
-        while let Some(change) = self.changes.get(self.applied).filter(|change| change.t <= t) {
+        let end = self.applied + self.changes[self.applied..].partition_point(|change| change.t <= t);
+        while self.applied < end {
             if self.applied == self.states.len() * self.stride {
                 self.states.push(self.held.clone());
             }
-            self.held.set(change.place as usize, change.value);
-            self.applied += 1;
+            let next = end.min((self.applied / self.stride + 1) * self.stride);
+            for change in &self.changes[self.applied..next] {
+                self.held.values[change.place as usize] = change.value;
+            }
+            self.applied = next;
         }
         self.held.values()
     }

@@ -1,13 +1,14 @@
 //! What taxels hold, and what of it stands above rest, for Python.
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
-use taxel_core::problem;
 use taxel_core::rest::{Rest, touched_from};
+use taxel_core::{Error, problem};
 
 use crate::convert::{ArrayParts, EventsIn, EventsOut, array, from_events, slice, to_array, to_events};
 use crate::enter::{Shared, enter};
+use crate::errors::core;
 
 /// What chosen taxels of a recording hold at any time; without values, each event is a step of 1 up or down.
 #[pyclass(frozen, module = "taxel._core")]
@@ -40,18 +41,24 @@ impl HeldValues {
     /// The values at times, us, best ascending: one row a time.
     fn at<'py>(&self, py: Python<'py>, times: PyReadonlyArray1<'py, i64>) -> PyResult<Bound<'py, PyArray1<f32>>> {
         let times = slice("times", &times)?;
-        let values = self.0.enter(py, |held, stop| {
-            let (mut values, n) = (vec![], held.taxels());
-            if values.try_reserve_exact(times.len().saturating_mul(n)).is_err() {
-                return Err(problem!("{} pictures of {n} taxels do not fit the memory", times.len()));
-            }
-            for &t in times {
+        let n = self.0.with(py, |held| held.taxels());
+        let all = times.len().saturating_mul(n);
+        if Vec::<f32>::new().try_reserve_exact(all).is_err() {
+            return Err(core(problem!("{} pictures of {n} taxels do not fit the memory", times.len())));
+        }
+        // Memory of NumPy, which asks for large pages.
+        let values = PyArray1::zeros(py, all, false);
+        let mut filled = values.readwrite();
+        let rows = filled.as_slice_mut()?;
+        self.0.enter(py, |held, stop| {
+            for (k, &t) in times.iter().enumerate() {
                 stop.check()?;
-                values.extend_from_slice(held.at(t));
+                rows[k * n..(k + 1) * n].copy_from_slice(held.at(t));
             }
-            Ok(values)
+            Ok::<_, Error>(())
         })?;
-        Ok(array(py, values))
+        drop(filled);
+        Ok(values)
     }
 }
 

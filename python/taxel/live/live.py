@@ -274,6 +274,11 @@ class Live:
         Raises
         ------
         ProblemError : no such version
+
+        Examples
+        --------
+        >>> with Live(0, host="127.0.0.1") as live:
+        ...     live.expect_version(2)
         """
         self._core.expect_version(whole("version", version, 1, 2))
 
@@ -288,6 +293,13 @@ class Live:
         Raises
         ------
         ProblemError : no other board of that name
+
+        Examples
+        --------
+        >>> with Live(0, host="127.0.0.1") as live:
+        ...     live.source_address("left")
+        Traceback (most recent call last):
+        taxel.ProblemError: source 'left': no other board has that name
         """
         address = self._core.source_address(text("name", name))
         if address is None:

@@ -26,6 +26,14 @@ class Summary:
         The recording; None where nothing arrived: then a new file is removed, and an earlier one stays.
     tare : Tare or None
         The fresh tare, where one was completed.
+
+    Examples
+    --------
+    >>> from taxel.live import Live
+    >>> live = Live(0, host="127.0.0.1")
+    >>> summary = live.stop()
+    >>> summary.lost, summary.nothing_came
+    (0, True)
     """
 
     counters: dict[str, Any]

@@ -8,7 +8,8 @@ UDP: acts, a recording again, or the frames of any other sensor. `Board` is the 
 from taxel.simulate import circuit
 from taxel.simulate.acts import Act, Contact, Motion, Pictures, Scene, Silence, Track
 from taxel.simulate.board import NOT_RETURNED, Board, Version2
-from taxel.simulate.emulator import EmulatorReport, Played, emulate, play, truth
+from taxel.simulate.emulator import Played, emulate, play, truth
+from taxel.simulate.emulator_report import EmulatorReport
 from taxel.simulate.layer import Layer, Pressed
 from taxel.simulate.pipe import Pipe
 from taxel.simulate.replay import Replay

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import KW_ONLY, asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from taxel._base.arguments import flag, instance, number, text, whole
 from taxel._base.arguments import path as checked_path
@@ -16,14 +16,12 @@ from taxel.array import Array
 from taxel.simulate.acts import Act, Contact
 from taxel.simulate.board import Version2, fitting, reading
 from taxel.simulate.circuit import Circuit
+from taxel.simulate.emulator_report import EmulatorReport
 from taxel.simulate.pipe import Pipe
 from taxel.simulate.replay import Replay
 from taxel.simulate.trouble import Faults, Flaws
 from taxel.wire import Registers
 from taxel.wire.registers import QUOTED_PRESETS
-
-if TYPE_CHECKING:
-    from taxel.simulate.emulator import EmulatorReport
 
 __all__ = ["EmulateOptions"]
 
