@@ -10,8 +10,8 @@ use super::sampled::Source;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
-use crate::parameters::Described;
 use crate::held::Held;
+use crate::parameters::Described;
 use crate::spikes::ms;
 use crate::{Array, EventsView, Result, Spike, problem};
 

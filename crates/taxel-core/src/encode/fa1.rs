@@ -341,8 +341,13 @@ impl Afferent {
 
 impl Rule for Afferents {
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
-        let blank =
-            Afferent { base: [0.0; BLOCK], theta: [0.0; BLOCK], reference: [0.0; BLOCK], reach: [0.0; BLOCK], still: true };
+        let blank = Afferent {
+            base: [0.0; BLOCK],
+            theta: [0.0; BLOCK],
+            reference: [0.0; BLOCK],
+            reach: [0.0; BLOCK],
+            still: true,
+        };
         self.blocks = vec![blank; held.len()];
         self.near = vec![Near::default(); (held.len() + 1) * BLOCK];
         for (block, values) in held.iter().enumerate() {

@@ -259,7 +259,8 @@ impl Skim {
                     if row > 0 {
                         branch.state = step.apply(branch.state);
                     }
-                    while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| grid.has_come(i.0, point)) {
+                    while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| grid.has_come(i.0, point))
+                    {
                         shape.add(&mut branch.state, weight, (grid.time(point) - at).max(0.0));
                         branch.next += 1;
                     }
