@@ -117,7 +117,7 @@ package taxel_registers;
     if (!(40'(r.line_read) <= 40'(r.line_period))) return 4'd1;
     if (!(40'(r.step_read) <= 40'(r.step_period))) return 4'd1;
     if (!((40'(steps) * 40'(r.step_period)) <= 40'(r.line_read))) return 4'd2;
-    if (!(40'(r.ramp) < (40'd3 * 40'(r.step_read)))) return 4'd3;
+    if (!(40'(r.ramp) < (40'(r.step_read) + (40'(r.step_read) << 1)))) return 4'd3;
     if (!((40'(channels) + 40'd10) <= 40'(r.step_period))) return 4'd7;
     if (!(((40'(r.wire_version) + 40'd1) == 40'd2) || ((40'(driven_lines) <= 40'd64) && (40'(sense_lines) <= 40'd64)))) return 4'd8;
     return 4'd0;

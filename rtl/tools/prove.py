@@ -63,7 +63,6 @@ PROOFS = (
             (PACKER, "{2'b00, now.x}", "{2'b00, now.y}"),
             (PACKER, "ready && (!busy || (advance && event_over))", "ready && (!busy || event_over)"),
             (PACKER, "busy && (!event_over || known)", "busy"),
-            (PACKER, "words <= ends ? 9'd0 : after;", "words <= after;"),
         ),
     ),
 )

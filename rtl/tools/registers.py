@@ -49,6 +49,11 @@ def arithmetic(node: ast.expr, fields: dict[str, Table]) -> str:
             return f"{WIDTH}'({name})"
         case ast.Constant(value=number):
             return f"{WIDTH}'d{number}"
+        case ast.BinOp(left=ast.Constant(value=number), op=ast.Mult(), right=right):
+            # Shifts and a sum, as a multiplier was the longest path of the logic.
+            factor = arithmetic(right, fields)
+            places = [k for k in range(int(number).bit_length()) if int(number) >> k & 1]
+            return "(" + " + ".join(f"({factor} << {k})" if k else factor for k in places) + ")"
         case ast.BinOp(left=left, op=op, right=right):
             return f"({arithmetic(left, fields)} {OPERATOR[type(op)]} {arithmetic(right, fields)})"
     raise ValueError(f"registers.toml: {ast.unparse(node)} is no arithmetic")
