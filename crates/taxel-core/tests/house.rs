@@ -59,7 +59,8 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
         "taxel-python",
         &[
             &["errors"],
-            &["enter", "instructions", "thread_state", "convert", "parameters"],
+            &["enter", "instructions", "thread_state"],
+            &["convert", "parameters"],
             &["threaded"],
             &["bridge"],
             &[

@@ -14,19 +14,18 @@ mod entering;
 mod factor;
 mod kernels;
 mod leaving;
+mod rows;
 #[cfg(test)]
 mod tests;
 mod weights;
 mod working_set;
 
-pub use self::certificate::{Multipliers, Ray};
 use self::factor::Factor;
-use self::working_set::{Kind, Row};
+use self::rows::{Kind, Row};
+pub use self::rows::{Multipliers, Ray, RowId};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, Stop, problem};
 
-/// Rows count as satisfied within this, as they were stated or scaled to length 1, whichever asks for more.
-const TOLERANCE: f64 = 5e-13;
 /// Squared pivots at which a row counts as dependent: the next one where no proof comes of it.
 const DEPENDENT: [f64; 4] = [1e-16, 1e-20, 1e-24, 1e-28];
 /// Rows that are appended to the factor, or whose products are computed, in one go.
@@ -43,18 +42,6 @@ const EXCHANGES: usize = 60;
 const MOST_ROUNDS: usize = 10;
 /// How many exchanges in succession may leave the dual below its best before each must raise it.
 const MOST_FALLS: usize = 3;
-
-/// Names an inequality, in the order in which they were added; never given twice.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct RowId(usize);
-
-impl RowId {
-    /// How many inequalities had been added before it.
-    #[must_use]
-    pub fn index(self) -> usize {
-        self.0
-    }
-}
 
 /// How a call of [`DualActiveSet::solve`] ended.
 #[derive(Debug, Clone, PartialEq)]

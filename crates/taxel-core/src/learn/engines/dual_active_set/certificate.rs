@@ -1,29 +1,8 @@
 //! Multipliers of the rows as they were stated, and the proof that the rows contradict each other.
 
+use super::DualActiveSet;
 use super::kernels::add_rows;
-use super::working_set::Kind;
-use super::{DualActiveSet, RowId};
-
-/// Multipliers of the active rows, as they were stated (not scaled).
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Multipliers {
-    /// One an equality, in the order in which they were added; any sign.
-    pub equalities: Vec<f64>,
-    /// Of the active inequalities, 0 or more; of all others it is 0.
-    pub inequalities: Vec<(RowId, f64)>,
-}
-
-/// Proof that the rows contradict each other within the bounds (Farkas).
-///
-/// With `g = A_eq'y + A_in'z` the rows demand `g.w <= y.value + z.limit`, but no w within the bounds gives less than
-/// `sum_n min(lower_n g_n, upper_n g_n)`, which is larger.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Ray {
-    /// y and z.
-    pub multipliers: Multipliers,
-    /// By how much it is larger.
-    pub gap: f64,
-}
+use super::rows::{Kind, Multipliers, Ray};
 
 impl DualActiveSet {
     /// Multipliers by slot as multipliers of the rows as stated.

@@ -1,8 +1,8 @@
 //! The weights that belong to the multipliers, and by how much they miss each row.
 
+use super::DualActiveSet;
 use super::kernels::{add_rows, rows_times};
-use super::working_set::Kind;
-use super::{DualActiveSet, TOLERANCE};
+use super::rows::{Kind, TOLERANCE};
 
 /// Active rows are refined until they are satisfied to this, as they were stated or scaled to length 1.
 const REFINED: f64 = 2e-14;

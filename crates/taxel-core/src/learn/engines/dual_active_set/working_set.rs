@@ -1,38 +1,13 @@
 //! The working set: rows by slot, and the products of each with each (the Gram matrix).
 
 use super::kernels::products;
-use super::{BLOCK, DualActiveSet, RowId, TOLERANCE};
+use super::rows::{Kind, Row};
+use super::{BLOCK, DualActiveSet};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, problem};
 
-/// The least tolerance of a long row, scaled to length 1.
-const FINEST: f64 = 4e-14;
 /// The rows that memory is allocated for at first, where so many could be active; more rows move what is there.
 const AT_FIRST: usize = 1024;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Free,
-    Equality(usize),
-    Inequality(RowId),
-    Lower(usize),
-    Upper(usize),
-}
-
-/// A row of the working set, scaled to length 1.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Row {
-    pub(super) kind: Kind,
-    pub(super) length: f64,
-    pub(super) limit: f64,
-}
-
-impl Row {
-    /// The violation up to which the row counts as satisfied.
-    pub(super) fn tolerance(&self) -> f64 {
-        (TOLERANCE / self.length).clamp(FINEST, TOLERANCE)
-    }
-}
 
 impl DualActiveSet {
     pub(super) fn add(&mut self, kind: Kind, coefficients: &[f64], limit: f64) -> Result<usize> {

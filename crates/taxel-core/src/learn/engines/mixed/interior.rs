@@ -9,15 +9,15 @@ mod binding;
 mod conditions;
 mod cone;
 mod newton;
+mod variables;
 
 use faer::Mat;
 
-use self::binding::Iterate;
-use self::conditions::Residual;
 use self::cone::cone_step;
-use self::newton::Room;
+pub(super) use self::variables::PrimalDual;
+use self::variables::{Part, Residual, Room, Step};
 use super::dense::{add_gram, times};
-use super::program::{Program, retain};
+use super::program::{Iterate, Program};
 use crate::Stop;
 use crate::learn::statement::Norm;
 use crate::vectors::dot;
@@ -33,62 +33,6 @@ const MOST_IDLE: usize = 15;
 const NOTHING: f64 = 1e-10;
 /// Corrections of a step towards equal products, as long as they lengthen it.
 const MOST_CORRECTIONS: usize = 2;
-
-/// The part of a weight above or below its base.
-struct Part {
-    synapse: usize,
-    sign: f64,
-    range: f64,
-    cost: f64,
-}
-
-/// The variables: parts `x` with the multipliers of their two ends, rows' slacks and multipliers, the cone of the norm.
-#[derive(Debug, Clone)]
-pub(super) struct PrimalDual {
-    x: Vec<f64>,
-    low: Vec<f64>,
-    high: Vec<f64>,
-    equality: Vec<f64>,
-    slack: Vec<f64>,
-    inequality: Vec<f64>,
-    length: f64,
-    /// The cone's multiplier: its first entry, then the rest (minus the pull).
-    dual: (f64, Vec<f64>),
-}
-
-/// A direction in the same variables.
-struct Step {
-    x: Vec<f64>,
-    w: Vec<f64>,
-    low: Vec<f64>,
-    high: Vec<f64>,
-    equality: Vec<f64>,
-    slack: Vec<f64>,
-    inequality: Vec<f64>,
-    length: f64,
-    dual: (f64, Vec<f64>),
-}
-
-impl PrimalDual {
-    /// Removes the rows that `keep` does not mark.
-    pub(super) fn retain(&mut self, keep: &[bool]) {
-        retain(&mut self.slack, keep);
-        retain(&mut self.inequality, keep);
-    }
-
-    fn go(&mut self, reach: f64, step: &Step) {
-        let go = |v: &mut [f64], d: &[f64]| v.iter_mut().zip(d).for_each(|(v, d)| *v += reach * d);
-        go(&mut self.x, &step.x);
-        go(&mut self.low, &step.low);
-        go(&mut self.high, &step.high);
-        go(&mut self.equality, &step.equality);
-        go(&mut self.slack, &step.slack);
-        go(&mut self.inequality, &step.inequality);
-        self.length += reach * step.length;
-        self.dual.0 += reach * step.dual.0;
-        go(&mut self.dual.1, &step.dual.1);
-    }
-}
 
 /// The longest step that keeps all of `v + step d` above 0.
 fn wall(v: &[f64], d: &[f64]) -> f64 {

@@ -39,6 +39,13 @@ pub(super) enum Place {
     Upper,
 }
 
+/// Where an interior point ended.
+pub(super) struct Iterate {
+    pub(super) point: Point,
+    /// What seems to bind.
+    pub(super) guess: Guess,
+}
+
 /// A guess of what binds.
 #[derive(Debug, Clone)]
 pub(super) struct Guess {

@@ -1,15 +1,8 @@
 //! What seems to bind where an interior point ended.
 
-use super::super::program::{Guess, Place, Point};
+use super::super::program::{Guess, Iterate, Place, Point};
 use super::{Interior, PrimalDual};
 use crate::vectors::dot;
-
-/// Where an interior point ended.
-pub(in super::super) struct Iterate {
-    pub(in super::super) point: Point,
-    /// What seems to bind.
-    pub(in super::super) guess: Guess,
-}
 
 impl Interior<'_> {
     pub(super) fn finish(&self, state: &PrimalDual) -> Iterate {

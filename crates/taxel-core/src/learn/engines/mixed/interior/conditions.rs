@@ -1,28 +1,10 @@
 //! The conditions of optimality: by how much each is missed, and what the complementarity products shall become.
 
 use super::super::dense::{add_sum, times};
+use super::Interior;
 use super::newton::Newton;
-use super::{Interior, PrimalDual, Step};
+use super::variables::{Complement, PrimalDual, Residual, Step};
 use crate::vectors::dot;
-
-/// Residuals of the optimality conditions.
-pub(super) struct Residual {
-    pub(super) w: Vec<f64>,
-    pub(super) gradient: Vec<f64>,
-    pub(super) dual: Vec<f64>,
-    pub(super) equality: Vec<f64>,
-    pub(super) inequality: Vec<f64>,
-    pub(super) length: f64,
-}
-
-/// Targets of the complementarity products, less what they are.
-pub(super) struct Complement {
-    pub(super) low: Vec<f64>,
-    pub(super) high: Vec<f64>,
-    pub(super) rows: Vec<f64>,
-    /// Already divided by the scaled point.
-    pub(super) cone: Option<(f64, Vec<f64>)>,
-}
 
 impl Interior<'_> {
     pub(super) fn residual(&self, state: &PrimalDual) -> Residual {

@@ -3,9 +3,9 @@
 use faer::Mat;
 
 use super::super::dense::{Cholesky, add_gram, add_sum, outer, times};
-use super::conditions::{Complement, Residual};
+use super::Interior;
 use super::cone::Scaling;
-use super::{Interior, PrimalDual, Step};
+use super::variables::{Complement, PrimalDual, Residual, Room, Step};
 use crate::learn::statement::Norm;
 use crate::vectors::dot;
 
@@ -14,12 +14,6 @@ const REFINED: f64 = 1e-10;
 const MOST_REFINEMENTS: usize = 3;
 /// Curvature of a weight that cannot move.
 const FIXED: f64 = 1e30;
-
-/// Memory that iterations reuse.
-pub(super) struct Room {
-    pub(super) matrix: Mat<f64>,
-    pub(super) scaled: Vec<f64>,
-}
 
 /// A factored Newton matrix with what it needs to solve for a direction.
 pub(super) struct Newton<'a> {
