@@ -23,8 +23,6 @@ NOT_YET = {
     "taxel.device",
     # encode
     "taxel.encode",
-    # wire
-    "taxel.wire",
 }
 
 DOCS = Path(__file__).parents[1] / "docs"
