@@ -21,8 +21,6 @@ import taxel
 NOT_YET = {
     # device: its methods need a board for an example
     "taxel.device",
-    # encode
-    "taxel.encode",
 }
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -31,9 +31,18 @@ class RunningRange(Value):
         Until the first window is full: no spike; or, for recordings, the first window read by its own percentiles,
         whose spikes then come late by up to the window.
 
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense, when an encoder with this range is made
+
     Notes
     -----
     A channel whose two percentiles are equal has no range and stays below all levels.
+
+    Examples
+    --------
+    >>> LevelCrossing([0.5], running_range=RunningRange(low=10, high=90)).running_range.high
+    90
     """
 
     low: float = _RANGE.low
@@ -50,7 +59,7 @@ _DEFAULT = defaults("level_crossing")
 
 @dataclass(eq=False, repr=False)
 class LevelCrossing(Encoder):
-    """Say where a taxel comes to a level (+1) and where it falls below the level's release (-1).
+    """Give a spike where a taxel comes to a level (+1) and where it falls below the level's release (-1).
 
     Trains: ``taxel * len(levels) + level``, signed; with `tonic_ms` one more a taxel behind them. It begins settled:
     the first sample makes no crossing. Values and levels are compared in float32.
