@@ -466,6 +466,7 @@ class Device:
         timeout: float = 1.0,
         patience: float = 2.0,
     ) -> None:
+        given = None if array is None else instance("array", array, Array)
         self.patience = number("patience", patience)
         self.reconnects = 0
         self._set: Registers | None = None
@@ -474,7 +475,8 @@ class Device:
             self.greeting = self.cable.greeting()
             size = (self.greeting.rows, self.greeting.columns)
             thesis = Array.thesis()
-            self.array = array or (thesis if thesis.shape == size else Array(*size, pitch_mm=thesis.pitch_mm))
+            reported = thesis if thesis.shape == size else Array(*size, pitch_mm=thesis.pitch_mm)
+            self.array = reported if given is None else given
             if self.array.shape != size:
                 raise DeviceError(f"{place}: the board has {size[0]} x {size[1]} taxels, the array {self.array!r}")
         except BaseException:
