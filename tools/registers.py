@@ -314,7 +314,7 @@ pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, S
     None
 }}
 
-/// What is allowed but hardly meant.
+/// Warnings about values that are allowed but probably a mistake.
 pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {{
     let mut warnings = vec![];
 {rust_values(source, warns=True)}

@@ -23,7 +23,8 @@ class FILT(INST):
     initial : (float, float), mV, optional
     epochs : int, 1 or more
     updates : {"batch", "pattern"}
-    tau, tau_s, theta_0 : float, ms and mV, above 0
+    tau, tau_s : float, ms, above 0
+    theta_0 : float, mV, above 0
     after_spike : {"subtract", "membrane", "reset"}
     step_ms, within_ms : float, ms, above 0
     until_right : bool

@@ -108,7 +108,9 @@ class EmulateOptions:
             "tare_ms": None if isinstance(self.touch, Replay | Pipe) else number("tare_ms", self.tare_ms),
             "previous": text("previous", self.previous, ("last_sent", "last_sample")),
             "intensity": text("intensity", self.intensity, ("value", "difference", "nothing")),
-            "version_2": asdict(instance("version_2", self.version_2 or Version2(), Version2)),
+            "version_2": asdict(
+                instance("version_2", Version2() if self.version_2 is None else self.version_2, Version2)
+            ),
             "control": None if self.control is None else text("control", self.control),
             "line": None if self.line is None else (_path("line", self.line), whole("baud", self.baud, 300, 4_000_000)),
             "sync": None if self.sync is None else (_path("sync", self.sync), flag("overwrite", self.overwrite)),
