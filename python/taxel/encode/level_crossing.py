@@ -24,7 +24,7 @@ class RunningRange(Value):
     low, high : float, percent, from 0 to 100
         The percentiles (linear between ranks) of the past window that read 0 and 1.
     window_s : float, s, whole us
-        How long the window is; its samples are kept in memory.
+        How long the window is; its samples stay in memory.
     renew_s : float, s, whole us
         How often the percentiles are renewed, counted from the end of the first window.
     first_window : {"silent", "itself"}
@@ -73,7 +73,7 @@ class LevelCrossing(Encoder):
     release_by : float, 0 or more, optional
         Release as a distance below each level, instead.
     hold_ms : float, ms, 0 or more, whole us
-        How long a crossing must last; it is said then, so this is the latency.
+        How long a crossing must last; its spike comes after that time, so this is the latency.
     tonic_ms : float, ms, whole us, optional
         Adds tonic spikes, the slowly adapting part: one at the crossing, then one every `tonic_ms` while above.
     tonic_level : float, one of `levels`, optional

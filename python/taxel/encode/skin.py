@@ -142,7 +142,7 @@ class Skin(Tared):
         Parameters
         ----------
         array : Array
-            The sensor; its pitch says how many cm^2 it covers.
+            The sensor; its pitch gives the cm^2 that it covers.
 
         Returns
         -------

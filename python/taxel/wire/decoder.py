@@ -124,8 +124,8 @@ class Decoder:
     Notes
     -----
     Table 5.4, and the page *Wire version 2*. Time of version 1 is unwrapped into 64 bits: a stamp up to 0.1 s behind
-    the latest time is a step back (counted, kept), any other lies ahead, so silences of up to 6.45 s are right. Arrival
-    times show how long a longer one was.
+    the latest time is a step back, which is counted and stays in the events; any other lies ahead, so silences of up to
+    6.45 s are right. Arrival times show how long a longer one was.
 
     Examples
     --------

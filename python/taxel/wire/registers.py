@@ -16,7 +16,7 @@ from taxel.wire.command import Command
 
 __all__ = ["FRAME_US", "PRESETS", "QUOTED_PRESETS", "Registers", "described"]
 
-#: The names that `Registers.preset` knows.
+#: The names of the presets (`Registers.preset`).
 PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
 
 #: The names of all presets, for a text.
