@@ -1,7 +1,6 @@
 """Docstrings of what a user imports: parameters as in the signature, with shape and unit, errors, sources, examples.
 
-Every room is tried but those of `NOT_YET`. Whoever has written the docstrings of a room deletes its line there, and
-`python tests/test_docstrings.py taxel.learn` lists what a room lacks.
+Every room is tried; `python tests/test_docstrings.py taxel.learn` lists what a room lacks.
 """
 
 import inspect
@@ -16,16 +15,6 @@ from sound import SOUND
 from test_nonsense import modules, public, somewhere, takes  # noqa: F401  the fixture is used by name
 
 import taxel
-
-#: Rooms whose docstrings are not whole yet.
-NOT_YET = {
-    # device: its methods need a board for an example
-    "taxel.device",
-    # encode
-    "taxel.encode",
-    # wire
-    "taxel.wire",
-}
 
 DOCS = Path(__file__).parents[1] / "docs"
 #: Annotations of arrays of numbers, whose entries name a shape and a unit.
@@ -43,11 +32,6 @@ def room_of(name: str) -> str:
     """Return the room that a public name belongs to: "taxel" for what stands at the root."""
     found = [room.__name__ for room in modules() if name.startswith(f"{room.__name__}.")]
     return ".".join(max(found, key=len).split(".")[:2])
-
-
-def of_rooms(whole: bool = True) -> dict[str, Any]:
-    """Return what is public in the rooms whose docstrings are whole."""
-    return {name: value for name, value in public().items() if (room_of(name) not in NOT_YET) == whole}
 
 
 def sections(value: Any) -> dict[str, list[str]]:
@@ -114,20 +98,20 @@ def faults_of_raises(name: str, value: Any) -> list[str]:
     return []
 
 
-@pytest.mark.parametrize("name", of_rooms())
+@pytest.mark.parametrize("name", public())
 def test_parameters_are_those_of_the_signature_with_shape_and_unit(name: str) -> None:
-    assert not (faults := faults_of_parameters(name, of_rooms()[name])), "\n".join(faults)
+    assert not (faults := faults_of_parameters(name, public()[name])), "\n".join(faults)
 
 
 @pytest.mark.usefixtures("somewhere")
-@pytest.mark.parametrize("name", [name for name in of_rooms() if name in SOUND])
+@pytest.mark.parametrize("name", [name for name in public() if name in SOUND])
 def test_what_refuses_an_argument_has_raises(name: str) -> None:
-    assert not (faults := faults_of_raises(name, of_rooms()[name])), "\n".join(faults)
+    assert not (faults := faults_of_raises(name, public()[name])), "\n".join(faults)
 
 
 def test_at_least_half_show_an_example_that_is_run() -> None:
     """`make docs` and the doctests run every example; here they are counted, room by room."""
-    there = of_rooms()
+    there = public()
     for room in {room_of(name) for name in there}:
         own = {name: value for name, value in there.items() if room_of(name) == room}
         shown = [name for name, value in own.items() if ">>>" in (inspect.getdoc(value) or "")]
@@ -136,7 +120,7 @@ def test_at_least_half_show_an_example_that_is_run() -> None:
 
 def test_what_the_readings_list_names_its_source() -> None:
     """The options in the last column of docs/readings.md: their class cites the section or equation of the row."""
-    there = {name.rsplit(".", 1)[-1]: value for name, value in of_rooms().items() if inspect.isclass(value)}
+    there = {name.rsplit(".", 1)[-1]: value for name, value in public().items() if inspect.isclass(value)}
     missing = []
     for row in (DOCS / "readings.md").read_text("utf-8").splitlines():
         cells = [cell.strip() for cell in row.strip("|").split("|")]

@@ -63,6 +63,11 @@ class Port:
         The description of a USB device.
     usb : (int, int) or None
         Vendor and product numbers of a USB device.
+
+    Examples
+    --------
+    >>> Port("/dev/ttyUSB0", "usb", product="FT232R").place
+    '/dev/ttyUSB0'
     """
 
     place: str
@@ -77,6 +82,10 @@ def ports() -> list[Port]:
     """Return the serial ports of the system, USB devices first.
 
     Pseudo-terminals, as `taxel emulate --line` makes, are not among them.
+
+    Returns
+    -------
+    list of Port
 
     Raises
     ------
@@ -138,7 +147,12 @@ class Cable:
     Raises
     ------
     OSError : the device or the server cannot be opened
-    ProblemError : a place or baud rate that makes no sense
+    DeviceError : the device is no serial one
+    ProblemError : a place, a baud rate or a timeout that makes no sense
+
+    Notes
+    -----
+    Thesis, Appendix 1, Tables 5.1 and 5.5, and the page *Registers*.
 
     Examples
     --------
@@ -191,9 +205,30 @@ class Cable:
         ----------
         command : Command
 
+        Returns
+        -------
+        int, from 0 to 2**32 - 1
+            The whole register.
+
         Raises
         ------
         DeviceError : the board refuses (its rule is named), or does not answer
+        ProblemError : no command
+
+        Examples
+        --------
+        On the line of an emulated board:
+
+        >>> import os, pty, threading
+        >>> from taxel.simulate import Board
+        >>> board, (end, line) = Board(), pty.openpty()
+        >>> def answer():
+        ...     while data := os.read(end, 5):
+        ...         os.write(end, board.command(data).encode())
+        >>> threading.Thread(target=answer, daemon=True).start()
+        >>> with Cable(os.ttyname(line), timeout=30) as cable:
+        ...     cable.command(Command(4, 140)), cable.read(4)
+        (140, 140)
         """
         instance("command", command, Command)
         # A write of REG6 asks for the register that it names.
@@ -210,6 +245,10 @@ class Cable:
     def greeting(self) -> Greeting:
         """Request the greeting of the board (a write of 8 to REG6), as its line at reset may not have been received.
 
+        Returns
+        -------
+        Greeting
+
         Raises
         ------
         DeviceError : the board does not answer
@@ -225,6 +264,10 @@ class Cable:
     def listen(self) -> dict[str, int]:
         """Read the lines that have arrived, and return the number of faults so far by name ("queue": 3).
 
+        Returns
+        -------
+        dict of int by str
+
         Raises
         ------
         OSError, DeviceError : the cable was pulled
@@ -235,6 +278,10 @@ class Cable:
 
     def said(self) -> list[str]:
         """Return the lines of the board since the last call, answers to commands included; at most the last 256.
+
+        Returns
+        -------
+        list of str, one a line
 
         Raises
         ------
@@ -253,9 +300,14 @@ class Cable:
         within : float, s
             How long to try.
 
+        Returns
+        -------
+        Greeting
+
         Raises
         ------
         DeviceError : no board answers within that time
+        ProblemError : no number
         """
         until, why = time.monotonic() + number("within", within), ""
         patience, self.timeout = self.timeout, min(self.timeout, 0.25)
@@ -281,9 +333,15 @@ class Cable:
         ----------
         register : int, from 0 to 7
 
+        Returns
+        -------
+        int, from 0 to 2**32 - 1
+            The whole register.
+
         Raises
         ------
         DeviceError : the board does not answer
+        ProblemError : no such register
         """
         return self.command(Command(6, whole("register", register, 0, 7)))
 
@@ -295,9 +353,14 @@ class Cable:
         ----------
         ticks : int, ticks, from 0 to 255
 
+        Returns
+        -------
+        context manager, which yields None
+
         Raises
         ------
         DeviceError : the board refuses, or does not answer
+        ProblemError : a noise floor out of this range
         """
         before = self.read(_FLOOR_REGISTER)
         floor = whole("ticks", ticks, 0, 255) << 8
@@ -403,6 +466,7 @@ class Device:
         timeout: float = 1.0,
         patience: float = 2.0,
     ) -> None:
+        given = None if array is None else instance("array", array, Array)
         self.patience = number("patience", patience)
         self.reconnects = 0
         self._set: Registers | None = None
@@ -411,7 +475,8 @@ class Device:
             self.greeting = self.cable.greeting()
             size = (self.greeting.rows, self.greeting.columns)
             thesis = Array.thesis()
-            self.array = array or (thesis if thesis.shape == size else Array(*size, pitch_mm=thesis.pitch_mm))
+            reported = thesis if thesis.shape == size else Array(*size, pitch_mm=thesis.pitch_mm)
+            self.array = reported if given is None else given
             if self.array.shape != size:
                 raise DeviceError(f"{place}: the board has {size[0]} x {size[1]} taxels, the array {self.array!r}")
         except BaseException:
@@ -439,9 +504,29 @@ class Device:
         registers : Registers or str
             The registers, or the name of a preset.
 
+        Returns
+        -------
+        Registers
+
         Raises
         ------
         DeviceError : a rule is broken, the board refuses, does not answer, or holds something else afterwards
+        ProblemError : no such preset
+
+        Examples
+        --------
+        On the line of an emulated board:
+
+        >>> import os, pty, threading
+        >>> from taxel.simulate import Board
+        >>> board, (end, line) = Board(), pty.openpty()
+        >>> def answer():
+        ...     while data := os.read(end, 5):
+        ...         os.write(end, board.command(data).encode())
+        >>> threading.Thread(target=answer, daemon=True).start()
+        >>> with Device(os.ttyname(line), timeout=30) as device:
+        ...     device.apply("2 kHz").noise_floor, device.set(noise_floor=7).noise_floor
+        (10, 7)
         """
         if isinstance(registers, Registers):
             return self._try(lambda: self._write(registers))
@@ -455,6 +540,10 @@ class Device:
         ----------
         **fields : float
             Values by the names of `Registers`, in their units.
+
+        Returns
+        -------
+        Registers
 
         Raises
         ------
@@ -478,9 +567,15 @@ class Device:
         start : bool
             Start (true) or stop.
 
+        Returns
+        -------
+        Registers
+            The contents of the registers afterwards.
+
         Raises
         ------
         DeviceError : the board does not answer
+        ProblemError : neither true nor false
         """
         on = flag("start", start)
         return self._try(lambda: self._record(on))

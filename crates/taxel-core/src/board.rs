@@ -5,7 +5,7 @@
 //!
 //! This file has the board's parts and how it is made and reset; `frame` runs them once a frame, `commands` answers the
 //! host. Of the parts `scan` has the order of taxels, `comparator`, `afferents` and `asynchronous` find events, `link`
-//! makes datagrams of them and queues these, `refresh` says what is repeated when.
+//! makes datagrams of them and queues these, `refresh` repeats values and totals.
 
 mod afferents;
 mod asynchronous;
@@ -81,7 +81,7 @@ pub struct Board {
     comparators: Comparators,
     /// The comparators' model with `mechanoreceptor`.
     afferents: Afferents,
-    /// Where each taxel compares by itself and nothing is scanned.
+    /// The taxels' own comparators, on a board that scans nothing.
     asynchronous: Option<Asynchronous>,
     link: Link,
     refresh: Refresh,

@@ -26,7 +26,8 @@ __all__ = ["Encoder", "EncoderStream"]
 class Encoder(Value):
     """Turn events or frames into spike trains; the common part of all encoders.
 
-    An encoder holds its parameters under their own names and nothing else. Two are equal where their parameters are.
+    An encoder holds its parameters under their own names and nothing else. Two encoders are equal where their
+    parameters are.
 
     Examples
     --------
@@ -48,16 +49,45 @@ class Encoder(Value):
         return {"name": self.name} | super()._plain()
 
     def to_json(self) -> str:
-        """Return the encoder as JSON: an object with its name and all parameters."""
+        """Return the encoder as JSON: an object with its name and all parameters.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        ProblemError : a parameter that makes no sense
+
+        Examples
+        --------
+        >>> from taxel.encode import FA1
+        >>> Encoder.from_json(FA1(bits=2).to_json()) == FA1(bits=2)
+        True
+        """
         return _core.check_encoder(self._json())
 
     @staticmethod
     def from_json(text: str) -> Encoder:
-        """Return the encoder that the JSON names; what is left out has its default.
+        """Return the encoder that the JSON names; a parameter that is left out has its default.
+
+        Parameters
+        ----------
+        text : str
+            A JSON object with "name" and any parameters, as `to_json` returns it.
+
+        Returns
+        -------
+        Encoder
 
         Raises
         ------
-        ProblemError : an unknown name or parameter, or a value that makes no sense
+        ProblemError : no JSON, an unknown name or parameter, or a value that makes no sense
+
+        Examples
+        --------
+        >>> Encoder.from_json('{"name": "fa1", "bits": 2}').bits
+        2
         """
         if not isinstance(text, str):
             raise ProblemError(f"encoder is {shown(text)}: must be JSON text")
@@ -65,12 +95,31 @@ class Encoder(Value):
         return Encoder._by_name[values.pop("name")]._from_values(values)
 
     def trains(self, array: Array) -> int:
-        """Return on how many trains the encoder speaks for an array; signed ones count once."""
+        """Return the number of trains that the encoder gives for an array; a signed train counts once.
+
+        Parameters
+        ----------
+        array : Array
+
+        Returns
+        -------
+        int, trains
+
+        Raises
+        ------
+        ProblemError : no array, or a parameter that makes no sense
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> LevelCrossing([5.0, 10.0]).trains(Array(4, 4))
+        32
+        """
         return _core.encoder_about(self._json(), instance("array", array, Array)._parts())[0]
 
     @property
     def signed(self) -> bool:
-        """Whether spikes carry a signed value, so that a neuron hears each train as two, ON and OFF."""
+        """Whether spikes carry a signed value, so that each train is two inputs of a neuron, ON and OFF."""
         return _core.encoder_about(self._json(), Array(1, 1)._parts())[1]
 
     @property
@@ -79,7 +128,29 @@ class Encoder(Value):
         return _core.encoder_about(self._json(), Array(1, 1)._parts())[2]
 
     def with_tare(self, tare: Tare) -> Self:
-        """Return the same encoder with this tare; one that reads none stays as it is."""
+        """Return the same encoder with this tare; an encoder that has no parameter `tare` stays as it is.
+
+        Parameters
+        ----------
+        tare : Tare
+            The taxels' rest.
+
+        Returns
+        -------
+        Encoder
+            A copy; this encoder is not changed.
+
+        Raises
+        ------
+        ProblemError : no tare
+
+        Examples
+        --------
+        >>> from taxel.encode import ContactArea, FA1
+        >>> tare = Tare.take(Frames([[[50.0, 52.0]], [[50.0, 52.0]]], [0, 1000], unit="ticks"))
+        >>> ContactArea().with_tare(tare).tare == tare, FA1().with_tare(tare) == FA1()
+        (True, True)
+        """
         instance("tare", tare, Tare)
         return self
 
@@ -103,6 +174,12 @@ class Encoder(Value):
         ------
         ProblemError : none of these, events without intensities, or one more than 0.1 s behind another
             (names it; `Events.sorted` puts them in order)
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> LevelCrossing([10.0]).encode(Frames([[[0.0]], [[12.0]]], [0, 1000]))
+        SpikeTrains(1 trains, 1 spikes, signed, 0 to 1 ms)
         """
         x = recorded(x)
         if isinstance(x, Events):
@@ -110,11 +187,21 @@ class Encoder(Value):
         return SpikeTrains._from_parts(_core.encode_frames(self._json(), _frames(x)._parts()))
 
     def fit(self, recordings: object = None, targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
-        """Do nothing: an encoder learns nothing; so that it stands in a pipeline of scikit-learn's."""
+        """Return the encoder itself, which learns nothing; a pipeline of scikit-learn's calls `fit` of each step.
+
+        Parameters
+        ----------
+        recordings, targets : object
+            Not used.
+
+        Returns
+        -------
+        Encoder
+        """
         return self
 
     def transform(self, recordings: Sequence[Events | Frames | Recorded]) -> list[SpikeTrains]:
-        """Return the spikes of several recordings as learners take them: signed trains split into ON and OFF.
+        """Return the spikes of several recordings as learners expect them: signed trains split into ON and OFF.
 
         Parameters
         ----------
@@ -127,7 +214,13 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : as `encode`
+        ProblemError : no sequence of recordings, or as `encode`
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> LevelCrossing([10.0]).transform([Frames([[[0.0]], [[12.0]]], [0, 1000])])
+        [SpikeTrains(2 trains, 1 spikes, 0 to 1 ms)]
         """
         encoded = [self.encode(one) for one in several("recordings", recordings)]
         return [trains.split_by_sign() if trains.signed else trains for trains in encoded]
@@ -139,6 +232,20 @@ class Encoder(Value):
         ----------
         array : Array, optional
             The sensor; that of the first piece where it is left out.
+
+        Returns
+        -------
+        EncoderStream
+
+        Raises
+        ------
+        ProblemError : no array, or a parameter that makes no sense
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> LevelCrossing([10.0]).stream().push(Frames([[[0.0]], [[12.0]]], [0, 1000]))
+        SpikeTrains(1 trains, 1 spikes, signed, 0 to 1 ms)
         """
         return EncoderStream(self, array)
 
@@ -148,6 +255,17 @@ class EncoderStream:
 
     Every call returns the spikes that became certain by it, with the window from where the last call ended. A stamp of
     events is over when a later one comes, `advance` moves time on or `finish` ends it.
+
+    Parameters
+    ----------
+    encoder : Encoder
+        Later changes of its parameters have no effect.
+    array : Array, optional
+        The sensor; that of the first piece where it is left out.
+
+    Raises
+    ------
+    ProblemError : no encoder, no array, or a parameter that makes no sense
 
     Examples
     --------
@@ -171,17 +289,34 @@ class EncoderStream:
 
     @property
     def late(self) -> int:
-        """How many events came more than 0.1 s behind the time come to, and were taken as of that time."""
+        """How many events came more than 0.1 s behind the stream's time, and count as of that time."""
         return 0 if self._core is None else self._core.late
 
     def push(self, x: Events | Frames) -> SpikeTrains:
-        """Take the next events or frames; one stream takes either, never both.
+        """Encode the next events or frames; a stream reads either events or frames, never both.
 
-        An event behind the time come to counts as of that time.
+        An event behind the stream's time counts as of that time.
+
+        Parameters
+        ----------
+        x : Events or Frames
+            The next piece.
+
+        Returns
+        -------
+        SpikeTrains
+            The spikes that became certain, in ms from where the stream's time counts.
 
         Raises
         ------
         ProblemError : neither, another array's, events without intensities, or frames out of order
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> stream = LevelCrossing([10.0]).stream()
+        >>> stream.push(Frames([[[0.0]]], [0])).times, stream.push(Frames([[[12.0]]], [1000])).times
+        (array([], dtype=float64), array([1.]))
         """
         if isinstance(x, Events):
             return SpikeTrains._from_parts(self._begin(x.array).push_events(x._parts()))
@@ -189,16 +324,53 @@ class EncoderStream:
         return SpikeTrains._from_parts(self._begin(frames.array).push_frames(frames._parts()))
 
     def advance(self, t_us: int) -> SpikeTrains:
-        """Say that nothing will come any more before `t_us` (exclusive); an earlier time changes nothing."""
+        """Move the stream's time on: no event before `t_us` will be pushed any more.
+
+        Parameters
+        ----------
+        t_us : int, us
+            Exclusive; a time before the stream's changes nothing.
+
+        Returns
+        -------
+        SpikeTrains
+            The spikes that became certain.
+
+        Raises
+        ------
+        ProblemError : no whole number, or beyond 2**60
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> stream = LevelCrossing([10.0]).stream()
+        >>> values = Events([0, 500], [0, 0], [0, 0], [True, True], array=Array(1, 1), intensity=[5, 12])
+        >>> len(stream.push(values).times), stream.advance(2000).times
+        (0, array([0.5]))
+        """
         if isinstance(t_us, bool) or not isinstance(t_us, int | np.integer) or not -(2**60) <= t_us <= 2**60:
             raise ProblemError(f"t_us is {shown(t_us)}: must be a whole number of us")
-        return self._told(None if self._core is None else self._core.advance(int(t_us)))
+        return self._spikes(None if self._core is None else self._core.advance(int(t_us)))
 
     def finish(self) -> SpikeTrains:
-        """Say that nothing more will come; the last values are held for the latency, so that all spikes come out."""
-        return self._told(None if self._core is None else self._core.finish())
+        """End the stream; the last values are held for the encoder's latency, so that all spikes are returned.
 
-    def _told(self, parts: tuple[Any, ...] | None) -> SpikeTrains:
+        Returns
+        -------
+        SpikeTrains
+            The rest of the spikes.
+
+        Examples
+        --------
+        >>> from taxel.encode import ThresholdIzhikevich
+        >>> stream = ThresholdIzhikevich([0.4]).stream()
+        >>> frames = Frames([[[0.0]], [[1.0]], [[1.0]]], [0, 10_000, 20_000], unit="V")
+        >>> len(stream.push(frames).times), stream.finish().times
+        (0, array([25.8]))
+        """
+        return self._spikes(None if self._core is None else self._core.finish())
+
+    def _spikes(self, parts: tuple[Any, ...] | None) -> SpikeTrains:
         return SpikeTrains.from_lists([]) if parts is None else SpikeTrains._from_parts(parts)
 
 

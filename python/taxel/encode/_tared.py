@@ -24,8 +24,8 @@ __all__ = ["Tared"]
 class Tared(Encoder):
     """Turn what stands above the taxels' rest into spikes: an encoder with the parameter `tare`.
 
-    A rest belongs to a board and a day, so a saved readout has none and is given one. In seconds it is taken from each
-    recording's own beginning, so that recordings of several boards can be encoded alike.
+    A rest belongs to a board and a day, so a saved readout has none and is given one. A rest in seconds is measured at
+    each recording's own beginning, so that recordings of several boards can be encoded alike.
     """
 
     tare: Tare | float | None
@@ -33,13 +33,13 @@ class Tared(Encoder):
     def _json(self) -> str:
         if not self._is_rest():
             return super()._json()
-        # As it stands: a tare of thousands of taxels need not be read to be handed over.
+        # The tare's JSON as text: to parse that of thousands of taxels only to write it again costs time.
         rest = self.tare.to_json()  # type: ignore[union-attr]
         others = {name: value for name, value in self._plain().items() if name != "tare"}
         return f'{parameters(others)[:-1]}, "tare": {rest}}}'
 
     def _is_rest(self) -> bool:
-        """Tell whether the rest itself is held: not how long it lasts, which is checked."""
+        """Return whether `tare` is a rest; a number of seconds is checked to be one."""
         if self.tare is None or isinstance(self.tare, Tare):
             return self.tare is not None
         if isinstance(self.tare, bool) or not isinstance(self.tare, int | float | np.integer | np.floating):
@@ -52,6 +52,15 @@ class Tared(Encoder):
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
         """Return the spikes of a whole recording, as `Encoder.encode`; a tare in seconds is that of its beginning.
+
+        Parameters
+        ----------
+        x : Events, Frames or Recording
+            As in `Encoder.encode`.
+
+        Returns
+        -------
+        SpikeTrains
 
         Raises
         ------
@@ -79,7 +88,22 @@ class Tared(Encoder):
         return None if self._is_rest() else self.tare
 
     def with_tare(self, tare: Tare) -> Self:
-        """Return the same encoder with this tare."""
+        """Return the same encoder with this tare.
+
+        Parameters
+        ----------
+        tare : Tare
+            The taxels' rest.
+
+        Returns
+        -------
+        Encoder
+            A copy; this encoder is not changed.
+
+        Raises
+        ------
+        ProblemError : no tare
+        """
         super().with_tare(tare)
         return copy.copy(self).set_params(tare=tare)
 

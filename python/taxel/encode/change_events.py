@@ -16,7 +16,7 @@ _DEFAULT = defaults("change_events")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ChangeEvents(Encoder):
-    """Say how far each taxel moved since its last event, in units of the noise floor; +-(2^bits - 1) at most.
+    """Give each change of a taxel since its last event, in units of the noise floor; +-(2^bits - 1) at most.
 
     One signed train a taxel. The first sample is the first previous value and gives no spike. Reckoned in float32.
 

@@ -18,12 +18,12 @@ _DEFAULT = defaults("contact_area")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ContactArea(Tared):
-    """Say where the number of loaded taxels rises through levels, and where it falls below them.
+    """Give a spike where the number of loaded taxels rises through levels, and where it falls below them.
 
     A taxel is loaded while its held value stands above its tared rest by the noise floor and half a tick; it counts if
-    one of its 8 neighbours is loaded too. A taxel never heard of, in the tare or since, is unloaded. Reckoned once a
-    stamp, after the last event that carries it; spikes have the stamp's time. There is no place in it, so what is
-    learnt at one place holds at others.
+    one of its 8 neighbours is loaded too. A taxel without a value, in the tare or since, is unloaded. The number is
+    counted once a stamp, after the last event that carries it; spikes have the stamp's time. Spikes do not depend on
+    the place of a touch, so what is learnt at one place holds at others.
 
     Trains, unsigned: rises through each level, then falls below each; ten by default.
 

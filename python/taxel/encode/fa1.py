@@ -18,7 +18,7 @@ _DEFAULT = defaults("fa1")
 class FA1(Encoder):
     """Integrate each taxel's change of compressed pressure; fire with its sign where that passes a moving threshold.
 
-    Exactly equations 5.1 to 5.5 (and 5.7 where `bits` are more than one), polarity kept; the constants are those of
+    Exactly equations 5.1 to 5.5 (and 5.7 where `bits` are more than one), with polarity; the constants are those of
     Table 5.3. One signed train a taxel. It begins as if the first sample had always been. Reckoned in float64; pressure
     below 0 counts as 0.
 

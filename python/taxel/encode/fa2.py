@@ -54,8 +54,8 @@ class FA2(Encoder):
     that it carries do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). `corner_ms`, `membrane_ms`, `jump` and
     `recovery_ms` are fitted by us to a threshold of one spike a cycle that is least between 200 and 250 Hz.
     `threshold` is what a sensor allows: a step of one tick in 150 stays below it; a finger is far more sensitive.
-    Thresholds at periods of 0.05 to 0.2 ms agree within 5 % of each other; above 0.5 ms the best frequency is no
-    longer there to be felt.
+    Thresholds at periods of 0.05 to 0.2 ms agree within 5 % of each other; at periods above 0.5 ms no
+    best frequency is left.
 
     Examples
     --------

@@ -24,16 +24,25 @@ class RunningRange(Value):
     low, high : float, percent, from 0 to 100
         The percentiles (linear between ranks) of the past window that read 0 and 1.
     window_s : float, s, whole us
-        How long the window is; its samples are kept in memory.
+        How long the window is; its samples stay in memory.
     renew_s : float, s, whole us
         How often the percentiles are renewed, counted from the end of the first window.
     first_window : {"silent", "itself"}
         Until the first window is full: no spike; or, for recordings, the first window read by its own percentiles,
         whose spikes then come late by up to the window.
 
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense, when an encoder with this range is made
+
     Notes
     -----
     A channel whose two percentiles are equal has no range and stays below all levels.
+
+    Examples
+    --------
+    >>> LevelCrossing([0.5], running_range=RunningRange(low=10, high=90)).running_range.high
+    90
     """
 
     low: float = _RANGE.low
@@ -50,7 +59,7 @@ _DEFAULT = defaults("level_crossing")
 
 @dataclass(eq=False, repr=False)
 class LevelCrossing(Encoder):
-    """Say where a taxel comes to a level (+1) and where it falls below the level's release (-1).
+    """Give a spike where a taxel comes to a level (+1) and where it falls below the level's release (-1).
 
     Trains: ``taxel * len(levels) + level``, signed; with `tonic_ms` one more a taxel behind them. It begins settled:
     the first sample makes no crossing. Values and levels are compared in float32.
@@ -64,7 +73,7 @@ class LevelCrossing(Encoder):
     release_by : float, 0 or more, optional
         Release as a distance below each level, instead.
     hold_ms : float, ms, 0 or more, whole us
-        How long a crossing must last; it is said then, so this is the latency.
+        How long a crossing must last; its spike comes after that time, so this is the latency.
     tonic_ms : float, ms, whole us, optional
         Adds tonic spikes, the slowly adapting part: one at the crossing, then one every `tonic_ms` while above.
     tonic_level : float, one of `levels`, optional

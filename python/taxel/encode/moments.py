@@ -16,7 +16,7 @@ _DEFAULT = defaults("moments")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Moments(Tared):
-    """Say where area, total, peak and the way of the centre of a touch pass levels that stand in equal ratios.
+    """Give a spike where area, total, peak and the way of the centre of a touch pass levels that stand in equal ratios.
 
     Of the taxels that count as `ContactArea` counts them: how many (area), the sum and the largest of their values
     above rest (total, peak), and how far their centre, weighted by these values, has moved to the right and downwards
@@ -25,7 +25,7 @@ class Moments(Tared):
     on the array the touch began, so what is learnt at one place holds at others.
 
     Trains, unsigned, one a level in the order area, total, peak, x right, x left, y down, y up, each from its least
-    level on: first where each level is reached, then where each is left, then (with `tonic_ms`) one that speaks while
+    level on: first where each level is reached, then where each is left, then (with `tonic_ms`) one that fires while
     beyond. It begins settled: the first sample makes no crossing. Reckoned in float64.
 
     Parameters

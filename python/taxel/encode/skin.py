@@ -25,14 +25,20 @@ KINDS = ("SA-1", "FA-1", "SA-2", "FA-2")
 
 @dataclass(frozen=True, eq=False)
 class Afferents:
-    """Say of each train of a `Skin` what it is and where it stands.
+    """Hold the type and the place of the afferent behind each train of a `Skin`.
 
-    Attributes
+    Parameters
     ----------
     kind : array of str, shape (trains,)
-        ``"SA-1"``, ``"FA-1"``, ``"SA-2"`` or ``"FA-2"``.
-    x_mm, y_mm : float array, shape (trains,)
+        The labels ``"SA-1"``, ``"FA-1"``, ``"SA-2"`` or ``"FA-2"``.
+    x_mm, y_mm : array of float, mm, shape (trains,)
         To the right and downwards from the middle of the first taxel.
+
+    Examples
+    --------
+    >>> afferents = Skin(seed=5).afferents(Array(10, 10, pitch_mm=1.0))
+    >>> len(afferents), str(afferents.kind[0])
+    (241, 'SA-1')
     """
 
     kind: NDArray[np.str_]
@@ -45,9 +51,22 @@ class Afferents:
     def trains(self, kind: str) -> NDArray[np.int64]:
         """Return the numbers of the trains of one type.
 
+        Parameters
+        ----------
+        kind : {"SA-1", "FA-1", "SA-2", "FA-2"}
+
+        Returns
+        -------
+        array of int, shape (trains of this type,)
+
         Raises
         ------
         ProblemError : no such type
+
+        Examples
+        --------
+        >>> Skin(seed=5).afferents(Array(10, 10, pitch_mm=1.0)).trains("SA-2")
+        array([210, 211, 212, 213, 214, 215])
         """
         if not isinstance(kind, str) or kind not in KINDS:
             raise ProblemError(f"kind is {shown(kind)}: must be one of {', '.join(KINDS)}")
@@ -59,8 +78,8 @@ class Skin(Tared):
     """Give an array the afferents of a fingertip: all four types in places that a seed draws, each with a field.
 
     Trains have no sign, as a nerve's spikes have none: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to
-    the last; `afferents` says what each is and where. Each type is the encoder of its name with its defaults and this
-    `range`; FA-1's threshold decays by the ms.
+    the last; `afferents` returns the type and place of each. Each type is the encoder of its name with its defaults and
+    this `range`; FA-1's threshold decays by the ms.
 
     Parameters
     ----------
@@ -118,11 +137,25 @@ class Skin(Tared):
     tare: Tare | float | None = _DEFAULT.tare
 
     def afferents(self, array: Array) -> Afferents:
-        """Return what each train is, and where, on an array.
+        """Return the type and the place of each train's afferent on an array.
+
+        Parameters
+        ----------
+        array : Array
+            The sensor; its pitch gives the cm^2 that it covers.
+
+        Returns
+        -------
+        Afferents
 
         Raises
         ------
         ProblemError : no array, or more than a million afferents on it
+
+        Examples
+        --------
+        >>> len(Skin(fa1_per_cm2=0, seed=5).afferents(Array(10, 10, pitch_mm=1.0)))
+        101
         """
         kind, x, y = _core.skin_afferents(self._json(), instance("array", array, Array)._parts())
         return Afferents(np.array(kind, dtype="<U4"), np.array(x, dtype=float), np.array(y, dtype=float))

@@ -17,10 +17,10 @@ _DEFAULT = defaults("threshold_izhikevich")
 
 @dataclass(eq=False, repr=False)
 class ThresholdIzhikevich(Encoder):
-    """Say with two Izhikevich neurons a level where a taxel came to it (+1) and where it left it (-1).
+    """Let two Izhikevich neurons a level fire where a taxel came to it (+1) and where it left it (-1).
 
-    One neuron hears the thresholded signal, one its inverse; each fires once for each step of its input, and chatter
-    within some 10 ms vanishes. Trains: ``taxel * len(levels) + level``, signed.
+    The input of one neuron is the thresholded signal, that of the other its inverse; each fires once for each step of
+    its input, and chatter within some 10 ms vanishes. Trains: ``taxel * len(levels) + level``, signed.
 
     Parameters
     ----------

@@ -24,7 +24,11 @@ class Command:
 
     Raises
     ------
-    ProblemError : out of these ranges
+    ProblemError : a register or a value out of these ranges
+
+    Notes
+    -----
+    Thesis, Appendix 1, Table 5.1.
 
     Examples
     --------
@@ -47,6 +51,11 @@ class Command:
         Returns
         -------
         bytes, 5
+
+        Examples
+        --------
+        >>> list(Command(7, 1).to_bytes())
+        [240, 0, 0, 0, 1]
         """
         return _core.command_bytes(self.register, self.value)
 
@@ -66,5 +75,10 @@ class Command:
         ------
         ProblemError : `data` is not bytes
         FormatError : not five bytes, or a top bit out of place (names the byte)
+
+        Examples
+        --------
+        >>> Command.from_bytes(Command(4, 140).to_bytes()).value
+        140
         """
         return cls(*_core.command_read(given_bytes(data)))

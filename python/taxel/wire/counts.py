@@ -9,7 +9,9 @@ __all__ = ["Counts", "Received", "Status"]
 
 @dataclass(frozen=True)
 class Counts:
-    """Hold what a decoder read, and all that it dropped or missed, by cause; causes that a version does not have are 0.
+    """Hold the numbers of what a decoder read, and of all that it dropped or missed, by cause.
+
+    A cause that a version of the wire does not have is 0.
 
     The sums close at any time. Version 1: ``bytes == 5 * words + skipped``, and ``words == changes + intensities +
     unpaired + markers + contradictory + outside``; the bytes of a word that is not complete count when it is, or is
@@ -18,43 +20,64 @@ class Counts:
     Parameters
     ----------
     bytes, words : int
-        Version 1: bytes read, and complete words.
+        Version 1: the number of bytes read, and of complete words.
     skipped : int
-        Version 1: bytes that belong to no complete word.
+        Version 1: the number of bytes that belong to no complete word.
     short : int
-        Version 1: words cut off by the next first byte, or by the end. Version 2: datagrams refused as too short.
+        Version 1: the number of words cut off by the next first byte, or by the end. Version 2: of datagrams refused as
+        too short.
     changes : int
-        Version 1: changes on the array, the rows of `Events`.
+        Version 1: the number of changes on the array, which are the rows of `Events`.
     intensities, unpaired : int
-        Version 1: intensities that found their change, and those that did not.
+        Version 1: the number of intensities that belong to a change, and of those that belong to none.
     markers : int
-        Starts and stops.
+        The number of starts and stops of a recording.
     contradictory : int
-        Version 1: words that are an intensity and a marker at once.
+        Version 1: the number of words that are an intensity and a marker at once.
     outside : int
-        Events, states and intensities outside the array.
+        The number of events, states and intensities outside the array.
     back : int
-        Version 1: changes and markers behind the latest time, which are kept.
+        Version 1: the number of changes and markers behind the latest time; the events have them.
     datagrams, intact : int
-        Version 2: given to the decoder, and decoded.
+        Version 2: the number of datagrams given to the decoder, and of those that it decoded.
     repeated, old : int
-        Version 2: received again; more than 65 536 numbers late, so that it is unknown whether they came before.
+        Version 2: the number of datagrams received again, and of those whose sequence number is more than 65 536 behind
+        the highest, so that it is unknown whether they came before.
     long, foreign, checksum : int
-        Version 2: refused as longer than 1400 bytes, not of version 2 or of another board, damaged.
+        Version 2: the number of datagrams refused because they are longer than 1400 bytes, are not of version 2 or come
+        from another board, or have a wrong checksum.
     missing : int
-        Version 2: numbers between the first and the last of each session that were never received intact.
+        Version 2: how many sequence numbers between the first and the last of each session were never received intact.
     unknown_kind, unknown_flags, unknown_marker : int
-        Version 2: datagrams of unknown kind, skipped; with unknown flags, decoded; markers of unknown code, left out.
+        Version 2: the number of datagrams of unknown kind, which are skipped; of datagrams with unknown flags, which
+        are decoded; and of markers of unknown code, which are left out.
     malformed : int
-        Version 2: bodies that end within a word, or have an offset above 32 511 us; what stands before is decoded.
+        Version 2: the number of bodies that end within a word, or have an offset above 32 511 us; what stands before
+        that place is decoded.
     events, repaired : int
-        Version 2: events on the array, and those of them that a state gave.
+        Version 2: the number of events on the array, and of those among them that a state gave.
     states, stale : int
-        Version 2: states on the array, and those of them that came too late to count.
+        Version 2: the number of states on the array, and of those among them that came too late to count.
     dropped, resets : int
-        Version 2: datagrams that report dropped events; resets of the board.
+        Version 2: the number of datagrams that report dropped events, and of resets of the board.
     unknown_value : int
-        Version 2: differences from a value that was not received, whose events have none.
+        Version 2: the number of differences from a value that was not received; their events have no intensity.
+
+    Notes
+    -----
+    Thesis, Appendix 1, Table 5.4, and the page *Wire version 2*.
+
+    Examples
+    --------
+    A byte that begins no word, then one change.
+
+    >>> from taxel.wire import Decoder
+    >>> decoder = Decoder()
+    >>> events = decoder.push(bytes.fromhex("05 c000050304"))
+    >>> decoder.end_of_datagram()
+    Events(1 events, 500 to 500 us, 64 x 64 taxels, no intensities)
+    >>> decoder.counts.bytes, decoder.counts.words, decoder.counts.skipped
+    (6, 1, 1)
     """
 
     bytes: int = 0
@@ -91,7 +114,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class Received:
-    """Hold what a datagram of version 2 was (`Decoder.last`).
+    """Hold whether a datagram of version 2 was intact, and up to when all is received (`Decoder.last`).
 
     Parameters
     ----------
@@ -99,6 +122,15 @@ class Received:
         No datagram of a higher sequence number holds anything before this time; None where nothing is promised.
     intact : bool
         False where it was refused, or received before (`Decoder.counts` has the cause).
+
+    Examples
+    --------
+    >>> from taxel.wire import Decoder
+    >>> decoder = Decoder(version=2)
+    >>> decoder.push(b"no datagram")
+    Events(0 events, no time, 64 x 64 taxels, no intensities)
+    >>> decoder.last
+    Received(until=None, intact=False)
     """
 
     until: int | None
@@ -107,12 +139,30 @@ class Received:
 
 @dataclass(frozen=True)
 class Status:
-    """Hold the board's totals since its reset.
+    """Hold the totals that a board of version 2 reports of the time since its reset (`Decoder.status`).
 
     Parameters
     ----------
     frames, events, dropped, datagrams, faults : int
-        Frames scanned, events sent, events dropped, datagrams made before this one, comparators that had not returned.
+        The number of frames scanned, of events sent, of events dropped, of datagrams made before this one, and of
+        comparators that had not returned.
+
+    Notes
+    -----
+    The page *Wire version 2*.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from taxel.simulate import Board, Version2
+    >>> from taxel.wire import Decoder, Registers
+    >>> board = Board(Registers(wire_version=2), version_2=Version2(states_us=5000))
+    >>> decoder = Decoder(version=2)
+    >>> for _ in range(50):
+    ...     for datagram in board.frame(np.full(4096, 60, np.uint16)):
+    ...         events = decoder.push(datagram)
+    >>> decoder.status.events, decoder.status.dropped
+    (4096, 0)
     """
 
     frames: int

@@ -32,7 +32,7 @@ def decode(
     lengths: ArrayLike | None = None,
     columns: Columns | None = None,
 ) -> Events:
-    """Read a whole stream; see `Decoder`, which also counts what is dropped.
+    """Read a whole stream; a `Decoder` also counts what is dropped.
 
     Parameters
     ----------
@@ -61,6 +61,10 @@ def decode(
     Raises
     ------
     ProblemError : an argument that makes no sense; damage in the bytes is no error
+
+    Notes
+    -----
+    Thesis, Appendix 1, Table 5.4, and the page *Wire version 2*.
 
     Examples
     --------
@@ -120,8 +124,8 @@ class Decoder:
     Notes
     -----
     Table 5.4, and the page *Wire version 2*. Time of version 1 is unwrapped into 64 bits: a stamp up to 0.1 s behind
-    the latest time is a step back (counted, kept), any other lies ahead, so silences of up to 6.45 s are right. Arrival
-    times show how long a longer one was.
+    the latest time is a step back, which is counted and stays in the events; any other lies ahead, so silences of up to
+    6.45 s are right. Arrival times show how long a longer one was.
 
     Examples
     --------
@@ -177,6 +181,11 @@ class Decoder:
         Raises
         ------
         ProblemError : `data` is not bytes, or `arrived` not a whole number
+
+        Examples
+        --------
+        >>> Decoder().push(bytes.fromhex("c000050304 e000280304"))
+        Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
         """
         stream = given_bytes(data)
         columns = Columns._fresh(_core.wire_rows(self.version, len(stream)))
@@ -185,7 +194,7 @@ class Decoder:
     def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
         """Decode into memory that is used again; return the events as views of it.
 
-        The events are good until the columns are filled again: copy what is to be kept.
+        The next decoding into the same columns overwrites the events: copy what is needed longer.
 
         Parameters
         ----------
@@ -202,6 +211,12 @@ class Decoder:
         Raises
         ------
         ProblemError : too little room, or as `push`
+
+        Examples
+        --------
+        >>> columns = Columns(1000)
+        >>> Decoder().push_into(columns, bytes.fromhex("c000050304 e000280304")).intensity
+        array([40], dtype=uint16)
         """
         room = instance("columns", columns, Columns)
         return room._first(self.array, *self._fill(room, given_bytes(data), arrived))
@@ -219,6 +234,12 @@ class Decoder:
         Returns
         -------
         Events, at most one; none of version 2, in which no event waits
+
+        Examples
+        --------
+        >>> decoder = Decoder()
+        >>> len(decoder.push(bytes.fromhex("c000050304"))), len(decoder.end_of_datagram())
+        (0, 1)
         """
         return Events._from_parts(self._core.end_of_datagram(), self.array)
 
@@ -228,6 +249,12 @@ class Decoder:
         Returns
         -------
         Events, none of version 2, in which no event waits
+
+        Examples
+        --------
+        >>> decoder = Decoder(pairing="taxel")
+        >>> len(decoder.push(bytes.fromhex("c000050304 e000280304"))), len(decoder.finish())
+        (0, 1)
         """
         return Events._from_parts(self._core.finish(), self.array)
 

@@ -23,12 +23,12 @@ def encode(events: Events) -> bytes:
 
     Raises
     ------
-    ProblemError : a column or row above 63, which version 1 cannot say
+    ProblemError : a column or row above 63, which a word of version 1 has no bits for
 
     Notes
     -----
-    Table 5.4. Version 1 holds times to 100 us, cut down as the board counts, and modulo 6.5536 s: a reader gets back
-    whole silences of up to 6.45 s.
+    Thesis, Appendix 1, Table 5.4. Version 1 holds times to 100 us, cut down as the board counts, and modulo 6.5536 s:
+    a reader gets back whole silences of up to 6.45 s.
 
     Examples
     --------

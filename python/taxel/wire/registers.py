@@ -16,7 +16,7 @@ from taxel.wire.command import Command
 
 __all__ = ["FRAME_US", "PRESETS", "QUOTED_PRESETS", "Registers", "described"]
 
-#: The names that `Registers.preset` knows.
+#: The names of the presets (`Registers.preset`).
 PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
 
 #: The names of all presets, for a text.
@@ -38,6 +38,13 @@ class Registers:
 
     Parameters
     ----------
+    array : Array, optional
+        The sensor; the thesis' 64 x 64 where it is left out.
+    **fields : float
+        The fields that differ from those of a board at reset, by the names below or the manual's.
+
+    Other Parameters
+    ----------------
     line_period, line_read : float, us
         Time from one driven line to the next, and the part of it in which the line is read.
     step_period, step_read : float, us
@@ -49,14 +56,14 @@ class Registers:
     lines : int, 1 to 256
         Driven lines.
     random_lines, mechanoreceptor, invert_comparator, frame_sync, record : bool
+        Whether the lines are driven in random order, each taxel is an FA-1 afferent, a falling edge ends a sample, all
+        events of a frame carry the time of its start, and a recording runs.
     wire_version : {1, 2}
         Version 1 names 64 x 64 taxels at most.
     threshold_rest, threshold_jump, threshold_decay : int, in 1/1024, 1/256 theta_0, 1/1024 theta_0
         FA-1 on the board, where `mechanoreceptor` is set.
     channels : {16, 64}
         Of the converter: the board's build, not a register. A line of 64 taxels has 4 steps with 16, one with 64.
-    array : Array, optional
-        The sensor; the thesis' 64 x 64 where it is left out.
 
     Raises
     ------
@@ -110,6 +117,11 @@ class Registers:
         ------
         ProblemError : no such preset (names those that there are)
         DeviceError : the array has fewer lines than the preset drives
+
+        Examples
+        --------
+        >>> Registers.preset("2 kHz").noise_floor
+        10
         """
         registers = cls.__new__(cls)
         registers._set(json.loads(_core.registers_preset(text("preset", name))), {}, array)
@@ -176,6 +188,11 @@ class Registers:
         Raises
         ------
         DeviceError, ProblemError : as for a new set
+
+        Examples
+        --------
+        >>> Registers().replace(noise_floor=7).noise_floor
+        7
         """
         registers = Registers.__new__(Registers)
         registers._set(self._held, fields, self.array)
@@ -241,6 +258,13 @@ class Registers:
         Raises
         ------
         DeviceError : the sets are for boards with different channels
+        ProblemError : `target` is not `Registers`
+
+        Examples
+        --------
+        >>> now = Registers()
+        >>> now.commands_to(now.replace(noise_floor=7))
+        [Command(register=5, value=4130560)]
         """
         other = instance("target", target, Registers)
         commands = _core.registers_commands(self._json(), other._json(), self.array._parts())

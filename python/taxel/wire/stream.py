@@ -13,7 +13,8 @@ __all__ = ["StreamReader"]
 class StreamReader:
     """Cut a file or stream into datagrams, each of which has its length before it (16 bits, little-endian).
 
-    What is no datagram is skipped byte by byte, to the next place where length, magic and checksum agree.
+    Bytes that are no datagram are skipped one by one, up to the next place where length, magic and checksum agree (the
+    page *Wire version 2*).
 
     Examples
     --------
@@ -44,6 +45,11 @@ class StreamReader:
         Raises
         ------
         ProblemError : `data` is not bytes
+
+        Examples
+        --------
+        >>> StreamReader().push(b"no datagram")
+        []
         """
         return self._core.push(given_bytes(data))
 
@@ -53,6 +59,12 @@ class StreamReader:
         Returns
         -------
         list of bytes, one a datagram, without its length
+
+        Examples
+        --------
+        >>> reader = StreamReader()
+        >>> reader.push(b"no datagram") + reader.finish(), reader.skipped
+        ([], 11)
         """
         return self._core.finish()
 

@@ -1,4 +1,4 @@
-//! Each taxel as an FA-1 afferent (5.4.2), in the whole numbers that the logic has: the registers' page says which.
+//! Each taxel as an FA-1 afferent (5.4.2), in the whole numbers that the logic has (docs: *Registers*).
 
 use crate::wire::Registers;
 use crate::wire::registers::{POWER_LAW, POWER_LAW_FRACTION};

@@ -8,8 +8,9 @@ use crate::{Array, Result, Stop, problem};
 
 /// Puts frames of trip times through a circuit, one after the other.
 ///
-/// What a taxel reads by itself says what it conducts; of all these the network makes voltages, and what those differ by
-/// from the taxels' own is added to them. So an ideal circuit changes nothing. The converter's times are the registers'.
+/// The reading of each taxel by itself gives its conductance, and the network turns all conductances into voltages. The
+/// difference of these from the taxels' own voltages is added to the latter, so an ideal circuit changes nothing. The
+/// converter's times are the registers'.
 #[derive(Debug, Clone)]
 pub struct Crossed {
     chain: Chain,

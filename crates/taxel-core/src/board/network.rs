@@ -11,7 +11,7 @@ use crate::{Result, problem};
 /// A datagram that is overtaken comes behind so many others at most.
 const BEHIND: usize = 8;
 
-/// Which share of all datagrams each fault befalls, 0 to 1; of the faults at most one befalls a datagram.
+/// The share of all datagrams that each fault hits, 0 to 1; at most one fault hits a datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Faults {
@@ -41,7 +41,7 @@ impl Faults {
     }
 }
 
-/// What befell how many datagrams.
+/// The number of datagrams that each fault has hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct NetworkCounts {
     /// Given to the network.
@@ -91,7 +91,7 @@ impl Network {
         Ok(Self { faults, draw, behind: VecDeque::new(), counts: NetworkCounts::default() })
     }
 
-    /// What befell how many.
+    /// The number of datagrams that each fault has hit.
     #[must_use]
     pub fn counts(&self) -> &NetworkCounts {
         &self.counts

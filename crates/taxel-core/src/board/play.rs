@@ -13,13 +13,13 @@ pub struct Play {
     pub array: Array,
     /// What the board's registers hold from the start.
     pub registers: Registers,
-    /// How taxels answer.
+    /// The law by which taxels turn force into readings.
     pub sensor: Sensor,
     /// What taxels and their noise are drawn from.
     pub seed: u64,
     /// What touches the array, one act after the other.
     pub acts: Vec<Act>,
-    /// How long the tare takes, ms.
+    /// Duration of the tare, ms.
     pub tare_ms: f64,
     /// What taxels share and how they are converted; nothing: each reads by itself.
     pub circuit: Option<Chain>,
@@ -40,7 +40,7 @@ pub struct Armed {
     pub commands: Vec<(u64, Command)>,
 }
 
-/// What a host made of what a board sent.
+/// What a host decoded of a board's datagrams.
 #[derive(Debug, Clone)]
 pub struct Played {
     /// What changed, when.

@@ -8,12 +8,12 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop, problem};
 
-/// A converter whose ramp takes another time in each frame; what a step and a column take beside their ramp stays.
+/// A converter whose ramp lasts another time in each frame; the rest of a step's and of a column's time is constant.
 ///
 /// After a frame the taxel that moved farthest sets the length of the next ramp: the length that lets it move by `moves_ticks`
-/// of that ramp within the frame, so that what a reading is too old by stays of the size of what it is too coarse by. A
-/// move of `noise_ticks` or less of the coarser of two ramps is none; without any, the ramp takes twice its time, up to
-/// the gentlest. The rule is ours: the thesis calls for one and states none.
+/// of that ramp within the frame, so that a reading's error by its age stays of the size of that by its resolution. A
+/// move of `noise_ticks` or less of the coarser of two ramps is none; without any, the next ramp lasts twice as long,
+/// up to the gentlest. The rule is ours: the thesis calls for one and states none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Adaptive {

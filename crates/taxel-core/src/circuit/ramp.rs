@@ -18,7 +18,7 @@ pub enum RampShape {
     Linear,
 }
 
-/// A ramp from 0 to 3 V that takes so many ticks of 1/300 us; beyond its end it stays there.
+/// A ramp from 0 to 3 V, as long as so many ticks of 1/300 us; after its end it stays at its last voltage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ramp {
     /// How it rises.

@@ -57,7 +57,7 @@ pub struct Body {
     /// Of sliding on the foam, as a share of the force. A guess.
     #[serde(default = "sliding", skip_serializing_if = "is_sliding")]
     pub friction: f64,
-    /// Of rolling, as a share of the force: what foam that rises late takes. A guess.
+    /// Of rolling, as a share of the force: the loss in foam that rises late. A guess.
     #[serde(default = "rolling", skip_serializing_if = "is_rolling")]
     pub rolling_friction: f64,
     /// How long after the scene's beginning its own begins, ms.
@@ -98,7 +98,7 @@ pub enum Move {
     Dropped {
         /// From how high above where it touches, mm.
         height_mm: f64,
-        /// What becomes of it.
+        /// What happens to it after the fall.
         #[serde(default)]
         ending: Ending,
     },
@@ -110,7 +110,7 @@ pub enum Move {
     Slid(Along),
 }
 
-/// What becomes of a body that fell.
+/// What happens to a body after its fall.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Ending {
@@ -166,8 +166,8 @@ pub struct Along {
     pub toward_deg: f64,
     /// For how long, ms; then a hand lifts it.
     pub for_ms: f64,
-    /// A hand presses it with so many N and keeps its speed; where it is left out, it lies there by its weight, and
-    /// friction slows it.
+    /// A hand presses the body with so many N, and its speed stays constant; where this is left out, the body lies on
+    /// the foam by its weight, and friction slows it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub press_n: Option<f64>,
 }
@@ -179,7 +179,7 @@ impl Body {
         self.mass_g.or_else(|| Some(self.material?.grams_per_mm3() * self.shape.volume_mm3()?))
     }
 
-    /// How long it takes at least, ms: waits and holds, without what a hand's way or a bounce adds.
+    /// Its least duration, ms: waits and holds, without the time of a hand's way or of a bounce.
     pub(super) fn least_ms(&self) -> f64 {
         let held = |press: &Press| press.wait_ms + press.hold_ms;
         let moving = match &self.motion {

@@ -236,7 +236,9 @@ impl Bonded {
         }
     }
 
-    /// Pressure on each of `cells` (in the order of rows, then columns), MPa. Begins where the last two touches lead.
+    /// Pressure on each of `cells` (in the order of rows, then columns), MPa.
+    ///
+    /// The iteration begins with an extrapolation of the last two touches.
     ///
     /// Foam that has collapsed gives way more, and foam that is dense less, than a linear layer: how far a body has sunk
     /// is replaced by how far it would have in a linear column under the same pressure. So the law is exact for a wide

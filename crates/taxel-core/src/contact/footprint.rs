@@ -30,7 +30,7 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Works the table out for a ball of `radius_mm` on `foam`; takes some milliseconds.
+    /// Works the table out for a ball of `radius_mm` on `foam`, within some milliseconds.
     ///
     /// # Errors
     ///

@@ -3,14 +3,15 @@
 //! Each taxel integrates the change of its compressed pressure and fires where that passes a threshold, which a spike
 //! raises by `T A theta_0` and a quiet sample lowers by `B theta_0`. Order within a sample: the threshold moves by the
 //! last sample's spike, the change is added, both are compared, a spike resets the integral. (The threshold's move is
-//! reckoned at the end of a sample instead of at the start of the next: the same numbers, one array less.)
+//! computed at the end of a sample instead of at the start of the next: the same numbers, one array less.)
 //!
-//! Few afferents fire at a sample, and a power is dear. So each keeps how far its pressure may go from the one at its last
-//! spike without firing, in proportion to the threshold (`Afferents::reach`); only those beyond are reckoned by 5.1 and
-//! 5.4. That bound is safe, so spikes are the same to the bit as if all were.
+//! Few afferents fire at a sample, and a power is slow. So each afferent has a bound, in proportion to its threshold,
+//! within which its pressure may differ from the one at its last spike without a spike (`Afferents::reach`); only
+//! afferents beyond their bound are computed by 5.1 and 5.4. The bound is safe, so spikes are the same to the bit as if
+//! all were computed.
 //!
 //! Reading: as printed, equation 5.5 lets the threshold sink below `theta_0` for one sample, by less than `B theta_0`,
-//! before its third case restores it. Kept, so that spikes equal the thesis'.
+//! before its third case restores it. This code does so too, so that its spikes equal the thesis'.
 
 use std::ops::RangeInclusive;
 

@@ -113,7 +113,7 @@ pub(super) struct Fast {
 #[derive(Clone)]
 pub(super) struct FastState {
     x: Lanes,
-    /// The low pass that the first high pass takes away, and what is left.
+    /// The low pass that the first high pass subtracts, and the difference.
     first: Lanes,
     once: Lanes,
     /// The same of the second.

@@ -44,7 +44,7 @@ pub(super) struct Loaded {
 }
 
 impl Loaded {
-    /// Nothing is loaded yet; `what` asks for the tare.
+    /// Begins with no taxel loaded; `what` names the encoder in an error.
     pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
         let Some(tare) = tare else {
             return Err(problem!("{what} without a tare: take one at rest and give it to the encoder"));

@@ -80,13 +80,13 @@ impl Pieces {
         self.piece(&out, None, end)
     }
 
-    /// How many events came too far behind the time come to.
+    /// How many events came too far behind the stream's time.
     #[must_use]
     pub fn late(&self) -> u64 {
         self.stream.late()
     }
 
-    /// What came out, with the window from where the last piece ended to `until` ms.
+    /// The spikes of a piece, with the window from where the last piece ended to `until` ms.
     fn piece(&mut self, out: &[Spike], first: Option<i64>, until: Option<f64>) -> Result<SpikeTrains> {
         let start = self.known.or(first.map(ms)).unwrap_or(0.0);
         let stop = until.map_or(start, |until| until.max(start));

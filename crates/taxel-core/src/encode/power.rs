@@ -8,7 +8,7 @@ use std::f64::consts::{LN_2, SQRT_2};
 
 use super::blocks::{BLOCK, Block};
 
-/// Added and taken away again, it rounds to a whole number.
+/// A number to which this one is added, and then subtracted, is rounded to a whole number.
 const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
 
 /// Its lowest bits show a whole number from 0 that is added to it.

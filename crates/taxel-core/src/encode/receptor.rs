@@ -38,7 +38,7 @@ impl LowPass {
     }
 }
 
-/// How an afferent turns pressure, in shares of the range, into the potential that its threshold is held against.
+/// How an afferent turns pressure, in shares of the range, into the potential that is compared with its threshold.
 pub(super) trait Filter: Send + Clone + 'static {
     /// Of the channels of one block.
     type State: Send + Clone + 'static;
@@ -78,7 +78,7 @@ struct Afferent<S> {
     u: Lanes,
     /// How much the threshold is raised.
     raised: Lanes,
-    /// How long no spike may come yet, ms.
+    /// The time for which no spike may follow yet, ms.
     wait: Lanes,
     /// Whether a sample without change would leave all this as it is, and fire nothing.
     still: bool,
@@ -89,7 +89,7 @@ struct Afferent<S> {
 pub(super) struct Afferents<F: Filter> {
     filter: F,
     firing: Firing,
-    /// What the raised threshold keeps over one sample.
+    /// The factor by which the raise of the threshold decays in one sample.
     keep: f64,
     blocks: Vec<Afferent<F::State>>,
 }

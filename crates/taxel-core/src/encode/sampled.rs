@@ -1,7 +1,7 @@
 //! Encoders that read pressure: pictures as they come, or held intensities sampled at a fixed period.
 //!
-//! A [`Rule`] knows one encoder's law and nothing of events, pieces or order; [`Sampled`] brings it the samples. What
-//! did not change since the last sample is known by block, so a rule need not look at it.
+//! A [`Rule`] computes one encoder's law and reads neither events nor pieces; [`Sampled`] passes it the samples, and
+//! the blocks that did not change since the last sample, which a rule can skip.
 
 use super::blocks::{BLOCK, Block, Next, blocks, in_blocks};
 use super::channels::{Channels, FARTHEST};
@@ -72,7 +72,7 @@ wide! {
     }
 }
 
-/// What a stream has been fed with; one stream takes events or frames, never both.
+/// The input of a stream: events or frames, never both.
 #[derive(Clone)]
 pub(super) enum Source {
     Unknown,

@@ -2,10 +2,10 @@
 
 use crate::{EventsView, Result, Spike};
 
-/// An encoder at work: takes what comes, in order of time, and hands on spikes as soon as they are certain.
+/// An encoder that runs: it reads events or frames in order of time and passes spikes on as soon as they are certain.
 ///
 /// A stamp is over when a later one comes or when the caller moves time on with [`Stream::advance`]; what depends on a
-/// whole stamp is reckoned then, and its spikes have the stamp's time. So pieces and the whole give the same spikes,
+/// whole stamp is computed then, and its spikes have the stamp's time. So pieces and the whole give the same spikes,
 /// in the same order: by time, then by train.
 pub trait Stream: Send {
     /// The number of the encoder's spike trains.

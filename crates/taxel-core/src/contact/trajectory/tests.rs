@@ -301,7 +301,7 @@ fn a_ball_that_gives_is_off_sooner_and_without_bottoming_out() {
 
 #[test]
 fn a_touch_that_is_too_narrow_is_told_how_many_cells_would_do() {
-    // What needs more than there may be is told so; a wide touch is told nothing.
+    // A touch that needs more cells than allowed is reported with the most there may be; a wide touch is not.
     let press = Press { peak_n: None, depth_mm: Some(0.05), speed_mm_s: 50.0, hold_ms: 2.0, wait_ms: 0.0 };
     let shape = Shape::Edge { slope_deg: 45.0, length_mm: 20.0, axis_deg: 0.0 };
     let mut scene = alone(Surface::Layer, undamped(), body(shape, 36.0, Move::Pressed(press)));
