@@ -65,12 +65,12 @@ class Encoder(Value):
         return Encoder._by_name[values.pop("name")]._from_values(values)
 
     def trains(self, array: Array) -> int:
-        """Return on how many trains the encoder speaks for an array; signed ones count once."""
+        """Return the number of spike trains that the encoder makes of an array; signed ones count once."""
         return _core.encoder_about(self._json(), instance("array", array, Array)._parts())[0]
 
     @property
     def signed(self) -> bool:
-        """Whether spikes carry a signed value, so that a neuron hears each train as two, ON and OFF."""
+        """Whether spikes carry a signed value, so that a neuron receives each train as two inputs, ON and OFF."""
         return _core.encoder_about(self._json(), Array(1, 1)._parts())[1]
 
     @property

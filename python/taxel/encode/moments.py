@@ -25,7 +25,7 @@ class Moments(Tared):
     on the array the touch began, so what is learnt at one place holds at others.
 
     Trains, unsigned, one a level in the order area, total, peak, x right, x left, y down, y up, each from its least
-    level on: first where each level is reached, then where each is left, then (with `tonic_ms`) one that speaks while
+    level on: first where each level is reached, then where each is left, then (with `tonic_ms`) one that spikes while
     beyond. It begins settled: the first sample makes no crossing. Reckoned in float64.
 
     Parameters

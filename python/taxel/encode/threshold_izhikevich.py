@@ -17,9 +17,9 @@ _DEFAULT = defaults("threshold_izhikevich")
 
 @dataclass(eq=False, repr=False)
 class ThresholdIzhikevich(Encoder):
-    """Say with two Izhikevich neurons a level where a taxel came to it (+1) and where it left it (-1).
+    """Spike where a taxel reaches a level (+1) and where it leaves it (-1), by two Izhikevich neurons a level.
 
-    One neuron hears the thresholded signal, one its inverse; each fires once for each step of its input, and chatter
+    One neuron receives the thresholded signal, one its inverse; each fires once for each step of its input, and chatter
     within some 10 ms vanishes. Trains: ``taxel * len(levels) + level``, signed.
 
     Parameters

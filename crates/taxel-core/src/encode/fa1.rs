@@ -5,7 +5,7 @@
 //! last sample's spike, the change is added, both are compared, a spike resets the integral. (The threshold's move is
 //! reckoned at the end of a sample instead of at the start of the next: the same numbers, one array less.)
 //!
-//! Few afferents fire at a sample, and a power is dear. So each keeps how far its pressure may go from the one at its last
+//! Few afferents fire at a sample, and a power takes long to compute. So each keeps how far its pressure may go from the one at its last
 //! spike without firing, in proportion to the threshold (`Afferents::reach`); only those beyond are reckoned by 5.1 and
 //! 5.4. That bound is safe, so spikes are the same to the bit as if all were.
 //!
