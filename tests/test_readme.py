@@ -4,13 +4,13 @@ import os
 import re
 import shlex
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 import typer
+from live.boards import LOOPBACK, free_port
 from typer.core import TyperCommand, TyperGroup
 
 from taxel.cli import app
@@ -18,7 +18,6 @@ from taxel.cli import app
 ROOT = Path(__file__).parent.parent
 README = ROOT / "README.md"
 PAGES = [README, ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-LOOPBACK = "127.0.0.1"
 
 
 def shell_lines(page: Path) -> list[str]:
@@ -66,12 +65,6 @@ def check(command: TyperGroup | TyperCommand, arguments: list[str], *, in_full: 
     else:
         options = {option for parameter in command.params for option in parameter.opts} | {"--help", "-h"}
         assert {argument for argument in arguments if argument.startswith("-")} <= options, arguments
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        link.bind((LOOPBACK, 0))
-        return int(link.getsockname()[1])
 
 
 class Shell:

@@ -20,7 +20,7 @@ LEARN: dict[str, Any] = {"delta_t_ms": 1.5, "lb": -0.3, "ub": 0.3}
 
 
 def single_spikes(seed: int, inputs: int, stop: float, end: float) -> SpikeTrains:
-    """Draw one spike an input, uniform on 0 to `stop` ms; the window ends at `heard_to`."""
+    """Draw one spike an input, uniform on 0 to `stop` ms; the window ends at `end`."""
     times = np.random.default_rng(seed).uniform(0.0, stop, inputs)
     return SpikeTrains.from_lists([[t] for t in times], 0.0, end)
 

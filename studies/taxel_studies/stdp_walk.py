@@ -80,7 +80,7 @@ def train_and_test(foot: Piece, params: Parameters) -> dict[str, Any]:
     late = (params["passes"] - 1) * half
     stdp.partial_fit(moved(second, late))
     learnt = judged(stdp.spikes_ - late, foot, half)
-    # As often, without learning: at a lower threshold.
+    # For comparison a neuron that does not learn, with a threshold at which it fires as often.
     hz = max(1000 * len(stdp.spikes_) / half, params["untrained_hz"])
     untrained = unlearning(threshold(first, hz, taus), taus).partial_fit(foot.spikes)
     return {

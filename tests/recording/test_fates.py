@@ -386,7 +386,7 @@ def test_in_any_chain_of_steps_nothing_goes_lost_unsaid(tmp_path: Path, seed: in
                 moved = [r[0] for r in rows_of(recording)]
                 by = moved[0] - m.rows[0][0] if moved else 0
                 assert all(abs(b - r[0] - by) <= 2 for b, r in zip(moved, m.rows, strict=True)), where
-                # A clock's line is no more exact than that: what it gives is where the reckoning goes on.
+                # The clock's fit is exact to 2 us only, so the model goes on from the times that taxel computed.
                 exact = taxel.recording.recording.Recording(recording._contents)
                 m.rows = rows_of(exact)
                 m.zeroed = [(z.t, z.x, z.y, z.rest) for z in exact.zeroings]

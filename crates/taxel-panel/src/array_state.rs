@@ -363,10 +363,10 @@ mod tests {
         let (taxels, mut t) = (12, 0_i64);
         let mut changes = vec![];
         for _ in 0..5000 {
-            // Pauses of an hour too.
+            // The time between two changes is sometimes an hour,
             t += match random.random_range(0..500) {
                 0 => 3_600_000_000,
-                // Of one moment.
+                // and often 0.
                 1..200 => 0,
                 _ => random.random_range(0..5000),
             };

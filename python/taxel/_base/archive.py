@@ -1,4 +1,4 @@
-"""Arrays of a .npz, from strangers and damaged disks too: nothing is unpacked before it has said how large it is."""
+"""Arrays of a .npz, which may be damaged or made to harm: the stated size is checked before anything is unpacked."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """What a file may hold at most: checked before memory is allocated, named in the error, listed in docs/files.md.
 
-Files come from strangers and from damaged disks: a few bytes can claim 10^12 values. The limits lie well above what
+Files may be damaged, or made to harm: a few bytes can claim 10^12 values. The limits lie well above what
 sensors of today record. Those of .mcap stand beside its reader (crates/taxel-live/src/recording/limits.rs).
 """
 

@@ -181,7 +181,7 @@ def emulate(
                 )
             ]
         except KeyboardInterrupt:
-            # Without an end of its own, Ctrl-C is how it ends; a board that was to end is stopped by it.
+            # Where scenes repeat without end, Ctrl-C is the regular end; else it interrupts the command.
             if not last or scenes is not None or replay is not None:
                 raise
         report = last[0]

@@ -182,7 +182,7 @@ def solved(moments: ClassMoments, ridge: float, priors: str, shift: NDArray[np.f
     if fault == 0 and factor.diagonal().min() ** 2 > _SINGULAR:
         values = lapack.dpotrs(factor, right, lower=1)[0]
     else:
-        # The factor has taken the matrix' place: it is made again.
+        # dpotrf overwrote the matrix by its factor, so the matrix is computed again.
         del factor, within
         values, rank = _where_classes_vary(_scaled(_within(moments)[0], scale), weighed, right)
     weights = values.T * scale * trials

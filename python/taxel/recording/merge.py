@@ -128,7 +128,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         truncated=any(part.truncated for part in parts),
         **fields,
     )
-    # All was read for it; so the parts need not be kept.
+    # Reading `lost` read all fields; with its value in place of its function the parts can be freed.
     return together.but(lost=together.lost)
 
 

@@ -27,7 +27,7 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
     for trial in popu.trials(folder):
         if trial.about["posture"] == "empty":
             continue
-        # Ten snapshots of somebody who does not move are one look.
+        # The person does not move during the ten frames of a trial, so their mean is one sample.
         values.append(trial.frames.values.mean(0).ravel())
         labels.append(str(trial.about["posture"]))
         groups.append(str(trial.about["pose"]))

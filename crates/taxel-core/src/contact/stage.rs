@@ -188,7 +188,7 @@ impl Stage {
             return Err(Error::Scene(format!("room for {} ticks: must be {}", ticks.len(), self.clean.len())));
         }
         while self.parts.get(self.part).is_some_and(|p| self.frame == p.frames) {
-            // Its tables are not needed any more; how long it was is.
+            // The tables of a part that is over are freed; its number of frames is still needed.
             self.parts[self.part].what = What::Silence;
             self.part += 1;
             self.frame = 0;

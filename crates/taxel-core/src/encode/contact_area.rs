@@ -176,7 +176,7 @@ impl Stream for Area {
         self.advance(t, out);
         self.loaded.set_rest(place, rest);
         match self.source {
-            // The next picture is looked at there anew.
+            // Marks the block as changed, so that the next frame is computed there with the new rest.
             Source::Frames { .. } => self.changed[place / BLOCK] = true,
             _ => self.loaded.take(place, self.held.values()[place]),
         }

@@ -132,7 +132,7 @@ mod tests {
     fn a_recording_gets_ten_pictures_a_second_and_those_around_events_once() {
         let (mut picture_buffer, begun) = (PictureBuffer::new(), Instant::now());
         assert_eq!(recorded(&mut picture_buffer, begun, 0..37), [0, 100_000, 200_000, 300_000]);
-        // Within two pictures, at one of them, and one that comes later.
+        // Times between two pictures, at a picture, and after the last picture.
         picture_buffer.around(123_456);
         picture_buffer.around(150_000);
         picture_buffer.around(365_000);

@@ -21,7 +21,8 @@ pub fn act(body: &Body, push: f64, along: &mut [f64; 2], turning: &mut [f64; 2])
     let rub: [f64; 2] = if stop[0].hypot(stop[1]) <= most {
         stop
     } else {
-        // Against the slip, not along `stop`: a cylinder is turned sooner than it is braked along its axis.
+        // Sliding friction acts against the slip, not along `stop`: the two differ for a cylinder, which is easier to turn
+        // than to brake along its axis.
         let share = most / slip[0].hypot(slip[1]);
         std::array::from_fn(|k| -slip[k] * share.min(1.0 / (1.0 + turns[k])))
     };

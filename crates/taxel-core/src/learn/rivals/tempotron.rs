@@ -218,7 +218,7 @@ impl Tempotron {
 
     /// Trains to fire on the patterns whose label is true, and on no other, until an epoch has no error.
     ///
-    /// Weights change after each pattern that is wrong; the order is drawn anew each epoch. `report` hears how many
+    /// Weights change after each pattern that is wrong; the order is drawn anew each epoch. `report` is given how many
     /// epochs are done and the share of patterns right as they were presented.
     ///
     /// # Errors

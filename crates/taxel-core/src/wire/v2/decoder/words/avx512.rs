@@ -297,7 +297,8 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
             body.at = after + bytes;
             continue;
         }
-        // Up to the next word of time, behind which the position begins anew; where there is none, as mostly, nothing waits for it.
+        // Takes the words up to the next word of time, after which the position begins anew. The condition spares the usual case,
+        // which has no word of time, the wait for the bit operations.
         let taken = if times == 0 { lanes } else { lanes & (times & times.wrapping_neg()).wrapping_sub(1) };
         let advances = words.controls & taken;
         let steps = constants.sums::<VALUE>(&words, taken, advances, count <= 8);

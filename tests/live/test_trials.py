@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel import Array, Events, wire
+from taxel import Events, wire
 from taxel.live import Live
 
-LOOPBACK = "127.0.0.1"
-SMALL = Array(4, 4, pitch_mm=2.0, name="small")
+from .boards import LOOPBACK, SMALL, free_port
+
 #: What each taxel is told to hold once, before all else.
 REST = 40 + np.arange(16)
 #: From one datagram to the next by the board's clock: its 6.5 s turn within a second of the test's.
@@ -98,12 +98,6 @@ def assert_follow_each_other(trials: list[Path]) -> None:
             held[n % 12] = 100 + n
         seen += mine
     assert seen == list(range(seen[0], seen[0] + len(seen)))
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        link.bind((LOOPBACK, 0))
-        return int(link.getsockname()[1])
 
 
 def record(port: int, *arguments: object) -> list[str]:
