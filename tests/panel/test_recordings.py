@@ -238,3 +238,35 @@ def test_a_taxel_is_zeroed_for_all_and_the_next_recording_begins_with_it(live, t
         assert page.ask("open", name="after.mcap")["type"] == "done"
         opened = next(m for m in reversed(page.said) if not isinstance(m, bytes) and m["type"] == "opened")
         assert [z["taxel"] for z in opened["zeroed"]] == [[3, 5]]
+
+
+def labels_of(page):
+    """What the page shows last, after all that was sent to it."""
+    page.ask("seek", t_us=1500)
+    return next(m for m in reversed(page.said) if m["type"] == "labels")["labels"]
+
+
+def test_labels_that_change_at_once_are_in_the_file_as_the_page_shows_them(tmp_path):
+    """A client that does not wait for answers, as a page whose key repeats, loses no change; the last one counts."""
+    t = np.arange(1000, 2000, 10)
+    events = taxel.Events(t, t % 4, t % 3, t % 2 == 0, array=taxel.Array(4, 4))
+    taxel.convert(events, tmp_path / "walk.mcap")
+    file = tmp_path / "walk.notes.csv"
+    with Panel(tmp_path / "walk.mcap") as panel, Client(panel) as page:
+        page.send(type="credit", n=2)
+        assert page.ask("open", name="walk.mcap")["type"] == "done"
+        for round_ in range(20):
+            first, page.ids = page.ids, page.ids + 10
+            for k in range(1, 5):
+                page.send(type="mark", id=first + k, label=f"{round_}-{k}", t_us=1000 + 10 * round_ + k)
+            answered = {page.until("done")["id"] for _ in range(4)}
+            assert answered == set(range(first + 1, first + 5))
+            marked = file.read_text().splitlines()[1:]
+            assert len(marked) == 4 * (round_ + 1)
+            label = labels_of(page)[-1]["label_id"]
+            for k in range(5, 11):
+                page.send(type="move", id=first + k, label_id=label, t_us=1500 + 20 * round_ + k)
+            for _ in range(6):
+                page.until("done")
+            shown = [f"{row['label']},{row['t_us']}" for row in labels_of(page)]
+            assert file.read_text().splitlines()[1:] == shown

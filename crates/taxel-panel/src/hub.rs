@@ -13,7 +13,7 @@ use taxel_live::capture::Origin;
 use taxel_live::locked::lock;
 use taxel_live::pipeline::{Counters, Handle};
 use taxel_live::recording::now_ns;
-use tokio::sync::Notify;
+use tokio::sync::{Notify, OwnedMutexGuard};
 
 use super::clients::{Broadcast, Clients};
 use super::folder::Folder;
@@ -50,6 +50,8 @@ pub(super) struct Hub {
     live: Mutex<Option<Arc<LiveSource>>>,
     board: Mutex<BoardState>,
     presets: Mutex<UserPresets>,
+    /// See [`Hub::file_turn`].
+    files: Arc<tokio::sync::Mutex<()>>,
     /// Resets that the board has reported on its serial line.
     resets: AtomicU64,
     pub(super) clients: Clients,
@@ -74,6 +76,7 @@ impl Hub {
             live: Mutex::default(),
             board: Mutex::new(board),
             presets: Mutex::default(),
+            files: Arc::default(),
             resets: AtomicU64::new(0),
             clients: Clients::new(),
             labels: LabelTables::default(),
@@ -84,6 +87,12 @@ impl Hub {
             hub.attach(live)?;
         }
         Ok(hub)
+    }
+
+    /// Waits until no other request changes labels or presets and writes their file. Requests run at the same time, so without
+    /// this a file could end with the older of two changes.
+    pub(super) async fn file_turn(&self) -> OwnedMutexGuard<()> {
+        Arc::clone(&self.files).lock_owned().await
     }
 
     pub(super) fn options(&self) -> &PanelOptions {

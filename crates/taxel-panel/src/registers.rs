@@ -4,6 +4,7 @@ use serde_json::Value;
 use taxel_core::wire::registers::PRESETS;
 use taxel_core::wire::{Command, Registers};
 use taxel_live::locked::lock;
+use tokio::sync::OwnedMutexGuard;
 
 use super::handler::UserPresets;
 use super::hub::Hub;
@@ -126,15 +127,24 @@ fn field_of(reason: &str, names: &[String]) -> Option<String> {
 
 // ---------------------------------------------------------------------------------------------- presets
 
+/// Reads the presets of the user while no other request changes them.
+async fn reread_presets(hub: &Hub) -> Answer {
+    let _turn = hub.file_turn().await;
+    read_presets(hub).await
+}
+
 async fn read_presets(hub: &Hub) -> Answer {
     let read = hub.ask(|handler| handler.read_presets()).await?;
     *hub.presets() = read;
     Ok(())
 }
 
-async fn write_presets(hub: &Hub) -> Answer {
+async fn write_presets(hub: &Hub, turn: OwnedMutexGuard<()>) -> Answer {
     let UserPresets { presets, .. } = hub.presets().clone();
-    hub.ask(move |handler| handler.write_presets(&presets)).await?;
+    // The turn goes with the writing, which goes on where the client leaves.
+    let (written, turn) = hub.ask(move |handler| Ok((handler.write_presets(&presets), turn))).await?;
+    written?;
+    drop(turn);
     hub.clients.send_json(&hub.presets_message());
     hub.clients.send_json(&hub.registers_message());
     Ok(())
@@ -142,7 +152,7 @@ async fn write_presets(hub: &Hub) -> Answer {
 
 /// `preset_apply`: writes the registers of a preset.
 pub(super) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
-    read_presets(hub).await?;
+    reread_presets(hub).await?;
     let live = hub.live().ok_or("no board is listened to")?;
     let array = live.array();
     ensure_known(hub).await?;
@@ -163,6 +173,7 @@ pub(super) async fn apply_preset(hub: &Hub, name: &str) -> Answer {
 
 /// `preset_save`: saves the registers that the board holds under a new name.
 pub(super) async fn save_preset(hub: &Hub, name: &str) -> Answer {
+    let turn = hub.file_turn().await;
     read_presets(hub).await?;
     let exists = PRESETS.iter().any(|preset| preset.name == name) || hub.presets().presets.contains_key(name);
     if exists {
@@ -170,24 +181,25 @@ pub(super) async fn save_preset(hub: &Hub, name: &str) -> Answer {
     }
     let held = Registers { record: false, ..hub.board().registers };
     hub.presets().presets.insert(name.to_owned(), presets::from_registers(&held));
-    write_presets(hub).await
+    write_presets(hub, turn).await
 }
 
 /// `preset_delete`: deletes a preset of the user.
 pub(super) async fn delete_preset(hub: &Hub, name: &str) -> Answer {
+    let turn = hub.file_turn().await;
     read_presets(hub).await?;
     if hub.presets().presets.remove(name).is_none() {
         let built_in = PRESETS.iter().any(|preset| preset.name == name);
         let why = if built_in { "is built in" } else { "is no preset of yours" };
         return Err(Refusal::of("name", format!("{name} {why}")));
     }
-    write_presets(hub).await
+    write_presets(hub, turn).await
 }
 
 /// Reads what only the request handler knows: presets, and registers that are not known.
 pub(super) async fn prepare(hub: &Hub) {
     // Without a file there are no presets of the user; a damaged one is reported where a preset is applied.
-    let _ = read_presets(hub).await;
+    let _ = reread_presets(hub).await;
     // Where the board does not answer now, its registers stay unknown, as the page then shows.
     let _ = ensure_known(hub).await;
 }

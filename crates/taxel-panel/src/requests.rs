@@ -160,6 +160,7 @@ fn record(hub: &Arc<Hub>, request: &Request<'_>) -> Answer {
 
 /// Reads the labels of a recording from their file.
 pub(super) async fn read_labels(hub: &Hub, recording: &str) -> Answer {
+    let _turn = hub.file_turn().await;
     let table = hub.folder.file(&file_of(recording))?;
     if !table.exists() {
         hub.labels.remove(recording);
@@ -179,6 +180,7 @@ async fn label(hub: &Hub, what: &str, shown: Option<&str>, request: &Request<'_>
     let text = if matches!(what, "mark" | "rename") { request.text("label", 200)?.to_owned() } else { String::new() };
     let t_us = if matches!(what, "mark" | "move") { request.time("t_us")? } else { 0 };
     let table = hub.folder.file(&file_of(name))?;
+    let turn = hub.file_turn().await;
     let (before, rows) = hub.labels.change(name, |labels, next_id| {
         if what == "mark" {
             labels.push(Label { id: next_id, row: LabelRow { label: text, t_us } });
@@ -194,7 +196,9 @@ async fn label(hub: &Hub, what: &str, shown: Option<&str>, request: &Request<'_>
         }
         Ok::<_, Refusal>(())
     })?;
-    if let Err(reason) = hub.ask(move |handler| handler.write_labels(&table, &rows)).await {
+    // The turn goes with the writing, which goes on where the client leaves.
+    let (written, _turn) = hub.ask(move |handler| Ok((handler.write_labels(&table, &rows), turn))).await?;
+    if let Err(reason) = written {
         hub.labels.restore(name, before);
         return Err(reason.into());
     }
