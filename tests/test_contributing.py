@@ -1,4 +1,4 @@
-"""The code in CONTRIBUTING works: added to a copy it gives a format, a study and a learner; a missing part is named."""
+"""The code in CONTRIBUTING works: added to a copy it gives a format, a study, an encoder and a learner."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from typing import NamedTuple
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-FORMAT, STUDY, LEARNER = "channel", "quiet", "echo"
-#: The tests that check the laws and registries of formats, studies and learners.
+FORMAT, STUDY, ENCODER, LEARNER = "channel", "quiet", "binary", "echo"
+#: The tests that check the laws and registries of formats, studies, encoders and learners.
 TESTS = {
     FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
     STUDY: [
         f"studies/tests/{name}.py"
         for name in ("test_study_registry", "test_quiet", "test_studies", "test_public_names")
     ],
+    ENCODER: ["tests/encode/test_laws.py", "tests/encode/test_binary.py"],
     LEARNER: ["tests/learn/test_manners.py", "tests/learn/test_echo.py"],
 }
 
@@ -43,8 +44,8 @@ def pieces() -> list[Piece]:
 
 
 def of(name: str) -> list[Piece]:
-    """Return the pieces of a format, study or learner: its files, and lines that name it."""
-    return [p for p in pieces() if name in p.path or name in p.text]
+    """Return the pieces of one addition: its files, and lines that name it."""
+    return [p for p in pieces() if name in p.path or (p.after and name in p.text)]
 
 
 def add(root: Path, piece: Piece) -> None:
@@ -78,12 +79,13 @@ def copy(tmp_path: Path) -> Path:
 
 
 def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
-    """Run the tests of a format, study or learner, and those of its registry."""
+    """Run the tests of one addition, and those of its registry."""
     tests = [test for test in TESTS[name] if (root / test).exists() or name not in test]
     # A missing line may break the imports of one test file; the other files then name it.
     quietly = ["-q", "-p", "no:cacheprovider", "--continue-on-collection-errors"]
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
     about = {STUDY: f"{name} or registry or without_weight", LEARNER: "echo or Echo or nothing_is_left_out"}
+    about[ENCODER] = "binary or nothing_is_left_out"
     chosen = ["-k", about[name]] if name in about else []
     environment = os.environ | {"PYTHONPATH": f"{root / 'python'}:{root / 'studies'}"}
     return subprocess.run([*command, *chosen], cwd=root, env=environment, capture_output=True, text=True, check=False)
@@ -101,6 +103,14 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("studies/taxel_studies/__init__.py", True),
         ("studies/tests/test_quiet.py", False),
     ]
+    assert [(p.path, bool(p.after)) for p in of(ENCODER)] == [
+        ("crates/taxel-core/src/encode/binary.rs", False),
+        ("crates/taxel-core/src/encode.rs", True),
+        ("python/taxel/encode/binary.py", False),
+        ("python/taxel/encode/__init__.py", True),
+        ("tests/encode/test_binary.py", False),
+        ("benchmarks/encode_binary.py", False),
+    ]
     assert [(p.path, bool(p.after)) for p in of(LEARNER)] == [
         ("crates/taxel-core/src/learn/rivals/echo.rs", False),
         ("crates/taxel-core/src/learn/rivals.rs", True),
@@ -108,7 +118,7 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("python/taxel/learn/__init__.py", True),
         ("tests/learn/test_echo.py", False),
     ]
-    assert sorted(pieces()) == sorted([*of(FORMAT), *of(STUDY), *of(LEARNER)])
+    assert sorted(pieces()) == sorted([*of(FORMAT), *of(STUDY), *of(ENCODER), *of(LEARNER)])
 
 
 @pytest.mark.parametrize("name", [FORMAT, STUDY])
@@ -144,13 +154,13 @@ def test_a_part_that_is_left_out_is_named(copy: Path, name: str, without: str, s
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A whole copy with the learner's pieces, whose extension is built from them."""
+    """A whole copy with the pieces of encoder and learner, whose extension is built from them."""
     root = tmp_path_factory.mktemp("built")
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     for name in tracked:
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
-    for piece in of(LEARNER):
+    for piece in (*of(ENCODER), *of(LEARNER)):
         add(root, piece)
     # Dependencies are not built again: the copy uses the checkout's.
     made = ["build", "--release", "--quiet", "--target-dir", str(ROOT / "target"), "--out", str(root / "wheel")]
@@ -164,10 +174,11 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_what_contributing_says_of_a_learner_is_enough(built: Path) -> None:
-    done = tried(built, LEARNER)
+@pytest.mark.parametrize("name", [ENCODER, LEARNER])
+def test_what_contributing_says_of_rust_is_enough(built: Path, name: str) -> None:
+    done = tried(built, name)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
-    assert re.search(r"\b[5-9] passed", done.stdout), done.stdout[-1000:]
+    assert re.search(r"\b([5-9]|\d\d+) passed", done.stdout), done.stdout[-1000:]
 
 
 @pytest.mark.slow
