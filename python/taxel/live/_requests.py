@@ -10,9 +10,8 @@ import socket
 import struct
 import threading
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,16 +53,6 @@ def own_addresses() -> list[tuple[str, str]]:
     return found
 
 
-class Receiver(Protocol):
-    """What receives a board's datagrams, and can begin anew."""
-
-    def listen(self, host: str, port: int) -> None:
-        """Receive on another address."""
-
-    def delta_intensity(self, on: bool) -> None:
-        """Interpret intensities as differences, or as values."""
-
-
 @contextlib.contextmanager
 def _reasons() -> Iterator[None]:
     """Turn errors of the operating system into reasons that a person can read."""
@@ -84,14 +73,18 @@ class RequestHandler:
 
     Parameters
     ----------
-    receiver : Receiver
-        What receives the board's datagrams.
+    listen : function of host and port
+        Receives the board's datagrams on another address.
+    delta_intensity : function of a bool
+        Interprets intensities as differences, or as values.
     cable : Cable or None
         The board's serial line. The handler closes it.
     """
 
-    def __init__(self, receiver: Receiver, cable: Cable | None) -> None:
-        self._receiver, self._cable = receiver, cable
+    def __init__(
+        self, listen: Callable[[str, int], None], delta_intensity: Callable[[bool], None], cable: Cable | None
+    ) -> None:
+        self._listen, self._delta_intensity, self._cable = listen, delta_intensity, cable
         self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
 
     def close(self) -> None:
@@ -133,12 +126,12 @@ class RequestHandler:
     def listen(self, host: str, port: int) -> None:
         """Receive the board's datagrams on another address."""
         with _reasons():
-            self._receiver.listen(host, port)
+            self._listen(host, port)
 
     def set_differences(self, on: bool) -> None:
         """Interpret intensities as differences, or as values."""
         with _reasons():
-            self._receiver.delta_intensity(on)
+            self._delta_intensity(on)
 
     def addresses(self) -> list[tuple[str, str]]:
         """Return the IPv4 addresses of this machine, each with the name of its network interface."""

@@ -77,7 +77,8 @@ class Panel:
                 # The server indexes it when a client opens it; a file that is no recording is refused now.
                 _core.RecordingReader(place)
             folder, opened = place.resolve().parent, place.resolve().name
-        self._requests = RequestHandler(self, None if control is None else Cable(text("control", control)))
+        cable = None if control is None else Cable(text("control", control))
+        self._requests = RequestHandler(self.listen, self.delta_intensity, cable)
         readout = None if self._live is None else self._live._labels
         try:
             self._core = _core.Panel(
