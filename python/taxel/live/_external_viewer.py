@@ -1,12 +1,14 @@
-"""What Rerun and Foxglove have in common: the interface of a viewer in another program."""
+"""What Rerun and Foxglove have in common: the interface of a viewer in another program, and the table of the kinds."""
 
 from __future__ import annotations
 
-from typing import Protocol
+import importlib
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 from taxel.live.client import Item, Subject
 
-__all__ = ["Disconnected", "ExternalViewer"]
+__all__ = ["KINDS", "Disconnected", "ExternalViewer", "ViewerKind"]
 
 
 class Disconnected(Exception):  # noqa: N818  an expected event, not an error
@@ -35,3 +37,28 @@ class ExternalViewer(Protocol):
 
     def flush(self) -> None:
         """Wait until the viewer has read everything; raises `Disconnected` where it does not run any more."""
+
+
+@dataclass(frozen=True)
+class ViewerKind:
+    """A kind of viewer: its class, the modules that it needs, its default port, and whether a host may be named."""
+
+    module: str
+    name: str
+    needs: tuple[str, ...]
+    port: int
+    has_host: bool
+
+    def open(self, host: str, port: int) -> ExternalViewer:
+        """Connect to a viewer, or open the port that viewers connect to."""
+        # The modules of extras are imported only where they are used.
+        kind: Any = getattr(importlib.import_module(self.module), self.name)
+        viewer: ExternalViewer = kind(host, port) if self.has_host else kind(port)
+        return viewer
+
+
+#: The kinds by the name that `to` has.
+KINDS = {
+    "rerun": ViewerKind("taxel.live._to_rerun", "ToRerun", ("rerun", "websockets"), 9876, has_host=True),
+    "foxglove": ViewerKind("taxel.live._to_foxglove", "ToFoxglove", ("foxglove", "websockets"), 8765, has_host=False),
+}

@@ -19,7 +19,7 @@ from taxel._core import Error
 from taxel.detections import Detection
 from taxel.encode import Encoder
 from taxel.labels import Note
-from taxel.live._external_viewer import Disconnected, ExternalViewer
+from taxel.live._external_viewer import KINDS, Disconnected, ExternalViewer
 from taxel.live.client import Curves, Item, PanelClient, Picture, Spikes, Subject
 
 __all__ = ["BoundedQueue", "main"]
@@ -191,7 +191,8 @@ def main() -> None:
     options = json.loads(sys.stdin.readline())
     encoder = None if options["encoder"] is None else Encoder.from_json(options["encoder"])
     try:
-        viewer = _viewer(options["to"])
+        to = options["to"]
+        viewer = KINDS[to["what"]].open(to["host"], to["port"])
         client = PanelClient(options["url"], rate_hz=options["rate_hz"], encoder=encoder)
     except (OSError, Error) as error:
         _report({"error": str(error)})
@@ -207,16 +208,6 @@ def main() -> None:
     _report(relay.state(last=True))
     # A thread may wait for a viewer that does not read, and so may the clean-up of its library.
     os._exit(0)
-
-
-def _viewer(to: dict[str, Any]) -> ExternalViewer:
-    if to["what"] == "foxglove":
-        from taxel.live._to_foxglove import ToFoxglove  # noqa: PLC0415  an extra
-
-        return ToFoxglove(to["port"])
-    from taxel.live._to_rerun import ToRerun  # noqa: PLC0415  an extra
-
-    return ToRerun(to["host"], to["port"])
 
 
 def _wait_for_end_of_input(ends: threading.Event) -> None:

@@ -17,16 +17,11 @@ from typing import Any
 from taxel._base.arguments import instance, number, shown, text
 from taxel._core import ProblemError
 from taxel.encode import Encoder
+from taxel.live._external_viewer import KINDS
 from taxel.live.live import Live
 from taxel.live.panel import Panel
 
 __all__ = ["Viewer", "Viewing"]
-
-#: Default ports of a Rerun viewer, and of the server that Foxglove connects to.
-_PORTS = {"rerun": 9876, "foxglove": 8765}
-
-#: The modules of the extras.
-_MODULES = {"rerun": ("rerun", "websockets"), "foxglove": ("foxglove", "websockets")}
 
 _MOST_PORT = 65_535
 
@@ -234,15 +229,19 @@ def _where(to: object) -> dict[str, Any]:
     """Return what `to` names: the viewer's kind, host and port."""
     said = text("to", to)
     url = re.fullmatch(r"rerun\+http://([^/]+)/proxy", said)
-    plain = re.fullmatch(r"(rerun)(?::(.+):(\d{1,5}))?|(foxglove)(?::(\d{1,5}))?", f"rerun:{url[1]}" if url else said)
-    if plain is None or int(plain[3] or plain[5] or 0) > _MOST_PORT:
-        raise ProblemError(f"to is {shown(to)}: must be rerun, rerun:HOST:PORT, foxglove or foxglove:PORT")
-    what = plain[1] or plain[4]
-    return {"what": what, "host": plain[2] or "127.0.0.1", "port": int(plain[3] or plain[5] or _PORTS[what])}
+    what, colon, place = (f"rerun:{url[1]}" if url else said).partition(":")
+    kind = KINDS.get(what)
+    if kind is not None and not colon:
+        return {"what": what, "host": "127.0.0.1", "port": kind.port}
+    plain = None if kind is None else re.fullmatch(r"(.+):(\d{1,5})" if kind.has_host else r"()(\d{1,5})", place)
+    if plain is None or int(plain[2]) > _MOST_PORT:
+        forms = [form for n, k in KINDS.items() for form in (n, f"{n}:{'HOST:' * k.has_host}PORT")]
+        raise ProblemError(f"to is {shown(to)}: must be {', '.join(forms[:-1])} or {forms[-1]}")
+    return {"what": what, "host": plain[1] or "127.0.0.1", "port": int(plain[2])}
 
 
 def _wanted(what: str) -> None:
     """Refuse where an extra is not installed."""
-    missing = [module for module in _MODULES[what] if importlib.util.find_spec(module) is None]
+    missing = [module for module in KINDS[what].needs if importlib.util.find_spec(module) is None]
     if missing:
         raise ImportError(f"{missing[0]} is not installed: pip install taxel[{what}]")
