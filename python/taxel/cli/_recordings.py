@@ -35,10 +35,10 @@ TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest
 SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a nested one. May be repeated."
 
 
-def assignments(said: list[str]) -> dict[str, Any]:
+def assignments(settings: list[str]) -> dict[str, Any]:
     """Return the values of ``--set KEY=VALUE``; a VALUE that is no TOML is a text."""
     values = {}
-    for one in said:
+    for one in settings:
         key, equals, value = one.partition("=")
         if not equals or not key.strip():
             raise ProblemError(f"--set {one}: must be KEY=VALUE")
@@ -49,15 +49,15 @@ def assignments(said: list[str]) -> dict[str, Any]:
     return values
 
 
-def encoder_of(name: str | None, said: list[str]) -> Encoder:
+def encoder_of(name: str | None, settings: list[str]) -> Encoder:
     """Return the encoder that ``--encoder`` and ``--set`` describe."""
     from taxel._base.arguments import parameters  # noqa: PLC0415  the command line starts quickly
     from taxel.encode import Encoder  # noqa: PLC0415
 
-    return Encoder.from_json(parameters({**assignments(said), **({"name": name} if name else {})}))
+    return Encoder.from_json(parameters({**assignments(settings), **({"name": name} if name else {})}))
 
 
-def tare_of(said: str | None, recording: Recording) -> Tare | None:
+def tare_of(given: str | None, recording: Recording) -> Tare | None:
     """Return the tare that ``--tare`` names: a file, or so many seconds at the beginning of the recording.
 
     The stretch ends early where the board marked the start of the recording, as a board that was tared does. One
@@ -67,21 +67,21 @@ def tare_of(said: str | None, recording: Recording) -> Tare | None:
     from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
     from taxel.tare import Tare  # noqa: PLC0415
 
-    if said is None:
+    if given is None:
         return None
     try:
-        seconds = float(said)
+        seconds = float(given)
     except ValueError:
-        return Tare.load(said)
+        return Tare.load(given)
     if not 0 < seconds < np.inf:
-        raise ProblemError(f"--tare {said}: must be seconds above 0, or a file")
+        raise ProblemError(f"--tare {given}: must be seconds above 0, or a file")
     source = recorded(recording)
     if not len(source):
         raise ProblemError(f"{recording.path}: holds nothing to take a tare from")
     first, last = int(source.t[0]), int(source.t[-1])
     if seconds * 2e6 > last - first:
         raise ProblemError(
-            f"--tare {said}: more than half of {recording.path}, which lasts {(last - first) / 1e6:g} s; "
+            f"--tare {given}: more than half of {recording.path}, which lasts {(last - first) / 1e6:g} s; "
             "give the seconds at its beginning in which nothing was touched"
         )
     stop = first + int(seconds * 1e6)
@@ -118,14 +118,14 @@ def _taken(recording: Recording, source: Events | Frames, stop_us: int) -> Tare:
 
     tare = Tare.take(source, stop_us=stop_us, note=str(recording.path))
     if isinstance(source, Events):
-        heard = np.zeros(source.array.shape, bool)
-        heard[source.y, source.x] = True
-        unknown = int(np.count_nonzero(heard & np.isnan(tare.rest)))
-        if unknown > _MOST_UNKNOWN * np.count_nonzero(heard):
+        present = np.zeros(source.array.shape, bool)
+        present[source.y, source.x] = True
+        unknown = int(np.count_nonzero(present & np.isnan(tare.rest)))
+        if unknown > _MOST_UNKNOWN * np.count_nonzero(present):
             warnings.warn(
-                f"{recording.path}: the rest of {unknown} of {np.count_nonzero(heard)} taxels is not known, as none of "
-                f"their changes lies in its first {to_ms(stop_us - int(source.t[0])):g} ms: they are not listened to; "
-                "record from before the board starts, which tells all taxels then, or give --tare FILE",
+                f"{recording.path}: the rest of {unknown} of {np.count_nonzero(present)} taxels is not known, as none "
+                f"of their changes lies in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are left "
+                "out; record from before the board starts, which tells all taxels then, or give --tare FILE",
                 stacklevel=2,
             )
     return tare
@@ -137,7 +137,7 @@ def new_report(folder: Path) -> Path:
     return folder / "report.html"
 
 
-def references(said: str | None, option: str, recordings: Sequence[Recording]) -> list[dict[str, NDArray[np.int64]]]:
+def references(given: str | None, option: str, recordings: Sequence[Recording]) -> list[dict[str, NDArray[np.int64]]]:
     """Return the reference events of each recording: from a table, or its own notes (a note's text is the label).
 
     A table names recordings by path, file name or stem; one that it does not name is one in which nothing happened,
@@ -145,19 +145,19 @@ def references(said: str | None, option: str, recordings: Sequence[Recording]) -
     """
     from taxel.labels import Labels  # noqa: PLC0415  the command line starts quickly
 
-    if said is None or said == "notes":
+    if given is None or given == "notes":
         return [_notes(recording) for recording in recordings]
-    table = Labels(said)
+    table = Labels(given)
     if len(recordings) > 1 and any(not row.recording for row in table.rows):
         raise ProblemError(
-            f"{option} {said}: names no recording, and there are {len(recordings)}; must have the column recording"
+            f"{option} {given}: names no recording, and there are {len(recordings)}; must have the column recording"
         )
     unnamed = [str(recording.path) for recording in recordings if table.named(recording.path) is None]
     known = {table.named(recording.path) for recording in recordings}
     others = [name for name in table.recordings if name not in known]
     if unnamed and (others or len(unnamed) == len(recordings)):
         names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
-        raise ProblemError(f"{option} {said}: names no event in {', '.join(unnamed)}; {names}")
+        raise ProblemError(f"{option} {given}: names no event in {', '.join(unnamed)}; {names}")
     return [_within(table, recording, option) for recording in recordings]
 
 
@@ -196,7 +196,7 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
 
 
 @contextmanager
-def told(quiet: bool) -> Iterator[Callable[[str], None]]:
+def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
     """Show what is being done, and warnings as single lines; on stderr, so that results can be piped."""
     from rich.console import Console  # noqa: PLC0415  the command line starts quickly
 

@@ -12,7 +12,7 @@ import typer
 
 from taxel._core import FormatError, ProblemError
 from taxel.cli._app import app
-from taxel.cli._recordings import TARE_HELP, assignments, tare_of, told
+from taxel.cli._recordings import TARE_HELP, assignments, progress, tare_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -95,7 +95,7 @@ def calibrate(
     opened = _opened(recording)
     place = recording.with_name(f"{recording.stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)
-    with told(as_json):
+    with progress(as_json):
         read = _read(opened, tare)
     how: dict[str, Any] = {"unit": unit, "rest": read.rest, "floor": read.floor, "date": date, "note": note}
     made: Calibration | None = None

@@ -11,7 +11,7 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._recordings import TARE_HELP, new_report, open_all, references, tare_of, told
+from taxel.cli._recordings import TARE_HELP, new_report, open_all, progress, references, tare_of
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def detect(
     loaded = Readout.load(readout)
     opened = open_all([recording])
     heard = []
-    with told(as_json) as tell:
+    with progress(as_json) as tell:
         events = [None] * len(opened) if truth is None else references(truth, "--truth", opened)
         if truth is not None and not any(events):
             raise ProblemError(f"--truth {truth}: names no event in {recording}")

@@ -20,7 +20,7 @@ from taxel._base.files import try_whole
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._recordings import told
+from taxel.cli._recordings import progress
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.recording.opening import open_any
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
@@ -115,7 +115,7 @@ def emulate(
     )  # fmt: skip
     if labels is not None:
         try_whole(labels, overwrite=overwrite)
-    with told(quiet=True):
+    with progress(quiet=True):
         written = None if scene is None else SceneFile.open(scene)
     said_by = _with(written or SceneFile(Scene({})), preset, known=replay is None and not pipe)
     tare = said_by.tare_ms / 1e3 if tare is None else tare

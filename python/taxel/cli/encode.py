@@ -12,7 +12,7 @@ import typer
 from taxel._base.files import try_whole
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import app
-from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, open_recording, tare_of, told
+from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, open_recording, progress, tare_of
 
 __all__ = ["encode"]
 
@@ -36,7 +36,7 @@ def encode(
     try_whole(out, overwrite=overwrite)
     chosen = encoder_of(encoder, values or [])
     opened = open_recording(recording)
-    with told(as_json) as tell:
+    with progress(as_json) as tell:
         tell(f"reading {recording}")
         source = opened.events if opened.has_events else opened.frames()
         rest = tare_of(tare, opened)

@@ -66,7 +66,7 @@ def info(
             if picture is not None or table is not None:
                 raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")
             every = [summary(recording, series(recording)) for recording in opened]
-            typer.echo(json.dumps(every) if as_json else "\n".join(_page(said) for said in every))
+            typer.echo(json.dumps(every) if as_json else "\n".join(_page(facts) for facts in every))
             return
         if len(opened.sources) > 1:
             several = _sources(opened, drawn=picture is not None or table is not None)
@@ -74,14 +74,14 @@ def info(
             return
         recording = opened
         pressed = series(recording)
-        said = summary(recording, pressed)
-        said["array_assumed"] &= array is None
+        facts = summary(recording, pressed)
+        facts["array_assumed"] &= array is None
     if table is not None:
         if pressed is None:
             raise ProblemError(f"{file}: holds events without intensities, so there is no pressure to write")
         text = "".join(f"{line}\n" for line in _lines(pressed))
         write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
-        said["table"] = str(table)
+        facts["table"] = str(table)
     if picture is not None:
         import matplotlib as mpl  # noqa: PLC0415  loads slowly
 
@@ -100,12 +100,12 @@ def info(
             assert above is not None  # there are series
             pressure(*above, figure=figure.add_subfigure(grid[1]))
         write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
-        said["picture"] = str(picture)
-    typer.echo(json.dumps(said) if as_json else _page(said))
+        facts["picture"] = str(picture)
+    typer.echo(json.dumps(facts) if as_json else _page(facts))
 
 
 def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
-    """Return what is said of each source of a file, and how their clocks lie to the first one's."""
+    """Return the facts of each source of a file, and how their clocks lie to the first one's."""
     from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
     from taxel.recording.summary import summary  # noqa: PLC0415
 
@@ -117,10 +117,10 @@ def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
     first = next(iter(recording.sources.values()))
     sources: dict[str, Any] = {}
     for name, source in recording.sources.items():
-        said = summary(source, None if source.is_stream else series(source))
+        facts = summary(source, None if source.is_stream else series(source))
         clock, ours = source.clock, first.clock
         if source.is_stream:
-            said["columns"] = source.columns
+            facts["columns"] = source.columns
         if (
             source is not first
             and clock is not None
@@ -129,17 +129,17 @@ def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
             and len(ours.board_us)
         ):
             begins = int(clock.board_us.min())
-            said["against"] = {
+            facts["against"] = {
                 "source": next(iter(recording.sources)),
                 "offset_us": int(ours.board_us_at(int(clock.host_ns(begins)))) - begins,
                 "drift_ppm": clock.drift_ppm - ours.drift_ppm,
             }
-        sources[name] = said
+        sources[name] = facts
     return {"file": str(recording.path), "verdict": recording.verdict, "sources": sources}
 
 
 def _pages(several: dict[str, Any]) -> str:
-    return "\n".join(f"{name}: {_page(said)}" for name, said in several["sources"].items())
+    return "\n".join(f"{name}: {_page(facts)}" for name, facts in several["sources"].items())
 
 
 def _opened(file: Path, array: str | None) -> Recording | list[Recording]:
@@ -162,43 +162,43 @@ def _lines(pressed: Series) -> Iterator[str]:
         yield ",".join([str(t), *("" if np.isnan(value) else f"{value:.10g}" for value in values)])
 
 
-def _page(said: dict[str, Any]) -> str:
+def _page(facts: dict[str, Any]) -> str:
     """Return the same as lines for people."""
     from taxel.recording import kind_of_file  # noqa: PLC0415
 
-    head = f"{said['file']}: {kind_of_file(said['kind'])}" + f", from {said['source']}" * bool(said["source"])
-    rows = [*_contents(said), *_rates(said), *_losses(said), ("verdict", said["verdict"])]
-    rows += [("left behind", line) for line in said["lost"]]
+    head = f"{facts['file']}: {kind_of_file(facts['kind'])}" + f", from {facts['source']}" * bool(facts["source"])
+    rows = [*_contents(facts), *_rates(facts), *_losses(facts), ("verdict", facts["verdict"])]
+    rows += [("left behind", line) for line in facts["lost"]]
     lines = [head, *(f"  {name:<20}{value}" for name, value in rows)]
-    lines += [f"{what} written to {said[what]}" for what in ("picture", "table") if what in said]
+    lines += [f"{what} written to {facts[what]}" for what in ("picture", "table") if what in facts]
     return "\n".join(lines)
 
 
-def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
+def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     from taxel.calibration._curves import N_PER_KPA_MM2  # noqa: PLC0415  the command line starts quickly
 
-    array = said["array"]
+    array = facts["array"]
     size = f"{array['rows']} x {array['columns']} taxels, {array['pitch_mm']:g} mm, {array['name']}"
-    yield "array", size + (f"; a .{said['kind']} does not hold it: --array" if said["array_assumed"] else "")
-    if said["from_us"] is not None:
-        yield "board time", f"{said['from_us']} to {said['to_us']} us ({said['seconds']:.3f} s)"
-    if "events" in said:
-        words = f"{said['intensities']} with intensity, {len(said['markers'])} markers"
-        yield "events", f"{said['events']}, {words}"
+    yield "array", size + (f"; a .{facts['kind']} does not hold it: --array" if facts["array_assumed"] else "")
+    if facts["from_us"] is not None:
+        yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
+    if "events" in facts:
+        words = f"{facts['intensities']} with intensity, {len(facts['markers'])} markers"
+        yield "events", f"{facts['events']}, {words}"
     else:
-        yield ("samples" if "columns" in said else "pictures"), f"{said['pictures']} ({said['unit']})"
-    if "columns" in said:
-        yield "columns", ", ".join(said["columns"])
-    if "against" in said:
-        of = said["against"]
+        yield ("samples" if "columns" in facts else "pictures"), f"{facts['pictures']} ({facts['unit']})"
+    if "columns" in facts:
+        yield "columns", ", ".join(facts["columns"])
+    if "against" in facts:
+        of = facts["against"]
         yield f"clock of {of['source']}", f"{of['offset_us']:+d} us at the beginning, {of['drift_ppm']:+.1f} ppm faster"
-    if said["calibration"] is not None:
-        yield "calibration", said["calibration"]
-    pressed = said["pressure"]
+    if facts["calibration"] is not None:
+        yield "calibration", facts["calibration"]
+    pressed = facts["pressure"]
     if pressed is not None:
         # A calibration's kPa stand for the pitch's squares; of other files taxels may have any size.
         newtons = array["pitch_mm"] ** 2 * N_PER_KPA_MM2
-        force = said["calibration"] is not None and pressed["unit"] == "kPa"
+        force = facts["calibration"] is not None and pressed["unit"] == "kPa"
         for name, words, unit, factor in (
             ("area_mm2", "contact area", "mm2", 1.0),
             ("peak", "peak", pressed["unit"], 1.0),
@@ -208,35 +208,35 @@ def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
         if pressed["centre_mm"] is not None:
             x, y = pressed["centre_mm"]["x"], pressed["centre_mm"]["y"]
             yield "centre of pressure", f"x {x[0]:.1f} to {x[1]:.1f} mm, y {y[0]:.1f} to {y[1]:.1f} mm"
-    if said["notes"]:
-        yield "notes", str(len(said["notes"]))
-    if said["detections"]:
-        yield "detections", ", ".join(f"{label} {n}" for label, n in said["detections"].items())
-    for name, places in said["taxels"].items():
+    if facts["notes"]:
+        yield "notes", str(len(facts["notes"]))
+    if facts["detections"]:
+        yield "detections", ", ".join(f"{label} {n}" for label, n in facts["detections"].items())
+    for name, places in facts["taxels"].items():
         shown = ", ".join(f"({x}, {y})" for x, y in places[:8]) + " ..." * (len(places) > 8)
         yield f"{name} taxels", f"{len(places)}" + f": {shown}" * bool(places)
 
 
-def _rates(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    if said.get("events_per_s_board") is not None:
-        peak = said["peak_events_per_s_board"]
-        yield "rate, board", f"{said['events_per_s_board']:.0f} events/s; {peak:.0f} events/s in the busiest 10 ms"
-    if said.get("pictures_per_s") is not None:
-        yield "rate", f"{said['pictures_per_s']:.1f} pictures/s"
-    if said.get("events_per_s_host") is not None:
-        host = f"{said['events_per_s_host']:.0f} events/s, {said['datagrams_per_s_host']:.0f} datagrams/s"
-        yield "rate, host", f"{host} in {said['seconds_host']:.3f} s"
-        late = said["delay_us"]
+def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    if facts.get("events_per_s_board") is not None:
+        peak = facts["peak_events_per_s_board"]
+        yield "rate, board", f"{facts['events_per_s_board']:.0f} events/s; {peak:.0f} events/s in the busiest 10 ms"
+    if facts.get("pictures_per_s") is not None:
+        yield "rate", f"{facts['pictures_per_s']:.1f} pictures/s"
+    if facts.get("events_per_s_host") is not None:
+        host = f"{facts['events_per_s_host']:.0f} events/s, {facts['datagrams_per_s_host']:.0f} datagrams/s"
+        yield "rate, host", f"{host} in {facts['seconds_host']:.3f} s"
+        late = facts["delay_us"]
         delays = f"delays {late['median']:.0f} us median, {late['p99']:.0f} us 99 %"
-        yield "clock", f"drift {said['drift_ppm']:+.1f} ppm; {delays}"
+        yield "clock", f"drift {facts['drift_ppm']:+.1f} ppm; {delays}"
 
 
-def _losses(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    counts = said["counts"]
+def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    counts = facts["counts"]
     for name in ("datagrams", "bytes", "received", "dropped_by_kernel", "dropped_by_queue", "missing_numbers"):
         if counts.get(name) is not None:
             yield name.replace("_", " "), str(counts[name])
     sound = ("bytes", "words", "changes", "intensities", "markers")
-    for name, n in {**counts.get("decoder", {}), **said["rebuilt"]}.items():
+    for name, n in {**counts.get("decoder", {}), **facts["rebuilt"]}.items():
         if n and name not in sound:
             yield name.replace("_", " "), str(n)

@@ -12,7 +12,7 @@ from taxel._base.arguments import whole
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption
-from taxel.cli._recordings import SET_HELP, open_all, told
+from taxel.cli._recordings import SET_HELP, open_all, progress
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, LabelledTrial, Point
@@ -71,7 +71,7 @@ def information(
     if report.exists() and not overwrite:
         raise FileExistsError(17, "exists already; say --overwrite or another --report", str(report))
     chosen = _encoder(encoder, values or [])
-    with told(as_json) as tell:
+    with progress(as_json) as tell:
         opened = []
         for path in recordings:
             tell(f"reading {path}")

@@ -120,7 +120,7 @@ def live(
     _together(
         readout, panel=panel, viewers=bool(to), of_a_readout=bool(tare or report or send), of_a_panel=folder is not None
     )
-    heard = None if readout is None else Readout.load(readout)
+    trained = None if readout is None else Readout.load(readout)
     rest = rest_of(tare)
     _fresh(rest, save_tare, None if panel else control)
     if report is not None:
@@ -131,7 +131,7 @@ def live(
     with contextlib.ExitStack() as at_rest:
         if control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(control)).floor(0))
-        far = at_rest.enter_context(remote(address, congestion, keeps=record is not None or heard is not None))
+        far = at_rest.enter_context(remote(address, congestion, keeps=record is not None or trained is not None))
         with Live(
             port,
             host=host,
@@ -139,7 +139,7 @@ def live(
             array=None if array is None else geometry(array),
             registers=preset,
             differences=differences,
-            readout=heard,
+            readout=trained,
             tare=rest,
             record=record,
             guard_frames=guard_frames,
@@ -171,8 +171,8 @@ def live(
     if save_tare is not None and taken is not None:
         taken.save(save_tare)
         console.print(f"tare written to {save_tare}")
-    if report is not None and heard is not None and summary.path is not None:
-        _report(report, heard, summary.path, taken if taken is not None else rest)
+    if report is not None and trained is not None and summary.path is not None:
+        _report(report, trained, summary.path, taken if taken is not None else rest)
         console.print(f"report: {report / 'report.html'}", soft_wrap=True)
     _unsent(summary)
     report_viewers(looks, quiet=as_json)
@@ -195,8 +195,8 @@ def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | Non
 
     recording = taxel.open(path)
     rest = tare if isinstance(tare, Tare) else None
-    heard = Outcome(str(path), Example(recording, {}, rest), recording.detections)
-    write_listening(folder, readout, [heard], title=f"What was said live, recorded to {path}")
+    outcome = Outcome(str(path), Example(recording, {}, rest), recording.detections)
+    write_listening(folder, readout, [outcome], title=f"What was said live, recorded to {path}")
 
 
 def _say(summary: Summary, guard_frames: float) -> None:
@@ -288,7 +288,7 @@ def _watch(
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as asked, display:
-        before, told = None, False
+        before, warned = None, False
         while not asked.is_set() and (before is None or seconds is None or before["seconds"] < seconds):
             try:
                 if panel is not None and panel.live is not None and panel.live is not pipeline:
@@ -296,9 +296,9 @@ def _watch(
                     pipeline, before = panel.live, None
                 if before is None:
                     before = pipeline.counters
-                said = pipeline.next(REDRAW_S)
-                if said is not None:
-                    _tell(said, console, say)
+                detection = pipeline.next(REDRAW_S)
+                if detection is not None:
+                    _print(detection, console, say)
                 _drain(pipeline, console, say)
                 now = pipeline.counters
             except ProblemError:
@@ -311,25 +311,26 @@ def _watch(
                 if fresh and pipeline.tare is not None:
                     fresh = False
                     _unheard(pipeline.tare)
-            if not told and (wrong := outside(now, pipeline.array)):
+            if not warned and (wrong := outside(now, pipeline.array)):
                 typer.echo(f"taxel: {wrong}", err=True)
-                told = True
+                warned = True
             if now["seconds"] - before["seconds"] >= REDRAW_S:
                 lines = [Text(state_of(viewer)) for viewer in looks]
                 display.update(Group(counters_table(before, now), _state(now), *lines))
                 before = now
 
 
-def _tell(said: Detection, console: Console, say: Callable[[str], None]) -> None:
+def _print(detection: Detection, console: Console, say: Callable[[str], None]) -> None:
     """Print a detection, with its delay after `known`; with --json the thread that made it has written it."""
     if not console.quiet:
-        say(f"{said.t / 1e6:10.4f} s  {said.label:<16} said {to_ms(said.latency or 0):.2f} ms after it was known")
+        delay = to_ms(detection.latency or 0)
+        say(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} said {delay:.2f} ms after it was known")
 
 
 def _drain(pipeline: Live, console: Console, say: Callable[[str], None]) -> None:
     """Print all detections that wait."""
-    while (said := pipeline.next(0.0)) is not None:
-        _tell(said, console, say)
+    while (detection := pipeline.next(0.0)) is not None:
+        _print(detection, console, say)
 
 
 def _state(now: dict[str, Any]) -> Text:

@@ -217,7 +217,7 @@ def _watch(
     if keys:
         console.print(keys)
     with Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True) as display:
-        before, told = live.counters, False
+        before, warned = live.counters, False
         began = before["seconds"]
         if trial:
             # Markers from before belong to an earlier trial.
@@ -230,19 +230,19 @@ def _watch(
                 if markers and not start:
                     return
             now = live.counters
-            if not told and (said := outside(now, live.array)):
-                typer.echo(f"taxel: {said}", err=True)
-                told = True
+            if not warned and (wrong := outside(now, live.array)):
+                typer.echo(f"taxel: {wrong}", err=True)
+                warned = True
             display.update(counters_table(before, now))
             if trial and not live.records:
                 return
             before = now
 
 
-def _named(said: list[str]) -> dict[str, str]:
+def _named(given: list[str]) -> dict[str, str]:
     """Return what ``--source NAME=WHAT`` says."""
     sources: dict[str, str] = {}
-    for one in said:
+    for one in given:
         name, equals, what = one.partition("=")
         if not equals or not name or not what:
             raise ProblemError(f"--source {one}: must be NAME=WHAT, as imu=serial:/dev/ttyACM0")

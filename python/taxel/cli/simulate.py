@@ -12,7 +12,7 @@ from rich.progress import Progress
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._recordings import told
+from taxel.cli._recordings import progress
 
 __all__ = ["simulate"]
 
@@ -50,7 +50,7 @@ def simulate(
     from taxel.plot.film import film, writer_of  # noqa: PLC0415
     from taxel.simulate import SceneFile, play, truth  # noqa: PLC0415
 
-    with told(quiet=True):
+    with progress(quiet=True):
         said = SceneFile.open(scene)
     seed = said.seed if seed is None else seed
     wanted = [path for path in (out, movie, labels) if path is not None]

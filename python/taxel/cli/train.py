@@ -19,10 +19,10 @@ from taxel.cli._recordings import (
     assignments,
     new_report,
     open_all,
+    progress,
     references,
     tare_before,
     tare_of,
-    told,
 )
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def train(
     elif "encoder.name" in changes:
         plan = Recipe.from_dict(changed({}, changes))
     opened = open_all(recordings)
-    with told(as_json) as tell:
+    with progress(as_json) as tell:
         tell("reading")
         happened = references(labels, "--labels", opened)
         if not any(happened):
