@@ -176,7 +176,7 @@ impl Numbers for Vec<f64> {
     }
 }
 
-/// Gives a noun its table `RANGES`, and `check_ranges`, which reads it. A name in parentheses after a parameter's is the
+/// Returns a noun its table `RANGES`, and `check_ranges`, which reads it. A name in parentheses after a parameter's is the
 /// method that gives its value where it is left out.
 macro_rules! ranges {
     ($($name:ident $(($method:ident))?: $unit:literal, $range:expr;)*) => {

@@ -28,7 +28,7 @@ impl Array {
     ///
     /// # Errors
     ///
-    /// `Problem` where there is no row or no column, or the pitch is not above 0.
+    /// `Problem` if there is no row or no column, or the pitch is not above 0.
     pub fn new(rows: u16, columns: u16, pitch_mm: f64, name: &str) -> Result<Self> {
         if rows == 0 || columns == 0 {
             return Err(problem!("array of {rows} x {columns} taxels: needs 1 row and 1 column or more"));
@@ -47,7 +47,7 @@ impl Array {
     ///
     /// # Errors
     ///
-    /// `Problem` where there is no row or no column, the pitch is not above 0, or `exists` has another length.
+    /// `Problem` if there is no row or no column, the pitch is not above 0, or `exists` has another length.
     pub fn check(&self) -> Result<()> {
         Self::new(self.rows, self.columns, self.pitch_mm, "")?;
         match &self.exists {

@@ -97,7 +97,7 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// `Device` where the registers break a rule; `Problem` where the array has more positions than version 2 can name.
+    /// `Device` if the registers break a rule; `Problem` if the array has more positions than version 2 can name.
     pub fn new(registers: Registers, array: &Array) -> Result<Self> {
         registers.check(array)?;
         let (version_2, intensity) = (Version2::default(), IntensityWord::default());
@@ -186,7 +186,7 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// `Problem` where the registers hold version 1 of the wire, whose stamps are of 100 us, or `mechanoreceptor`, or the
+    /// `Problem` if the registers hold version 1 of the wire, whose stamps are of 100 us, or `mechanoreceptor`, or the
     /// board compares with the last sample.
     pub fn asynchronous(mut self) -> Result<Self> {
         if self.written.wire_version != 2 {

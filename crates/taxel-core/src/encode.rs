@@ -56,7 +56,7 @@ macro_rules! encoders {
                 match self { $(Self::$Kind(e) => e,)* }
             }
 
-            /// Reads the parameters of the encoder of a name; none where there is none of that name.
+            /// Reads the parameters of the encoder of a name; none if there is none of that name.
             fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
                 $(if name == stringify!($name) {
                     return Some(reading::from_value(parameters).map(Self::$Kind));
@@ -142,7 +142,7 @@ impl Encoder {
     ///
     /// # Errors
     ///
-    /// `Problem` where a parameter makes no sense, or an encoder that reads a tare has none or another array's.
+    /// `Problem` if a parameter makes no sense, or an encoder that reads a tare has none or another array's.
     pub fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         self.check()?;
         self.law().stream(array)
@@ -182,9 +182,9 @@ impl Encoder {
     /// # Errors
     ///
     /// As [`Encoder::stream`] and [`Stream::push_events`]; `Problem` too where an event lies too far behind one before
-    /// it ([`EventsView::check_order`]); `Interrupted` where asked to stop.
+    /// it ([`EventsView::check_order`]); `Interrupted` if asked to stop.
     pub fn encode_events(&self, events: EventsView<'_>, stop: Stop<'_>) -> Result<SpikeTrains> {
-        /// Events between two looks at `stop`.
+        /// Events between two checks of `stop`.
         const PIECE: usize = 65_536;
         let mut stream = self.stream(events.array)?;
         events.check()?;
@@ -201,7 +201,7 @@ impl Encoder {
     ///
     /// # Errors
     ///
-    /// As [`Encoder::stream`], [`FramesView::check`] and [`Stream::push_frame`]; `Interrupted` where asked to stop.
+    /// As [`Encoder::stream`], [`FramesView::check`] and [`Stream::push_frame`]; `Interrupted` if asked to stop.
     pub fn encode_frames(&self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<SpikeTrains> {
         let mut stream = self.stream(frames.array)?;
         frames.check()?;

@@ -39,7 +39,7 @@ pub struct Events {
     /// The held values that came with the changes, or none at all.
     pub intensity: Option<Intensities>,
     /// Whether a state of version 2 gave the event, because its value differed from the held one: what it tells happened
-    /// some time before. None where no event is of that kind.
+    /// some time before. None if no event is of that kind.
     pub repaired: Option<Vec<bool>>,
     /// Starts and stops, by time.
     pub markers: Vec<Marker>,

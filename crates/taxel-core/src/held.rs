@@ -128,7 +128,7 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
     ///
     /// # Errors
     ///
-    /// `Problem` where columns are unequal, a taxel lies outside the array, or there is not one value in `begins` a chosen taxel.
+    /// `Problem` if columns are unequal, a taxel lies outside the array, or there is not one value in `begins` a chosen taxel.
     pub fn new(events: EventsView<'_>, chosen: Option<&[u32]>, begins: Vec<V>) -> Result<Self> {
         events.check()?;
         let values = events.values().map(|(k, taxel, ticks)| (events.t[k], taxel, V::from(ticks)));

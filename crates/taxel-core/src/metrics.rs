@@ -48,7 +48,7 @@ macro_rules! metrics {
                 match self { $(Self::$Kind(metric) => metric,)* }
             }
 
-            /// Reads the parameters of the metric of a name; none where there is none of that name.
+            /// Reads the parameters of the metric of a name; none if there is none of that name.
             fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
                 $(if name == stringify!($name) {
                     return Some(reading::from_value(parameters).map(Self::$Kind));

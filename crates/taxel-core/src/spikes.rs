@@ -49,7 +49,7 @@ impl SpikeTrains {
     ///
     /// # Errors
     ///
-    /// `Problem` where a spike names a train that is not there, or lies outside the window.
+    /// `Problem` if a spike names a train that is not there, or lies outside the window.
     pub fn from_spikes(spikes: &[Spike], trains: usize, signed: bool, start: f64, stop: f64) -> Result<Self> {
         let mut offsets = vec![0_usize; trains + 1];
         for s in spikes {
@@ -95,7 +95,7 @@ impl SpikeTrains {
     ///
     /// # Errors
     ///
-    /// `Problem` as [`SpikeTrains::check`]; `Interrupted` where the caller stops it.
+    /// `Problem` as [`SpikeTrains::check`]; `Interrupted` if the caller stops it.
     pub fn copy_of(
         times: &[f64],
         offsets: Vec<usize>,
@@ -135,7 +135,7 @@ impl SpikeTrains {
     ///
     /// # Errors
     ///
-    /// `Interrupted` where the caller stops it.
+    /// `Interrupted` if the caller stops it.
     pub fn by_time(&self, stop: Stop<'_>) -> Result<Vec<Spike>> {
         let spike = |n: usize, k: usize| Spike {
             t: self.times[k],

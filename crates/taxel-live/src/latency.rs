@@ -14,7 +14,7 @@ pub struct Latencies {
     max_ns: u64,
 }
 
-/// Quantiles of [`Latencies`], us; none where nothing was measured.
+/// Quantiles of [`Latencies`], us; none if nothing was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Quantiles {
     /// How many were measured.

@@ -28,7 +28,7 @@ impl Crossed {
     ///
     /// # Errors
     ///
-    /// `Problem` where a parameter makes no sense.
+    /// `Problem` if a parameter makes no sense.
     pub fn new(chain: Chain, registers: &Registers, array: &Array) -> Result<Self> {
         chain.check()?;
         let scan = Scan::new(timed(&chain.converter, registers, array), array.rows.into(), array.columns.into())?;
@@ -70,7 +70,7 @@ impl Crossed {
     ///
     /// # Errors
     ///
-    /// `Problem` where registers that were written since leave the converter no time; `Interrupted`.
+    /// `Problem` if registers that were written since leave the converter no time; `Interrupted`.
     pub fn read(&mut self, registers: &Registers, ticks: &mut [u16], stop: Stop<'_>) -> Result<()> {
         if self.registers != *registers {
             *self = Self::new(self.chain.clone(), registers, &self.array)?;

@@ -77,7 +77,7 @@ impl Flawed {
     ///
     /// # Errors
     ///
-    /// `Problem` where a size makes no sense (names the flaw).
+    /// `Problem` if a size makes no sense (names the flaw).
     pub fn new(flaws: Flaws, array: &Array) -> Result<Self> {
         let lines = f64::from(array.rows) + f64::from(array.columns);
         for (name, size, most) in [

@@ -17,7 +17,7 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// `Problem` where there is not one trip time a taxel.
+    /// `Problem` if there is not one trip time a taxel.
     pub fn frame(&mut self, ticks: &[u16], mut sink: impl FnMut(&[u8]) -> bool) -> Result<()> {
         if ticks.len() != self.array.len() {
             return Err(problem!("frame of {} trip times: the array has {} taxels", ticks.len(), self.array.len()));

@@ -75,7 +75,7 @@ impl Network {
     ///
     /// # Errors
     ///
-    /// `Problem` where a share, or all of them together, do not lie in 0 to 1.
+    /// `Problem` if a share, or all of them together, do not lie in 0 to 1.
     pub fn new(faults: Faults) -> Result<Self> {
         let shares = faults.shares();
         for (name, share) in shares {
@@ -97,7 +97,7 @@ impl Network {
         &self.counts
     }
 
-    /// Takes a datagram; gives the sink what comes out.
+    /// Takes a datagram; returns the sink what comes out.
     pub fn pass(&mut self, datagram: &[u8], sink: &mut impl FnMut(&[u8])) {
         self.counts.given += 1;
         let at: f64 = self.draw.random();

@@ -60,7 +60,7 @@ impl Play {
     ///
     /// # Errors
     ///
-    /// `Device` where registers break a rule, `Scene` where an act cannot be played.
+    /// `Device` if registers break a rule, `Scene` if an act cannot be played.
     pub fn stage(&self, stop: Stop<'_>) -> Result<Stage> {
         let Self { array, registers, .. } = self;
         registers.check(array)?;
@@ -72,7 +72,7 @@ impl Play {
     ///
     /// # Errors
     ///
-    /// As [`Play::stage`], [`Board::new`], [`Board::asynchronous`], [`Crossed::new`] and [`Crossed::fits`]; `Problem` where
+    /// As [`Play::stage`], [`Board::new`], [`Board::asynchronous`], [`Crossed::new`] and [`Crossed::fits`]; `Problem` if
     /// the tare leaves no frame for the acts.
     pub fn arm(&self, stop: Stop<'_>) -> Result<Armed> {
         let mut stage = self.stage(stop)?;
@@ -100,7 +100,7 @@ impl Play {
     ///
     /// # Errors
     ///
-    /// As [`Play::arm`]; `Interrupted` where asked to stop.
+    /// As [`Play::arm`]; `Interrupted` if asked to stop.
     pub fn run(&self, mut watch: impl FnMut(f64), stop: Stop<'_>) -> Result<Played> {
         let Armed { mut board, mut crossed, mut stage, commands } = self.arm(stop)?;
         let version = self.registers.wire_version;

@@ -12,7 +12,7 @@ use crate::{Result, Stop, problem};
 ///
 /// # Errors
 ///
-/// `Problem` where the tare is not between 0 and a minute, or does not leave two frames.
+/// `Problem` if the tare is not between 0 and a minute, or does not leave two frames.
 pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(u64, Command)>> {
     let mut commands = opening(registers, tare_ms)?;
     let start = commands.last().map_or(1, |(frame, _)| *frame);
@@ -27,7 +27,7 @@ pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(
 ///
 /// # Errors
 ///
-/// `Problem` where the tare is not between 0 and a minute.
+/// `Problem` if the tare is not between 0 and a minute.
 pub fn opening(registers: &Registers, tare_ms: f64) -> Result<Vec<(u64, Command)>> {
     if !(0.0..=60_000.0).contains(&tare_ms) {
         return Err(problem!("tare of {tare_ms} ms: must be 0 to 60000"));
@@ -70,7 +70,7 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// As [`Board::frame`]; `Interrupted` where asked to stop.
+    /// As [`Board::frame`]; `Interrupted` if asked to stop.
     pub fn play(
         &mut self,
         mut touch: impl FnMut(&mut [u16]) -> Result<bool>,

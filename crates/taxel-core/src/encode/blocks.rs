@@ -36,7 +36,7 @@ impl Next {
         Self { at: picture.as_ptr_range().end.cast(), left: blocks(picture.len()) }
     }
 
-    /// Prefetches a block; gives whether there was one.
+    /// Prefetches a block; returns whether there was one.
     #[inline(always)]
     pub(super) fn fetch(&mut self) -> bool {
         if self.left == 0 {

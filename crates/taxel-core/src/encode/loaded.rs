@@ -64,7 +64,7 @@ impl Loaded {
         Ok(fresh)
     }
 
-    /// Gives a place another rest; its value above rest must be computed again.
+    /// Returns a place another rest; its value above rest must be computed again.
     pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
         self.rest.set(place, rest);
         self.rest_changed(place);

@@ -38,7 +38,7 @@ impl Pieces {
     ///
     /// # Errors
     ///
-    /// As [`FramesView::check`] and [`Stream::push_frame`]; `Problem` where they are another array's.
+    /// As [`FramesView::check`] and [`Stream::push_frame`]; `Problem` if they are another array's.
     pub fn push_frames(&mut self, frames: FramesView<'_>) -> Result<SpikeTrains> {
         let (own, given) = ((self.array.rows, self.array.columns), (frames.array.rows, frames.array.columns));
         if given != own {

@@ -46,7 +46,7 @@ pub(super) trait Filter: Send + Clone + 'static {
     /// The state in which `x` has always been, and the potential then.
     fn settled(&self, x: &Lanes) -> (Self::State, Lanes);
 
-    /// Takes the next sample of a channel whose potential was `u`; gives the potential. With `SEE`, sets bits of `moved`
+    /// Takes the next sample of a channel whose potential was `u`; returns the potential. With `SEE`, sets bits of `moved`
     /// where anything that it holds did.
     fn step<const SEE: bool>(&self, state: &mut Self::State, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64;
 
@@ -269,7 +269,7 @@ mod tests {
         out
     }
 
-    /// Compares blocks, of which only those that move are computed, with channels one by one; gives how many spikes came, and
+    /// Compares blocks, of which only those that move are computed, with channels one by one; returns how many spikes came, and
     /// how often a block was left out.
     fn holds<F: Filter>(filter: &F, firing: Firing, rng: &mut StdRng) -> [usize; 2] {
         let (channels, range) = (rng.random_range(1..150), 150.0);

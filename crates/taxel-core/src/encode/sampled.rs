@@ -89,7 +89,7 @@ pub(super) enum Source {
 }
 
 impl Source {
-    /// Takes the times of events; gives the time come to before them, `None` where there is no event.
+    /// Takes the times of events; returns the time come to before them, `None` where there is no event.
     pub(super) fn events(&mut self, times: &[i64]) -> Result<Option<i64>> {
         let Some(&first) = times.first() else { return Ok(None) };
         let (before, mut late) = match *self {
@@ -191,7 +191,7 @@ impl<R: Rule> Sampled<R> {
         })
     }
 
-    /// Gives the rule values above rest, where there is a tare.
+    /// Returns the rule values above rest, where there is a tare.
     pub(super) fn above(mut self, tare: Option<&Tare>, array: &Array) -> Result<Self> {
         if let Some(tare) = tare {
             let (rest, n) = (tare.rest_of(array)?, array.len());

@@ -160,7 +160,7 @@ impl Skin {
     ///
     /// # Errors
     ///
-    /// `Problem` where a parameter makes no sense, or there would be more than a million.
+    /// `Problem` if a parameter makes no sense, or there would be more than a million.
     pub fn afferents(&self, array: &Array) -> Result<Vec<Placed>> {
         self.check()?;
         let count = Law::trains(self, array);

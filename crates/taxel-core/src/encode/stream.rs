@@ -21,7 +21,7 @@ pub trait Stream: Send {
     ///
     /// # Errors
     ///
-    /// `Problem` where the encoder needs intensities that are not there, or the stream was begun with frames.
+    /// `Problem` if the encoder needs intensities that are not there, or the stream was begun with frames.
     fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()>;
 
     /// How long after an event that a state repaired its spikes come at the latest, ms; none of an encoder of changes, which
@@ -43,14 +43,14 @@ pub trait Stream: Send {
     ///
     /// # Errors
     ///
-    /// `Problem` where the picture has another size, holds NaN, comes out of order, or the stream was begun with events.
+    /// `Problem` if the picture has another size, holds NaN, comes out of order, or the stream was begun with events.
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()>;
 
     /// Ends the input before `t` us (exclusive): nothing will come any more up to then.
     fn advance(&mut self, t: i64, out: &mut Vec<Spike>);
 
     /// Ends the input: holds the latest values for one period and the latency, so that all spikes that are due come out.
-    /// Gives the end of that, ms, or `None` without any input.
+    /// Returns the end of that, ms, or `None` without any input.
     fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64>;
 
     /// A copy that goes on by itself, to compute the spikes that would follow without further input.

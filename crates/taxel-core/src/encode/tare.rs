@@ -53,7 +53,7 @@ impl Tare {
     ///
     /// # Errors
     ///
-    /// `Problem` where the tare is of an array of another shape.
+    /// `Problem` if the tare is of an array of another shape.
     pub(super) fn rest_of(&self, array: &Array) -> Result<Rest<f64>> {
         let (of, to) = (&self.array, array);
         if (of.rows, of.columns) != (to.rows, to.columns) {
@@ -104,7 +104,7 @@ impl Tare {
     ///
     /// # Errors
     ///
-    /// `Format` where it is no tare, `Problem` where its parts do not fit.
+    /// `Format` if it is no tare, `Problem` if its parts do not fit.
     pub fn from_json(json: &str) -> Result<Self> {
         let tare: Self = reading::from_text(json).map_err(|unfit| crate::Error::Format(unfit.of("tare")))?;
         tare.check()?;
@@ -201,7 +201,7 @@ impl TareBuilder {
     ///
     /// # Errors
     ///
-    /// `Problem` where events have no intensities or are another sensor's.
+    /// `Problem` if events have no intensities or are another sensor's.
     pub fn push_events(&mut self, events: EventsView<'_>) -> Result<()> {
         let (rows, columns) = (events.array.rows, events.array.columns);
         if (rows, columns) != (self.array.rows, self.array.columns) {
@@ -228,7 +228,7 @@ impl TareBuilder {
     ///
     /// # Errors
     ///
-    /// `Problem` where the picture has another size, holds NaN or comes out of order.
+    /// `Problem` if the picture has another size, holds NaN or comes out of order.
     pub fn push_frame(&mut self, t: i64, values: &[f32]) -> Result<()> {
         if values.len() != self.integrals.len() {
             return Err(problem!("frame at {t} us: {} values, must be {}", values.len(), self.integrals.len()));
@@ -252,7 +252,7 @@ impl TareBuilder {
     ///
     /// # Errors
     ///
-    /// `Problem` where no event came, the stretch is empty, or a later event came.
+    /// `Problem` if no event came, the stretch is empty, or a later event came.
     pub fn finish(mut self, stop: i64, note: &str) -> Result<Tare> {
         let Some(start) = self.start else { return Err(problem!("tare: no event came")) };
         if stop <= start {

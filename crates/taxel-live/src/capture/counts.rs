@@ -26,7 +26,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Adds what receive calls gave, and how many messages the kernel has dropped so far; gives the first datagram's number.
+    /// Adds what receive calls gave, and how many messages the kernel has dropped so far; returns the first datagram's number.
     pub(super) fn add(&mut self, datagrams: usize, bytes: usize, messages: u64, dropped_by_kernel: u64) -> u64 {
         let first = self.datagrams;
         self.messages += messages;

@@ -155,7 +155,7 @@ pub fn decode_lsa(
     differences: bool,
     stop: Stop<'_>,
 ) -> Result<DecodedLsa> {
-    /// Bytes between two looks at `stop`.
+    /// Bytes between two checks of `stop`.
     const PIECE: usize = 1 << 22;
     let bytes = std::fs::read(path).map_err(Error::file(path))?;
     if wire::v2::begins(&bytes) {

@@ -20,11 +20,11 @@ pub struct Pictures {
 
 impl Pictures {
     /// The pictures of events: at each whole 100 ms up to which an event came, and at the whole 10 ms before and behind each of
-    /// the times `around`, as far as events reach. None where no event has an intensity.
+    /// the times `around`, as far as events reach. None if no event has an intensity.
     ///
     /// # Errors
     ///
-    /// `Problem` where columns are unequal or a taxel lies outside the array.
+    /// `Problem` if columns are unequal or a taxel lies outside the array.
     pub fn new(events: EventsView<'_>, around: &[i64]) -> Result<Self> {
         // In a picture 0 is also a taxel without any event so far.
         let held = HeldOverTime::new(events, None, vec![0; events.array.len()])?;

@@ -111,7 +111,7 @@ fn held(data: &[u8]) -> Option<Vec<u16>> {
     Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect())
 }
 
-/// Gives a decoder the values that the taxels held before the recording's first datagram.
+/// Returns a decoder the values that the taxels held before the recording's first datagram.
 pub fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
     if let Some(held) = held(data) {
         receiver.begin_with(held.iter().map(|ticks| (*ticks != UNKNOWN).then_some(*ticks)));
