@@ -19,21 +19,23 @@ use serde::{Deserialize, Serialize};
 pub struct Detection {
     /// The label of the neuron that fired.
     pub label: String,
-    /// When the event was, us of the board's clock: the crossing less the encoder's latency and the trained delay.
+    /// Time of the event, us of the board's clock: the crossing minus the encoder's latency and the trained delay.
     pub t: i64,
-    /// When it could first be known, us of the board's clock: the end of the frame in which the potential crosses.
+    /// Earliest time at which the event could be known, us of the board's clock: the end of the frame in which the
+    /// potential crosses.
     pub known: i64,
-    /// How steeply the potential rose above its threshold, mV/ms: a measure of how sure.
+    /// Slope of the potential at its threshold, mV/ms: a measure of confidence.
     pub slope: f64,
-    /// Whether it may rest on values that states of version 2 repaired: then the event may have happened before `t`.
+    /// Whether the detection may depend on values that states of version 2 repaired: then the event may have happened
+    /// before `t`.
     pub repaired: bool,
 }
 
-/// An event that took place, by a reference.
+/// A reference event that took place, against which detections are scored.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reference {
-    /// What happened.
+    /// Kind of the event.
     pub label: String,
-    /// When, us of the board's clock.
+    /// Time of the event, us of the board's clock.
     pub t: i64,
 }

@@ -1,7 +1,8 @@
-//! Weights from examples: patterns of input spikes, and the times at which the neuron shall fire.
+//! Learns weights from examples: patterns of input spikes, and the times at which the neuron must fire.
 //!
-//! `statement` says once what the thesis' equations 6.9 to 6.14 ask of the weights; `engines` minimise over rows that they are
-//! handed; `cone` holds the learners CONE-X and CONE-R, `online` the window that slides; `rivals` the rules of others.
+//! `statement` defines the conditions of the thesis' equations 6.9 to 6.14 on the weights; `engines` solve the
+//! minimisation over given rows; `cone` contains the learners CONE-X and CONE-R, `online` the learner with a sliding
+//! window; `rivals` the rules of other authors.
 
 mod cone;
 mod engines;

@@ -1,8 +1,8 @@
 //! Distances between spike trains, and between patterns of many trains.
 //!
-//! A metric is a value of [`Metric`]; [`Metric::distance`] takes two patterns, [`Metric::pairwise`] makes matrices. A
-//! distance between two trains becomes one between patterns as the sum over trains of the same number; the metrics with
-//! `spatial` or `multi_unit` in their names know of the other trains themselves.
+//! A metric is a value of [`Metric`]; [`Metric::distance`] compares two patterns, [`Metric::pairwise`] computes
+//! matrices. A distance between two trains becomes one between patterns as the sum over trains of the same index; the
+//! metrics with `spatial` or `multi_unit` in their names compare different trains too.
 
 mod edges;
 mod law;
@@ -27,7 +27,8 @@ use crate::parameters::Described;
 use crate::reading::{self, Unfit};
 use crate::{Error, Result, Stop, problem};
 
-/// The registry: a line a metric, `NAME: Kind`, whose file is `metrics/NAME.rs` and whose name in JSON is `NAME`.
+/// The registry: one line per metric, `NAME: Kind`; the metric's file is `metrics/NAME.rs`, and its name in JSON is
+/// `NAME`.
 macro_rules! metrics {
     ($($(#[$about:meta])* $name:ident: $Kind:ident,)*) => {
         $(mod $name;)*
@@ -40,7 +41,7 @@ macro_rules! metrics {
             $($(#[$about])* $Kind($Kind),)*
         }
 
-        /// The names of all metrics, as JSON has them.
+        /// The names of all metrics, as in JSON.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
         impl Metric {
@@ -48,7 +49,7 @@ macro_rules! metrics {
                 match self { $(Self::$Kind(metric) => metric,)* }
             }
 
-            /// Reads the parameters of the metric of a name; none if there is none of that name.
+            /// Parses the parameters of the metric with this name; none if there is no such metric.
             fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
                 $(if name == stringify!($name) {
                     return Some(reading::from_value(parameters).map(Self::$Kind));
@@ -68,11 +69,11 @@ macro_rules! metrics {
     };
 }
 
-// Rustfmt finds no modules in a macro: the Makefile names their files to it.
+// Rustfmt does not find modules in a macro, so the Makefile passes it their files.
 metrics! {
-    /// The cheapest way to turn one train into the other.
+    /// The minimal cost of transforming one train into the other.
     victor_purpura: VictorPurpura,
-    /// The same where a spike may also change its train.
+    /// The minimal cost of the transformation if a spike may also change its train.
     victor_purpura_multi_unit: VictorPurpuraMultiUnit,
     /// Euclidean distance of trains smoothed by an exponential.
     van_rossum: VanRossum,
@@ -82,14 +83,14 @@ metrics! {
     van_rossum_spatial: VanRossumSpatial,
     /// Sum over taxels and time of the absolute difference of patterns smoothed in time and over the array.
     van_rossum_spatial_absolute: VanRossumSpatialAbsolute,
-    /// How much the intervals between spikes differ.
+    /// The difference between interspike intervals.
     isi_distance: IsiDistance,
-    /// How far spikes are from their nearest ones, over the intervals between spikes.
+    /// The distance of spikes from their nearest ones in the other train, relative to the interspike intervals.
     spike_distance: SpikeDistance,
 }
 
 impl Metric {
-    /// Reads a metric from JSON: an object whose `name` says which.
+    /// Parses a metric from JSON: an object whose `name` selects the metric.
     ///
     /// # Errors
     ///
@@ -103,7 +104,7 @@ impl Metric {
             let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
             return Err(problem!("metric is '{name}': must be one of {}", names.join(", ")));
         };
-        // A metric may hold another's parameters, whose reader would let unknown ones pass.
+        // A metric can contain another metric's parameters, whose deserialiser would accept unknown names.
         let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
         if let Some(unknown) = given.keys().find(|key| !known.contains(&key.as_str())) {
             return Err(problem!("{unknown}: {name} takes {}", known.join(", ")));
@@ -126,12 +127,12 @@ impl Metric {
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters or times that make no sense, or another number of trains; `Interrupted`.
+    /// `Problem` if parameters or times are not valid, or if the numbers of trains differ; `Interrupted`.
     pub fn distance(&self, a: &Patterns<'_>, b: &Patterns<'_>, stop: Stop<'_>) -> Result<f64> {
         self.prepare(a, Some(b))?.between((a, 0), (b, 0), stop)
     }
 
-    /// The distances of all patterns of `a` from all of `b`, row by row; without `b` from each other.
+    /// The distances of all patterns of `a` from all of `b`, row by row; without `b` the distances among those of `a`.
     ///
     /// # Errors
     ///
@@ -146,7 +147,7 @@ impl Metric {
         Ok(matrix.finish())
     }
 
-    /// Checks parameters and patterns; works out what all pairs share.
+    /// Checks parameters and patterns, and computes what all pairs share.
     fn prepare(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + '_>> {
         self.check()?;
         a.check()?;

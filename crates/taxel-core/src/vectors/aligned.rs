@@ -1,26 +1,26 @@
-//! Numbers on the border of a cache line.
+//! Arrays of numbers, aligned to cache lines.
 
 use super::eight::LANES;
 
-/// Bytes of a cache line.
+/// Size of a cache line, bytes.
 const LINE: usize = 64;
 
-/// Something that begins on a cache line's border.
+/// A value aligned to a cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct OnLine<T>(pub(crate) T);
 
-/// Numbers on a cache line's border, so that no vector straddles two lines.
+/// Numbers aligned to cache lines, so that no vector load crosses two lines.
 #[derive(Debug, Default)]
 pub(crate) struct Aligned {
-    /// With room before and behind, as the allocator knows no such border.
+    /// Padded at both ends, because the allocator does not align to cache lines.
     numbers: Vec<f64>,
     from: usize,
     len: usize,
 }
 
 impl Aligned {
-    /// Zeros, which take no memory from the machine until something is written there.
+    /// Zeros; the system allocates their memory only when it is written.
     pub(crate) fn zeros(len: usize) -> Self {
         let len = len.next_multiple_of(LANES);
         let numbers = vec![0.0; len + LANES];

@@ -1,9 +1,9 @@
-//! Eight numbers in the machine's registers.
+//! Vectors of eight numbers in registers.
 
-/// Numbers in a vector of the widest kind.
+/// Number of lanes in a vector of the widest kind.
 pub(crate) const LANES: usize = 8;
 
-/// Eight numbers in the machine's registers.
+/// A vector of eight numbers.
 pub(crate) trait Vector: Copy {
     fn splat(value: f64) -> Self;
     fn load(from: &[f64; LANES]) -> Self;
@@ -68,14 +68,14 @@ mod x86 {
 
     use super::{LANES, Vector};
 
-    /// A vector of AVX-512; made only in functions compiled for it.
+    /// A vector for AVX-512; constructed only in functions compiled for AVX-512.
     #[derive(Clone, Copy)]
     pub(crate) struct Zmm(__m512d);
 
     impl Vector for Zmm {
         #[inline(always)]
         fn splat(value: f64) -> Self {
-            // SAFETY: `kernel!` names this type only where the machine has AVX-512F.
+            // SAFETY: `kernel!` uses this type only if the machine has AVX-512F.
             Self(unsafe { _mm512_set1_pd(value) })
         }
         #[inline(always)]
@@ -120,14 +120,14 @@ mod x86 {
         }
     }
 
-    /// Two vectors of AVX2; made only in functions compiled for it.
+    /// Two vectors for AVX2; constructed only in functions compiled for AVX2.
     #[derive(Clone, Copy)]
     pub(crate) struct Ymm(__m256d, __m256d);
 
     impl Vector for Ymm {
         #[inline(always)]
         fn splat(value: f64) -> Self {
-            // SAFETY: `kernel!` names this type only where the machine has AVX2 and FMA.
+            // SAFETY: `kernel!` uses this type only if the machine has AVX2 and FMA.
             let one = unsafe { _mm256_set1_pd(value) };
             Self(one, one)
         }
@@ -182,13 +182,13 @@ mod x86 {
     }
 }
 
-/// Numbers by eights; what does not fill the last is left out.
+/// Splits numbers into groups of eight; the remainder is left out.
 #[inline(always)]
 pub(crate) fn lines(numbers: &[f64]) -> &[[f64; LANES]] {
     numbers.as_chunks().0
 }
 
-/// As [`lines`].
+/// As [`lines`], for writing.
 #[inline(always)]
 pub(crate) fn lines_mut(numbers: &mut [f64]) -> &mut [[f64; LANES]] {
     numbers.as_chunks_mut().0

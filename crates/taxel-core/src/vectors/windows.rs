@@ -1,18 +1,18 @@
-//! Short windows of numbers, read from many places at once.
+//! Reads short windows of numbers from many places at once.
 
-/// Windows in a row.
+/// Number of windows in a row.
 pub(crate) const ROW: usize = 16;
 
-/// Numbers in a window.
+/// Number of numbers in a window.
 pub(crate) const WIDE: usize = 4;
 
-/// Where windows of [`WIDE`] numbers begin in a slice, in rows.
+/// Start positions, in a slice, of windows of [`WIDE`] numbers, in rows of windows.
 ///
-/// How far they reach is known, so that reading asks once a row, not once a window.
+/// The largest end of all windows is stored, so that bounds are checked once per row instead of once per window.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Windows {
     starts: Vec<[u32; ROW]>,
-    /// No window ends behind this.
+    /// Largest end of any window.
     end: usize,
 }
 
@@ -23,28 +23,29 @@ impl Windows {
         self.starts.push(starts);
     }
 
-    /// Where those of a row begin.
+    /// The start positions of the windows of a row.
     pub(crate) fn starts(&self, row: usize) -> &[u32; ROW] {
         &self.starts[row]
     }
 
-    /// Where the windows of a row lie, all of which may be read.
+    /// Pointers to the windows of a row, all of which are within the slice.
     #[inline(always)]
     fn within(&self, row: usize, from: &[f32]) -> [*const f32; ROW] {
         assert!(self.end <= from.len(), "windows must lie within what they are read from");
-        // SAFETY: `push` saw that every window ends by `end`, which was just seen to be within `from`.
+        // SAFETY: `push` ensures that every window ends at or before `end`, and the assertion above that `end` is
+        // within `from`.
         self.starts[row].map(|start| unsafe { from.as_ptr().add(start as usize) })
     }
 
     /// Reads the windows of a row: the first number of each, the second of each, and so on.
     #[inline(always)]
     pub(crate) fn read(&self, row: usize, from: &[f32]) -> [[f32; ROW]; WIDE] {
-        // SAFETY: these windows may be read; an array of f32 may stand wherever an f32 may.
+        // SAFETY: the windows are within the slice, and `[f32; WIDE]` has the alignment of `f32`.
         let read = self.within(row, from).map(|at| unsafe { at.cast::<[f32; WIDE]>().read() });
         std::array::from_fn(|k| std::array::from_fn(|lane| read[lane][k]))
     }
 
-    /// As [`read`](Self::read), in 8 shuffles, where the compiler finds 16 and as many blends.
+    /// As [`read`](Self::read), with 8 shuffles; the compiler would use 16 shuffles and as many blends.
     #[cfg(target_arch = "x86_64")]
     #[inline]
     #[target_feature(enable = "avx512f")]
@@ -54,7 +55,7 @@ impl Windows {
         let at = self.within(row, from);
         let mut every_fourth = [_mm512_setzero_ps(); 4];
         for (k, windows) in every_fourth.iter_mut().enumerate() {
-            // SAFETY: these windows may be read, at any address.
+            // SAFETY: the windows are within the slice, and the loads need no alignment.
             let (a, b, c, d) = unsafe {
                 (_mm_loadu_ps(at[k]), _mm_loadu_ps(at[k + 4]), _mm_loadu_ps(at[k + 8]), _mm_loadu_ps(at[k + 12]))
             };
@@ -74,7 +75,7 @@ impl Windows {
         columns
     }
 
-    /// As [`read`](Self::read), in 16 shuffles of 256 bits.
+    /// As [`read`](Self::read), with 16 shuffles of 256 bits.
     #[cfg(target_arch = "x86_64")]
     #[inline]
     #[target_feature(enable = "avx2")]
@@ -84,7 +85,7 @@ impl Windows {
         let at = self.within(row, from);
         let mut columns = [[0.0; ROW]; WIDE];
         for half in [0, ROW / 2] {
-            // SAFETY: these windows may be read, at any address.
+            // SAFETY: the windows are within the slice, and the loads need no alignment.
             let [a, b, c, d] = std::array::from_fn(|k| unsafe {
                 let (early, late) = (_mm_loadu_ps(at[half + k]), _mm_loadu_ps(at[half + k + 4]));
                 _mm256_set_m128(late, early)
@@ -129,7 +130,7 @@ mod tests {
                 assert_eq!(unsafe { windows.read_avx512(row, &from) }, wanted);
             }
         }
-        // Any row is refused where one window of any row would lie outside.
+        // A row is refused if any window of any row would be outside.
         assert!(std::panic::catch_unwind(|| windows.read(0, &from[..20])).is_err());
     }
 }
