@@ -88,13 +88,14 @@ impl Feed {
         for (arrived_ns, bytes) in parcel.datagrams() {
             batch.push_arrived(offset.here_ns(arrived_ns), bytes);
         }
-        // The promise holds for callers that find the queue empty after this.
+        // The promise must be set after the datagrams are in the queue: callers that find it empty rely on it.
         self.queue.put(batch, u64::from(parcel.count > 0), 0);
         self.queue.promise(offset.here_ns(parcel.until_ns()));
         true
     }
 
-    /// Begins a session: the first one, or one after the bridge was restarted. The clocks are compared again.
+    /// Starts a session: the first one, or one after the bridge was restarted. The comparison of the clocks starts
+    /// again.
     pub fn begin_session(&self) {
         let mut state = lock(&self.state);
         if state.session.take().is_some() {

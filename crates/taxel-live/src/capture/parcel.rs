@@ -1,8 +1,8 @@
-//! The format in which datagrams are sent to other computers: unchanged, several in a parcel, with counts from which every loss is
-//! known.
+//! The format in which datagrams are sent to other computers: unchanged, several in a parcel, with counts that reveal
+//! every loss.
 //!
-//! All numbers are little-endian. The transport changes one field, the base time, so that tests can set the clocks of two computers
-//! apart; see docs/bridge.md.
+//! All numbers are little-endian. The transport changes one field, the base time, so that tests can offset the clocks
+//! of two computers; see docs/bridge.md.
 //!
 //! | bytes | field |
 //! |---|---|
@@ -51,7 +51,7 @@ pub(super) struct Parcel<'a> {
 }
 
 impl<'a> Parcel<'a> {
-    /// Reads a parcel; `None` where the bytes are not a whole parcel.
+    /// Parses a parcel; `None` if the bytes are not a whole parcel.
     pub(super) fn read(bytes: &'a [u8]) -> Option<Self> {
         let (head, body) = bytes.split_first_chunk::<HEADER>()?;
         let last = match head[4..8] {
@@ -118,11 +118,11 @@ pub struct Packer {
 }
 
 impl Packer {
-    /// Begins a session after this number of received datagrams.
+    /// Starts a session after this number of received datagrams.
     #[must_use]
     pub fn after(received: u64) -> Self {
         Self {
-            // A random number from the standard library.
+            // A random number; the standard library has no other source of randomness.
             session: RandomState::new().hash_one(std::process::id()),
             number: 0,
             base_ns: 0,
@@ -134,13 +134,14 @@ impl Packer {
         }
     }
 
-    /// How many datagrams wait.
+    /// Number of datagrams in the current parcel.
     #[must_use]
     pub fn waiting(&self) -> u32 {
         self.count
     }
 
-    /// Adds a datagram, with its number among those received; returns the previous parcel where the datagram does not fit into it.
+    /// Adds a datagram, with its number among those received; returns the previous parcel if the datagram does not fit
+    /// into it.
     pub fn push(&mut self, number: u64, arrived_ns: i64, bytes: &[u8], dropped_by_kernel: u64) -> Option<Vec<u8>> {
         let since = arrived_ns.checked_sub(self.base_ns).and_then(|since| i32::try_from(since).ok());
         let fits = self.next == number && since.is_some() && self.body.len() + bytes.len() <= FULL;
@@ -149,7 +150,7 @@ impl Packer {
         if self.count == 0 {
             (self.base_ns, self.before) = (arrived_ns, number);
         }
-        // The length of a datagram fits a u16, and the base time of a parcel that begins with it is its own.
+        // The length of a datagram fits in a u16, and a parcel's first datagram defines its base time.
         let length = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
         let since = i32::try_from(arrived_ns.saturating_sub(self.base_ns)).unwrap_or(0);
         self.body.extend_from_slice(&length.to_le_bytes());
@@ -184,7 +185,7 @@ impl Packer {
         parcel
     }
 
-    /// Counts the datagrams of a closed parcel that found no room in the queue as dropped.
+    /// Counts the datagrams of a closed parcel that did not fit in the queue as dropped.
     pub fn lost(&mut self, parcel: &[u8]) {
         self.dropped += Parcel::read(parcel).map_or(0, |parcel| u64::from(parcel.count));
     }

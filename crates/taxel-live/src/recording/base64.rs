@@ -14,7 +14,7 @@ pub(super) fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// Bytes of base64 with padding; `None` where it is none.
+/// Bytes of base64 with padding; `None` if it is none.
 pub(super) fn unbase64(text: &str) -> Option<Vec<u8>> {
     let digit = |c: u8| match c {
         b'A'..=b'Z' => Some(c - b'A'),

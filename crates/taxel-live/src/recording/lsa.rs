@@ -37,7 +37,7 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// As [`OutputFile::open`]; `File` where its `.lss` exists (and `overwrite` is not set).
+    /// As [`OutputFile::open`]; `File` if its `.lss` exists (and `overwrite` is not set).
     pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
         Self::begin(Self::reserve(path, overwrite)?)
     }
@@ -59,7 +59,7 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// `File` where it, or an earlier `.lss`, cannot be replaced.
+    /// `File` if it, or an earlier `.lss`, cannot be replaced.
     pub(crate) fn begin(file: OutputFile) -> Result<Self> {
         file.begin()?;
         let done = done(file.path());
@@ -78,7 +78,7 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone.
+    /// `File` if the disk is full or gone.
     pub fn bytes(&mut self, bytes: &[u8]) -> Result<()> {
         self.bytes += bytes.len() as u64;
         let outcome = self.out.write_all(bytes);
@@ -89,7 +89,7 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone.
+    /// `File` if the disk is full or gone.
     pub fn flush(&mut self) -> Result<()> {
         let outcome = self.out.flush();
         outcome.map_err(|error| Error::file(self.path())(error))
@@ -99,7 +99,7 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone, or the file was removed, renamed or replaced while it was written.
+    /// `File` if the disk is full or gone, or the file was removed, renamed or replaced while it was written.
     pub fn end(&mut self) -> Result<()> {
         self.flush()?;
         let file = &self.out.get_ref().0;
@@ -122,7 +122,7 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// `File` where the file cannot be removed.
+    /// `File` if the file cannot be removed.
     pub(crate) fn discard(self) -> Result<()> {
         let (file, _) = self.out.into_parts();
         file.0.discard()
@@ -146,7 +146,7 @@ pub struct DecodedLsa {
 ///
 /// # Errors
 ///
-/// `File` where it cannot be read; `Core` (format) where it holds datagrams of version 2; `Core(Interrupted)` where asked to
+/// `File` if it cannot be read; `Core` (format) if it holds datagrams of version 2; `Core(Interrupted)` if asked to
 /// stop.
 pub fn decode_lsa(
     path: &Path,

@@ -127,7 +127,7 @@ impl Reader {
     ///
     /// # Errors
     ///
-    /// `File` where it cannot be read; `Core` (format) where it is no MCAP file, or not one of ours.
+    /// `File` if it cannot be read; `Core` (format) if it is no MCAP file, or not one of ours.
     pub fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(Error::file(path))?;
         let length = file.metadata().map_err(Error::file(path))?.len();
@@ -157,7 +157,7 @@ impl Reader {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where there is none of that name.
+    /// `Core(Problem)` if there is none of that name.
     pub fn of_source(&self, name: &str) -> Result<Self> {
         let Some(source) = self.sources().position(|known| known == name) else {
             let known: Vec<&str> = self.sources().collect();
@@ -195,7 +195,7 @@ impl Reader {
     ///
     /// # Errors
     ///
-    /// `File` where the file cannot be read, `Core` where `take` returns that or the caller stops.
+    /// `File` if the file cannot be read, `Core` if `take` returns that or the caller stops.
     pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<u64> {
         let (mut place, mut bad) = (Place::default(), 0);
         for block in 0..self.blocks() {
@@ -299,7 +299,7 @@ impl Reader {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the source is a board; else as [`Reader::messages`].
+    /// `Core(Problem)` if the source is a board; else as [`Reader::messages`].
     pub fn samples(&self, stop: Stop<'_>) -> Result<Samples> {
         let Some(stream) = &self.header().stream else {
             return Err(problem!("source {}: a board has no samples", self.header().name).into());

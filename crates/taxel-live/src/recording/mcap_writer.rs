@@ -67,7 +67,7 @@ impl Writer {
     ///
     /// # Errors
     ///
-    /// As [`OutputFile::open`]; `File` where the file cannot be written; `Core(Problem)` for sources that make no sense.
+    /// As [`OutputFile::open`]; `File` if the file cannot be written; `Core(Problem)` for sources that make no sense.
     pub fn create(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
         header.check()?;
         let writer = Self::plan(OutputFile::open(path, options.overwrite)?, header, options.compression, false);
@@ -116,7 +116,7 @@ impl Writer {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the header named none of that name.
+    /// `Core(Problem)` if the header named none of that name.
     pub fn track(&self, name: &str) -> Result<Track> {
         let named = self.header.sources.iter().position(|source| source.name == name);
         let Some(k) = named else {
@@ -144,7 +144,7 @@ impl Writer {
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone: the file keeps everything that was written before; or where the file was removed,
+    /// `File` if the disk is full or gone: the file keeps everything that was written before; or if the file was removed,
     /// renamed or replaced while it was written, with what is lost.
     pub fn finish(self, counts: Counts) -> Result<Counts> {
         self.begin(self.header.origin_us)?;
@@ -156,7 +156,7 @@ impl Writer {
     ///
     /// # Errors
     ///
-    /// `File` where the file cannot be removed.
+    /// `File` if the file cannot be removed.
     pub fn discard(self) -> Result<()> {
         self.track.queue.abandon().map_or(Ok(()), OutputFile::discard)
     }
@@ -168,7 +168,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the source is no stream, or has other columns; else as [`Track::datagram`].
+    /// `Core(Problem)` if the source is no stream, or has other columns; else as [`Track::datagram`].
     pub fn sample(&self, arrived_ns: i64, number: u64, values: &[f64]) -> Result<()> {
         let Some(stream) = self.stream.as_ref().filter(|stream| stream.takes(values)) else {
             let n = self.stream.as_ref().map_or(0, |stream| stream.columns.len());
@@ -197,7 +197,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// `File` where an earlier write failed: the disk is full, or gone. `Core` where the bytes are more than a datagram
+    /// `File` if an earlier write failed: the disk is full, or gone. `Core` if the bytes are more than a datagram
     /// can be.
     pub fn datagram(&self, arrived_ns: i64, number: u64, bytes: &[u8]) -> Result<()> {
         self.datagram_at_most(arrived_ns, number, bytes, QUEUE_BYTES)
@@ -214,7 +214,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where columns differ in length or name bytes that are not there; else as [`Track::datagram`].
+    /// `Core(Problem)` if columns differ in length or name bytes that are not there; else as [`Track::datagram`].
     pub fn datagrams(&self, arrived_ns: &[i64], number: &[u64], offsets: &[i64], bytes: &[u8]) -> Result<()> {
         if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
             let n = arrived_ns.len();
@@ -316,7 +316,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`]; `Core` where `ticks` are not rows of `columns`.
+    /// As [`Track::datagram`]; `Core` if `ticks` are not rows of `columns`.
     pub fn picture(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16]) -> Result<()> {
         let columns = usize::from(columns);
         if columns == 0 || ticks.is_empty() || !ticks.len().is_multiple_of(columns) {

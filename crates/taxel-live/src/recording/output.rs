@@ -25,7 +25,7 @@ impl OutputFile {
     ///
     /// # Errors
     ///
-    /// `File` where the file exists (and `overwrite` is not set), cannot be created or written, or is being recorded by another
+    /// `File` if the file exists (and `overwrite` is not set), cannot be created or written, or is being recorded by another
     /// program, or by another part of this one.
     pub fn open(path: &Path, overwrite: bool) -> Result<Self> {
         if overwrite {
@@ -68,7 +68,7 @@ impl OutputFile {
     ///
     /// # Errors
     ///
-    /// `File` where the system refuses.
+    /// `File` if the system refuses.
     pub fn begin(&self) -> Result<()> {
         // A device has no length.
         let is_file = self.file.metadata().map_err(Error::file(&self.path))?.is_file();
@@ -95,7 +95,7 @@ impl OutputFile {
     ///
     /// # Errors
     ///
-    /// `File` where the file was removed, renamed or replaced: what was written is lost.
+    /// `File` if the file was removed, renamed or replaced: what was written is lost.
     pub fn check(&self, written: impl FnOnce() -> String) -> Result<()> {
         if self.is_in_place()? {
             return Ok(());
@@ -108,7 +108,7 @@ impl OutputFile {
     ///
     /// # Errors
     ///
-    /// `File` where the system refuses.
+    /// `File` if the system refuses.
     pub fn discard(self) -> Result<()> {
         if self.new && self.is_in_place()? {
             std::fs::remove_file(&self.path).map_err(Error::file(&self.path))?;

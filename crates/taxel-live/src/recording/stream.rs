@@ -80,7 +80,7 @@ impl Stream {
         values.len() == self.columns.len()
     }
 
-    /// The numbers of a line of text, separated by commas, semicolons, tabs or blanks; `None` where one is none, or there are
+    /// The numbers of a line of text, separated by commas, semicolons, tabs or blanks; `None` if one is none, or there are
     /// not as many as columns.
     #[must_use]
     pub fn parse(&self, line: &str) -> Option<Vec<f64>> {
