@@ -178,8 +178,8 @@ impl Emulator {
     ///
     /// # Errors
     ///
-    /// `Socket` if the control port is taken, `File` if line or sync line cannot be had; `Core(Problem)` if the
-    /// schedule does not ascend, or a fault, flaw, drift or reset makes no sense.
+    /// `Socket` if the control port is in use, `File` if the serial line or the sync line cannot be opened;
+    /// `Core(Problem)` if the schedule does not ascend, or if a fault, flaw, drift or reset is out of range.
     pub fn open(board: Board, array: &Array, options: EmulatorOptions) -> Result<Self> {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
             return Err(taxel_core::problem!("command {}: its frame lies before that of command {k}", k + 1).into());

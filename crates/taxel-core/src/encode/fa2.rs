@@ -15,14 +15,13 @@ use crate::{Array, Result};
 /// The FA-2 afferent (Pacini): silent while pressure is constant or changes slowly; one spike per cycle at 200 to 250
 /// Hz.
 ///
-/// Two high-pass filters with `corner_ms` and a low-pass filter with `membrane_ms`: `u =
-/// lowpass(highpass(highpass(x)))`, where x is the pressure as a fraction of `range`. Thresholds therefore fall by 12
-/// dB per octave up to the best frequency, as those of the Pacinian channel do (Bolanowski et al. 1988, J. Acoust. Soc.
-/// Am. 84:1680). The threshold adapts as that of [`Sa1`](super::Sa1). We fitted `corner_ms`, `membrane_ms`, `jump` and
-/// `recovery_ms` so that the amplitude for one spike per cycle is least between 200 and 250 Hz. `threshold` is limited
-/// by the sensor: a step of one tick in 150 stays below it; a finger is far more sensitive. Pressure below 0 counts as
-/// 0. One unsigned train per taxel, at most one spike per sample. The initial state is that of a constant input equal
-/// to the first sample.
+/// Two high-pass filters with `corner_ms` and a low-pass filter with `membrane_ms`, for x the pressure as a fraction of
+/// `range`: `u = lowpass(highpass(highpass(x)))`. Thresholds therefore fall by 12 dB per octave up to the best
+/// frequency, as those of the Pacinian channel do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). The threshold
+/// adapts as that of [`Sa1`](super::Sa1). We fitted `corner_ms`, `membrane_ms`, `jump` and `recovery_ms` so that the
+/// amplitude for one spike per cycle is least between 200 and 250 Hz. `threshold` is limited by the sensor: a step of
+/// one tick in 150 stays below it; a finger is far more sensitive. Negative pressure counts as 0. One unsigned train
+/// per taxel, at most one spike per sample. The initial state is that of a constant input equal to the first sample.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fa2 {

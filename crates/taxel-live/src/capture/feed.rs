@@ -45,7 +45,7 @@ impl Feed {
         Self { queue, state: Arc::default() }
     }
 
-    /// Queues the datagrams of a parcel. Returns false, and does nothing, where the parcel begins a session and
+    /// Queues the datagrams of a parcel. Returns false without any effect if the parcel begins a session and
     /// [`Feed::begin_session`] was not called for it.
     ///
     /// Parcels that cannot be read, and repeated ones, are counted and ignored.

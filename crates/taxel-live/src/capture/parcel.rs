@@ -8,17 +8,18 @@
 //! |---|---|
 //! | 0-3 | `TXLP` |
 //! | 4 | 1, the version of this format |
-//! | 5 | 1 where it is the last of its session, else 0 |
+//! | 5 | 1 if it is the last parcel of its session, otherwise 0 |
 //! | 6-7 | 0 |
-//! | 8-15 | session: another one each time a bridge begins |
+//! | 8-15 | session: a random number, drawn each time a bridge starts |
 //! | 16-23 | number of this parcel in its session, from 0 |
 //! | 24-31 | base time, ns since 1970 of the computer that the board sends to |
-//! | 32-35 | until, ns from the base (signed): nothing that arrived before it follows |
-//! | 36-39 | how many datagrams |
-//! | 40-47 | how many datagrams that computer had received before them |
-//! | 48-55 | how many of those it dropped, its queues being full |
-//! | 56-63 | how many messages its kernel had dropped |
-//! | 64... | each datagram: its length (u16), when it arrived in ns from the base (i32), its bytes |
+//! | 32-35 | until, ns from the base (signed): every datagram that arrived before it is in this parcel or an earlier
+//! one |
+//! | 36-39 | number of datagrams |
+//! | 40-47 | number of datagrams that the computer had received before them |
+//! | 48-55 | number of those that it dropped because its queues were full |
+//! | 56-63 | number of messages that its kernel had dropped |
+//! | 64... | each datagram: its length (u16), its arrival time in ns from the base (i32), its bytes |
 
 use std::hash::{BuildHasher, RandomState};
 

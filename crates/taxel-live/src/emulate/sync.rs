@@ -41,7 +41,7 @@ impl Sync {
         Ok(sync)
     }
 
-    /// Writes the level of the line at a time of the board, us, where it has changed.
+    /// Writes the level of the line at a time of the board, us, if it has changed.
     pub(super) fn follow(&mut self, time_us: f64, high: bool) {
         if high != self.high {
             self.high = high;

@@ -140,8 +140,8 @@ impl Writer {
         self.track.queue.lock().recorded.iter().any(|&n| n > 0)
     }
 
-    /// Ends the recording with the counts of the first source, to which it adds the verdict, and returns them; the
-    /// other sources must have ended before ([`Track::end`]).
+    /// Ends the recording with the counts of the first source and the verdict; returns the final counts. The other
+    /// sources must have ended before ([`Track::end`]).
     ///
     /// The file is synced to the disk when this returns.
     ///

@@ -11,8 +11,8 @@ impl Decoder {
     ///
     /// # Errors
     ///
-    /// `Problem` if a column has fewer entries than [`Self::most_rows`] asks for, and nothing was read; `Interrupted`
-    /// where asked to stop.
+    /// `Problem` if a column has fewer entries than [`Self::most_rows`] requires, in which case nothing is read;
+    /// `Interrupted` if asked to stop.
     pub fn fill(
         &mut self,
         bytes: &[u8],
