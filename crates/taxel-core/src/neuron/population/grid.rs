@@ -20,7 +20,7 @@ pub(super) struct Script {
     step: Step,
     /// The share of a threshold rise that remains after one step.
     fade: f64,
-    keeps_all: bool,
+    all_hear: bool,
 }
 
 struct Point {
@@ -49,14 +49,14 @@ impl Lanes {
 
     /// Adds inputs one after the other; if `now` is given, all of them arrive at that time.
     #[inline(always)]
-    fn add_inputs<W: Weight>(&mut self, block: &[[W; LANES]], inputs: &[Input], now: Option<f64>, keeps_all: bool) {
+    fn hear<W: Weight>(&mut self, block: &[[W; LANES]], inputs: &[Input], now: Option<f64>, all_hear: bool) {
         // Local copies, so that the compiler keeps the sums in registers.
         let (mut a, mut b) = (self.a, self.b);
-        let gain = now.map(|now| self.input_gain(now));
+        let hears = now.map(|now| self.hears(now));
         for input in inputs {
             let weights = &block[input.train as usize];
             let one = input.one;
-            match (keeps_all, &gain) {
+            match (all_hear, &hears) {
                 (true, _) if one.b == 0.0 => {
                     for l in 0..LANES {
                         a[l] += weights[l].into() * one.a;
@@ -69,15 +69,15 @@ impl Lanes {
                         b[l] += w * one.b;
                     }
                 }
-                (false, Some(gain)) if one.b == 0.0 => {
+                (false, Some(hears)) if one.b == 0.0 => {
                     for l in 0..LANES {
-                        a[l] += weights[l].into() * one.a * gain[l];
+                        a[l] += weights[l].into() * one.a * hears[l];
                     }
                 }
-                (false, gain) => {
-                    let gain = gain.unwrap_or_else(|| self.input_gain(input.t));
+                (false, hears) => {
+                    let hears = hears.unwrap_or_else(|| self.hears(input.t));
                     for l in 0..LANES {
-                        let w = weights[l].into() * gain[l];
+                        let w = weights[l].into() * hears[l];
                         a[l] += w * one.a;
                         b[l] += w * one.b;
                     }
@@ -124,7 +124,7 @@ impl Script {
             grid,
             step: shape.step(step_ms),
             fade: (-step_ms / neuron.tau_rec()).exp(),
-            keeps_all: neuron.after_spike == AfterSpike::Keep,
+            all_hear: neuron.after_spike == AfterSpike::Keep,
             points,
             inputs,
         })
@@ -190,7 +190,7 @@ wide! {
         if let Some(from) = from {
             let point = &script.points[from];
             next = point.arriving_end;
-            lanes.add_inputs(block, &script.inputs[point.aged_end..next], Some(point.t), script.keeps_all);
+            lanes.hear(block, &script.inputs[point.aged_end..next], Some(point.t), script.all_hear);
         }
         for (k, point) in script.points.iter().enumerate().skip(from.map_or(0, |from| from + 1)) {
             for l in 0..LANES {
@@ -199,7 +199,7 @@ wide! {
                 lanes.b[l] = b * bb + a * ba;
                 lanes.rise[l] *= script.fade;
             }
-            lanes.add_inputs(block, &script.inputs[next..point.aged_end], None, script.keeps_all);
+            lanes.hear(block, &script.inputs[next..point.aged_end], None, script.all_hear);
             let mut any = false;
             for l in 0..LANES {
                 any |= may_matter(lanes, l, point.t, floor);
@@ -210,7 +210,7 @@ wide! {
                 }
                 return Some(k);
             }
-            lanes.add_inputs(block, &script.inputs[point.aged_end..point.arriving_end], Some(point.t), script.keeps_all);
+            lanes.hear(block, &script.inputs[point.aged_end..point.arriving_end], Some(point.t), script.all_hear);
             next = point.arriving_end;
         }
         None
