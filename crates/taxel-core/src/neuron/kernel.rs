@@ -29,8 +29,8 @@ pub struct Shape {
 
 /// The state of a weighted sum of kernels without further input.
 ///
-/// Advancing this state neither overflows nor loses digits after a long time, unlike the closed form `e^{-t/tau} (A
-/// t/tau - B)`.
+/// Advancing this state neither overflows nor loses digits after a long time, unlike the closed form
+/// `e^{-t/tau} (A t/tau - B)`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct KernelSum {
     /// The decayed sum of the weights, which drives the potential, mV; unused if an input makes the potential itself
