@@ -25,9 +25,9 @@ pub struct Tally {
     pub false_: Vec<usize>,
     /// The number of false detections within the window of a reference event: the thesis' false positives.
     pub false_near: usize,
-    /// Detection minus reference, one a pair, ms; negative is early.
+    /// Detection minus reference, one per pair, ms; negative is early.
     pub errors_ms: Vec<f64>,
-    /// `known` minus reference, one a pair, ms.
+    /// `known` minus reference, one per pair, ms.
     pub delays_ms: Vec<f64>,
 }
 

@@ -13,6 +13,6 @@ pub struct TrainedNeuron {
     /// The delay after the event at which the neuron was trained to fire, in addition to the encoder's latency, ms.
     #[serde(default)]
     pub delay_ms: f64,
-    /// One weight a train of the encoder, mV; for signed spikes all ON trains first, then all OFF trains.
+    /// One weight per train of the encoder, mV; for signed spikes all ON trains first, then all OFF trains.
     pub weights: Vec<f64>,
 }

@@ -80,7 +80,7 @@ pub enum Left {
 pub struct Fit {
     /// How the fit ended.
     pub status: Status,
-    /// The weights, mV, one a train; NaN if there are none.
+    /// The weights, mV, one per train; NaN if there are none.
     pub weights: Vec<f64>,
     /// The value of 6.14 (of 6.11 for CONE-X) at these weights; infinite if there are none.
     pub objective: f64,

@@ -143,7 +143,7 @@ impl StdpNeuron {
         })
     }
 
-    /// The weights, one a train.
+    /// The weights, one per train.
     #[must_use]
     pub fn weights(&self) -> &[f64] {
         &self.weights
@@ -153,7 +153,7 @@ impl StdpNeuron {
     ///
     /// # Errors
     ///
-    /// `Problem` if the weights are not one a train, from 0 to 1.
+    /// `Problem` if the weights are not one per train, from 0 to 1.
     pub fn set_weights(&mut self, weights: &[f64]) -> Result<()> {
         one_weight_a_train(weights, self.weights.len())?;
         if let Some(n) = weights.iter().position(|w| !(0.0..=1.0).contains(w)) {

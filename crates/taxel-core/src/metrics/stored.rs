@@ -1,4 +1,4 @@
-//! Exponentials computed once a spike, so that comparing a pair of smoothed trains takes a few multiplications a spike.
+//! Exponentials computed once per spike, so that comparing two smoothed trains takes a few multiplications per spike.
 //!
 //! The inner product of two trains smoothed by `exp(-t / tau)` is, in units of tau / 2, the sum of `exp(-|s - t| / tau)`
 //! over their spikes s and t (Houghton and Kreuz 2012). For one spike t of the second that is

@@ -22,11 +22,11 @@ enum Script {
 }
 
 impl Neuron {
-    /// The output spikes of many neurons to the same trains, one train a neuron.
+    /// The output spikes of many neurons to the same trains, one train per neuron.
     ///
     /// The spikes equal those of [`Neuron::run`] with each neuron's weights. `weights` lists the weights by neuron, one
-    /// a train.
-    /// Cost: a few operations an input spike and neuron.
+    /// per train.
+    /// Cost: a few operations per input spike and neuron.
     ///
     /// # Errors
     ///

@@ -1,6 +1,6 @@
 //! Compaction of selected 16-bit lanes to the front of a vector, for machines without an instruction for it.
 
-/// For each selection of eight 16-bit lanes (one bit a lane) the byte indices for `pshufb`: the selected lanes in
+/// For each selection of eight 16-bit lanes (one bit per lane) the byte indices for `pshufb`: the selected lanes in
 /// order, then the last selected lane repeated; for an empty selection, zeros.
 pub(crate) static TO_FRONT: [[u8; 16]; 256] = {
     let mut out = [[0x80; 16]; 256];

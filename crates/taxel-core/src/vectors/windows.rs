@@ -8,7 +8,7 @@ pub(crate) const WIDE: usize = 4;
 
 /// The start positions of windows of [`WIDE`] numbers in a slice, in rows of [`ROW`].
 ///
-/// The furthest end is stored, so that a read checks its bounds once a row, not once a window.
+/// The furthest end is stored, so that a read checks its bounds once per row, not once per window.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Windows {
     starts: Vec<[u32; ROW]>,

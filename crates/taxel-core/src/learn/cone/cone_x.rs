@@ -39,9 +39,9 @@ pub struct ConeX {
     /// `lambda_1` to `lambda_3`: the factors of l1, l2 and B; only their ratios matter. All 0: any weights that satisfy
     /// the rows.
     pub lambdas: [f64; 3],
-    /// Least weight, mV, one for all or one a synapse.
+    /// Least weight, mV, one for all or one per synapse.
     pub lb: Bound,
-    /// Largest weight, mV, one for all or one a synapse.
+    /// Largest weight, mV, one for all or one per synapse.
     pub ub: Bound,
     /// The normaliser of B.
     pub divide_b_by: Divisor,
@@ -50,10 +50,10 @@ pub struct ConeX {
     /// The distance that silence must keep below the threshold, mV; by default `theta_0` / 300 in continuous time, 0 on
     /// the grid.
     pub margin: Option<f64>,
-    /// The slope with which that margin falls to 0 towards a target, mV/ms; continuous time only, by default `theta_0`
-    /// / 300 a ms.
+    /// The slope with which that margin falls to 0 towards a target, mV/ms; continuous time only, by default
+    /// `theta_0` / 300 per ms.
     pub slope: Option<f64>,
-    /// The end of silence, ms, one for all or one a pattern; by default the later of a pattern's end and its last
+    /// The end of silence, ms, one for all or one per pattern; by default the later of a pattern's end and its last
     /// target + `tau`.
     pub horizon: Option<Horizon>,
     /// The relative gap between objective and proven bound at which a fit counts as solved.
@@ -68,7 +68,7 @@ pub struct ConeX {
 pub enum Horizon {
     /// The same in all patterns.
     All(f64),
-    /// One a pattern.
+    /// One per pattern.
     Each(Vec<f64>),
 }
 

@@ -53,7 +53,7 @@ struct Lagrangian<'a> {
     behind: Vec<f64>,
     /// The multipliers as shares: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
     shares: Vec<f64>,
-    /// The multipliers of l1 and of the bounds, one a synapse.
+    /// The multipliers of l1 and of the bounds, one per synapse.
     held: Vec<f64>,
     /// The weights at the beginning of the round, the centre of the proximal term.
     centre: Vec<f64>,

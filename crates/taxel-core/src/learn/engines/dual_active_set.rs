@@ -71,7 +71,7 @@ pub struct DualActiveSet {
     free: Vec<usize>,
     /// Slots whose products are still to be computed.
     fresh: Vec<usize>,
-    /// The products of rows by slot and slot, `gram_stride` numbers a row.
+    /// The products of rows by slot and slot, `gram_stride` numbers per row.
     gram: Aligned,
     gram_stride: usize,
     /// The slots of the active rows in the order of the factor, and the place of each slot in that order.

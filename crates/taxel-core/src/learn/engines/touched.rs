@@ -15,7 +15,7 @@ const NEARLY_MET: f64 = 1e-3;
 const BELOW: f64 = 1e-9;
 /// The share of the tolerance that this step may use; the rest is left for a later fit that starts here.
 const SPARED: f64 = 0.3;
-/// If the optimum touches more rows a synapse than this, they are left as they are.
+/// If the optimum touches more rows per synapse than this, they are left as they are.
 const MOST_TOUCHED: usize = 4;
 
 impl Relaxed {

@@ -1,4 +1,4 @@
-//! Bounds on the weights: the same for all synapses, or one a synapse.
+//! Bounds on the weights: the same for all synapses, or one per synapse.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use crate::{Result, problem};
 pub enum Bound {
     /// The same for all synapses.
     All(f64),
-    /// One a synapse.
+    /// One per synapse.
     Each(Vec<f64>),
 }
 
@@ -54,9 +54,9 @@ impl Bound {
 /// The lower and upper bounds of all weights, mV.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
-    /// The lower bounds, one a train.
+    /// The lower bounds, one per train.
     pub lower: Vec<f64>,
-    /// The upper bounds, one a train.
+    /// The upper bounds, one per train.
     pub upper: Vec<f64>,
 }
 

@@ -3,7 +3,7 @@
 use crate::neuron::Neuron;
 use crate::{Result, SpikeTrains, problem};
 
-/// Checks the arguments of every learner: one list of targets (ms, ascending) a pattern, and the same trains in each
+/// Checks the arguments of every learner: one list of targets (ms, ascending) per pattern, and the same trains in each
 /// pattern.
 ///
 /// # Errors

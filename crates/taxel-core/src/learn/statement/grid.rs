@@ -1,8 +1,8 @@
 //! Silence on the grid (6.9b): the potential at every grid point, and its limit there.
 //!
 //! Silent rows are never stored: one sweep over the grid computes the potential at all points (the kernel needs two
-//! numbers a pattern), and one backward sweep computes a weighted sum of all rows. CONE-X searches for points at which
-//! silence is violated, CONE-R sums the violations.
+//! numbers per pattern), and one backward sweep computes a weighted sum of all rows. CONE-X searches for points at
+//! which silence is violated, CONE-R sums the violations.
 
 use super::peak::{Peak, exceeds};
 use super::rows::{Example, Statement, lost};
@@ -265,7 +265,7 @@ impl SilentRows {
         }
     }
 
-    /// Adds the sum of all rows, each times its factor, to `sum` (one entry a train); the adjoint of `potential`.
+    /// Adds the sum of all rows, each times its factor, to `sum` (one entry per train); the adjoint of `potential`.
     pub(crate) fn add_sum(&self, factors: &[f64], sum: &mut [f64]) {
         if let Some(written) = &self.written {
             let rows = factors.iter().zip(written.chunks_exact(self.trains));

@@ -184,7 +184,7 @@ impl Point {
     }
 }
 
-/// The data of the tangents below 6.14: weights, their rows' excess, one multiplier a row, and the pull of the norm.
+/// The data of the tangents below 6.14: weights, their rows' excess, one multiplier per row, and the pull of the norm.
 pub(crate) struct Tangents<'a> {
     pub(crate) weights: &'a [f64],
     pub(crate) excess: &'a [f64],

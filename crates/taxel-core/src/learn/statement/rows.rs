@@ -48,7 +48,7 @@ pub enum Row {
 /// A computed row: `coefficients.w = limit` at a target, `<= limit` otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
-    /// One a train: those of the potential at targets and in silence, those of its negated slope in a slope row.
+    /// One per train: those of the potential at targets and in silence, those of its negated slope in a slope row.
     pub coefficients: Vec<f64>,
     /// The limit, mV; mV/ms in a slope row.
     pub limit: f64,
@@ -264,7 +264,7 @@ impl Statement {
         Ok(Stated { coefficients, limit })
     }
 
-    /// Computes a row's `coefficients`, one a train, and returns its limit.
+    /// Computes a row's `coefficients`, one per train, and returns its limit.
     pub(crate) fn state_into(&self, row: Row, coefficients: &mut [f64]) -> Result<f64> {
         match row {
             Row::Target { pattern, target } => {
@@ -307,7 +307,7 @@ impl Statement {
         Ok(Stated { coefficients, limit })
     }
 
-    /// Computes the row of B in `coefficients`, one a train, and returns the threshold.
+    /// Computes the row of B in `coefficients`, one per train, and returns the threshold.
     pub(crate) fn behind_into(
         &self,
         pattern: usize,
@@ -418,7 +418,7 @@ impl Statement {
         let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
         let (mut at, mut one) = (f64::NAN, 0.0);
         for &(s, train) in &inputs[from..] {
-            // With times in whole ms, many inputs share a time: the exponential is computed once a time.
+            // With times in whole ms, many inputs share a time: the exponential is computed once per time.
             if s != at {
                 at = s;
                 one = if lost(&self.neuron, earlier, s, t) {

@@ -27,7 +27,7 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// Stores `trains`, at least one and at most one a lane; the last one also fills the remaining lanes.
+    /// Stores `trains`, at least one and at most one per lane; the last one also fills the remaining lanes.
     pub(super) fn new(lanes: usize, trains: &[&[f64]]) -> Self {
         let lane = |l: usize| trains[l.min(trains.len() - 1)];
         let longest = (0..lanes).map(|l| lane(l).len()).max().unwrap_or(0);

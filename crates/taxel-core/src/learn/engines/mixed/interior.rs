@@ -1,7 +1,7 @@
 //! A primal-dual interior-point method (Mehrotra's predictor-corrector) for the mixed objective.
 //!
 //! With an l1 term, a weight whose bounds have opposite signs is the difference of two *parts*, each between 0 and its
-//! bound; elimination leaves one diagonal entry a synapse. The norm is one second-order cone with Nesterov-Todd
+//! bound; elimination leaves one diagonal entry per synapse. The norm is one second-order cone with Nesterov-Todd
 //! scaling, which adds a multiple of the identity and a rank-one matrix to the Newton matrix; its length is eliminated
 //! as well. Each iteration therefore takes the Cholesky factors of one matrix over synapses and one over equality rows.
 
