@@ -52,7 +52,7 @@ impl Neuron {
         Ok(out)
     }
 
-    /// Advances a stream on a grid to just before `to`, checking for Ctrl-C; the caller advances the rest.
+    /// Advances a stream on a grid towards `to` in pieces, checking for Ctrl-C; the caller advances the last piece.
     fn advance(
         &self,
         stream: &mut NeuronStream,

@@ -135,8 +135,8 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
     }
     if neuron.first_threshold == FirstThreshold::Printed {
         let rise = example.start + neuron.refractory;
-        // The lower threshold applies up to the start of the printed rise, whose time the neuron computes with
-        // rounding.
+        // Silence below the lower threshold is required up to slightly before the printed rise, because the neuron
+        // rounds the time at which this rise starts.
         times.extend([rise - 2.0 * rounding_ms(rise), rise]);
     }
     times.retain(|&t| example.start <= t && t <= example.end);
