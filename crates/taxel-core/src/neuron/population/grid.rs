@@ -1,4 +1,4 @@
-//! A block on a grid: from point to point.
+//! A block of neurons on a grid: advances from point to point.
 
 use super::lanes::{FADED, LANES, LOOK, Lanes, SLACK, Weight};
 use crate::neuron::kernel::{KernelSum, Step};
@@ -9,37 +9,37 @@ use crate::neuron::threshold::Threshold;
 use crate::vectors::wide;
 use crate::{Result, SpikeTrains, Stop};
 
-/// What all neurons have in common: the grid and its inputs.
+/// The grid and the inputs at its points, shared by all neurons.
 pub(super) struct Script {
     threshold: Threshold,
     grid: Grid,
-    /// The base of the threshold, less the rounding of the bound, mV.
+    /// The base of the threshold minus the rounding error of the bound, mV.
     floor: f64,
     points: Vec<Point>,
     inputs: Vec<Input>,
     step: Step,
-    /// What a step leaves of a rise.
+    /// The share of a threshold rise that remains after one step.
     fade: f64,
     all_hear: bool,
 }
 
 struct Point {
     t: f64,
-    /// Inputs since the point before end here ...
+    /// The inputs after the preceding point and before this one end before this index.
     aged_end: usize,
-    /// ... and those at the point itself here: they move nothing before it is left.
+    /// The inputs exactly at the point end before this index; they change the potential only after it.
     arriving_end: usize,
 }
 
 struct Input {
     train: u32,
     t: f64,
-    /// What a weight of 1 has become at the point.
+    /// The state that an input of weight 1 has reached at the point.
     one: KernelSum,
 }
 
 impl Lanes {
-    /// The rise sets in where it is time.
+    /// Starts the decay of the threshold rise if the refractory time has ended by `t`.
     fn recover(&mut self, lane: usize, threshold: &Threshold, t: f64) {
         if self.edge[lane] <= t + rounding_ms(t) {
             self.edge[lane] = f64::INFINITY;
@@ -47,10 +47,10 @@ impl Lanes {
         }
     }
 
-    /// Adds inputs one after the other; all of them come at `now`, where it is given.
+    /// Adds inputs one after the other; if `now` is given, all of them arrive at that time.
     #[inline(always)]
     fn hear<W: Weight>(&mut self, block: &[[W; LANES]], inputs: &[Input], now: Option<f64>, all_hear: bool) {
-        // The sums stay in registers.
+        // Local copies, so that the compiler keeps the sums in registers.
         let (mut a, mut b) = (self.a, self.b);
         let hears = now.map(|now| self.hears(now));
         for input in inputs {
@@ -131,7 +131,7 @@ impl Script {
     }
 }
 
-/// Runs a block of neurons from start to stop; adds each one's spikes to `fired`.
+/// Runs a block of neurons from start to stop and appends each neuron's spikes to `fired`.
 pub(super) fn run<W: Weight>(
     neuron: &Neuron,
     script: &Script,
@@ -174,8 +174,9 @@ fn may_matter(lanes: &Lanes, l: usize, t: f64, floor: f64) -> bool {
 }
 
 wide! {
-    /// Moves a block on from point `from`, left with its own inputs, or from before the first one, up to the next point at
-    /// which a neuron may matter; that one is given, with who may.
+    /// Advances a block from point `from` (whose own inputs are added on leaving it), or from before the first point,
+    /// to the next point at which a neuron may fire or leave its refractory time, or Ctrl-C is checked. Returns that
+    /// point, and marks in `perhaps` the neurons that may fire there.
     fn quiet<W: Weight>(
         lanes: &mut Lanes,
         script: &Script,
