@@ -39,12 +39,12 @@ impl<'a> Work<'a> {
 
     /// Runs `tasks` tasks, each on one thread, in order if there is one thread.
     ///
-    /// Each task gets the stop of its thread. `told` converts a number of finished tasks to numbers of finished and of
+    /// Each task gets the stop of its thread. `report` converts a number of finished tasks to numbers of finished and of
     /// all pairs.
     pub(super) fn each(
         &mut self,
         tasks: usize,
-        told: &dyn Fn(usize) -> (usize, usize),
+        report: &dyn Fn(usize) -> (usize, usize),
         task: impl Fn(usize, Stop<'_>) -> Result<()> + Sync,
     ) -> Result<()> {
         let (next, done, halt) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
@@ -64,7 +64,7 @@ impl<'a> Work<'a> {
         };
         let (stop, progress) = (self.stop, &mut self.progress);
         let mut tell = |done| {
-            let (now, all) = told(done);
+            let (now, all) = report(done);
             progress(now, all);
         };
         let asked = || stop.asked() || halt.load(Relaxed);

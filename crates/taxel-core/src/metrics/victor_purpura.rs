@@ -135,8 +135,8 @@ impl VictorPurpura {
                 .collect();
             // For patterns against each other, a row is compared with those that follow in the order.
             let row = |at: usize| if b.is_some() { (at, 0) } else { (order[at], at + 1) };
-            let told = |rows: usize| ((pairs * n + pairs * rows / a.count) / a.trains, pairs);
-            work.each(a.count, &told, |at, stop| {
+            let report = |rows: usize| ((pairs * n + pairs * rows / a.count) / a.trains, pairs);
+            work.each(a.count, &report, |at, stop| {
                 let (i, first) = row(at);
                 let mut cost = Vec::new();
                 for (block, from) in blocks.iter().zip((0..).step_by(lanes)).skip(first / lanes) {

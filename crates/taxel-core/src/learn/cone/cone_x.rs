@@ -343,8 +343,8 @@ impl ConeXProblem {
                 found = self.undecided(&found);
                 break;
             }
-            let mut told = |round: Round| progress(Round { round: rounds + round.round, ..round });
-            found = self.exact.with_margin(margin, stop)?.solve(&start, &mut told, stop)?;
+            let mut notify = |round: Round| progress(Round { round: rounds + round.round, ..round });
+            found = self.exact.with_margin(margin, stop)?.solve(&start, &mut notify, stop)?;
             rounds += found.fit.rounds;
         }
         found.fit.rounds = rounds;

@@ -42,28 +42,28 @@ impl Relaxed {
         let scale = if at_zero > 0.0 { 1.0 / at_zero } else { 1.0 };
         let objective = &objective.scaled(scale).within_reach(at_zero * scale);
         let mut before = 0;
-        let mut told = |round: usize, rows, least: f64, gap| {
+        let mut report = |round: usize, rows, least: f64, gap| {
             progress(Round { round, rows, objective: least / scale, left: Left::Gap(gap) });
         };
         let weights = start.weights.clone();
         let mut by = engine;
         let mut found = if engine == Engine::Native {
-            match self.near_a_fit(objective, tolerance, start, &mut told, stop) {
+            match self.near_a_fit(objective, tolerance, start, &mut report, stop) {
                 Ok(found) => found,
-                Err(start) => self.augmented(objective, tolerance, start, &mut told, stop),
+                Err(start) => self.augmented(objective, tolerance, start, &mut report, stop),
             }
         } else {
             let near = weights.is_some();
             let from = self.point(objective, weights.unwrap_or(zero));
-            self.by_rounds(objective, tolerance, (from, 0.0, near), &mut told, stop)?
+            self.by_rounds(objective, tolerance, (from, 0.0, near), &mut report, stop)?
         };
         let open = |best: &Point, bound| best.gap(bound) > tolerance;
         if by == Engine::Native && !found.stopped && open(&found.best, found.bound) {
             by = Engine::ConeSolver;
             before = found.rounds;
-            let mut told = |round, rows, least, gap| told(before + round, rows, least, gap);
+            let mut report = |round, rows, least, gap| report(before + round, rows, least, gap);
             let near = (found.best, found.bound, true);
-            found = self.by_rounds(objective, tolerance, near, &mut told, stop)?;
+            found = self.by_rounds(objective, tolerance, near, &mut report, stop)?;
         }
         let least = found.best.parts.sum() / scale;
         let mut parts = found.best.parts;
@@ -132,8 +132,8 @@ impl Relaxed {
             let small = self.of_rows(&live);
             let begin = live.iter().map(|&row| shares[row]).chain(shares[silent..].iter().copied());
             let from = Start { weights: Some(best.weights.clone()), shares: Some(begin.collect()) };
-            let mut told = |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(bound));
-            let found = small.augmented(objective, 0.3 * tolerance, from, &mut told, stop);
+            let mut report = |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(bound));
+            let found = small.augmented(objective, 0.3 * tolerance, from, &mut report, stop);
             rounds += found.rounds;
             bound = bound.max(found.bound);
             for (k, &share) in found.shares.iter().enumerate() {

@@ -126,10 +126,10 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
     let Statement { neuron, shape, taper, .. } = statement;
     // An input that is lost just after its own time has no effect at all, because spikes occur only at targets.
     let counts = |&(t, _): &(f64, u32)| t <= example.end && !lost(neuron, &example.targets, t, t.next_up());
-    let heard: Vec<(f64, u32)> = example.inputs.iter().copied().filter(counts).collect();
+    let counted: Vec<(f64, u32)> = example.inputs.iter().copied().filter(counts).collect();
 
     let mut times = vec![example.start, example.end];
-    times.extend(heard.iter().map(|i| i.0));
+    times.extend(counted.iter().map(|i| i.0));
     for &target in &example.targets {
         times.extend([target, target - taper.length, until(target), target + neuron.refractory]);
     }
@@ -150,7 +150,7 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
             length = t - times[k - 1];
             step = shape.step(length);
         }
-        next += heard[next..].iter().take_while(|i| i.0 <= t).count();
+        next += counted[next..].iter().take_while(|i| i.0 <= t).count();
         let reset = neuron.after_spike == AfterSpike::Reset && example.next(t) == Some(t);
         let mut here = Asked { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
         let (mut reach, mut least) = (0.0, f64::INFINITY);
@@ -168,7 +168,7 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
         nodes.push(Node { step, reach, least, inputs: next as u32, reset });
         asked.push(here);
     }
-    Strip { nodes, asked, trains: heard.iter().map(|i| i.1).collect() }
+    Strip { nodes, asked, trains: counted.iter().map(|i| i.1).collect() }
 }
 
 /// Whether silence is required between the neighbouring nodes `t` and `to`.

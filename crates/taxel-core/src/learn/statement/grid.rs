@@ -274,17 +274,17 @@ impl SilentRows {
         for lane in &self.lanes {
             let factors = &factors[lane.first..lane.first + lane.points];
             // The derivative of the factors' sum over all rows from here on with respect to the state here.
-            let mut heard = KernelSum::default();
+            let mut derivative = KernelSum::default();
             let mut end = lane.points;
             for (k, jump) in lane.jumps.iter().enumerate().rev() {
                 let at = jump.point as usize;
-                heard = self.run_back(heard, &factors[at..end]);
+                derivative = self.run_back(derivative, &factors[at..end]);
                 let from = if k == 0 { 0 } else { lane.jumps[k - 1].inputs as usize };
                 for i in &lane.inputs[from..jump.inputs as usize] {
-                    sum[i.train as usize] += heard.a * i.a + heard.b * i.b;
+                    sum[i.train as usize] += derivative.a * i.a + derivative.b * i.b;
                 }
                 if jump.reset {
-                    heard = KernelSum::default();
+                    derivative = KernelSum::default();
                 }
                 end = at;
             }
@@ -292,17 +292,17 @@ impl SilentRows {
     }
 
     /// That derivative at the first of consecutive rows without inputs, given the derivative after the last of them.
-    fn run_back(&self, mut heard: KernelSum, factors: &[f64]) -> KernelSum {
+    fn run_back(&self, mut derivative: KernelSum, factors: &[f64]) -> KernelSum {
         for factors in factors.rchunks(RUN) {
             let step = self.steps.of(factors.len());
-            let KernelSum { a, b } = heard;
-            heard = KernelSum { a: a * step.aa + b * step.ba, b: b * step.bb };
+            let KernelSum { a, b } = derivative;
+            derivative = KernelSum { a: a * step.aa + b * step.ba, b: b * step.bb };
             if factors.iter().any(|&f| f != 0.0) {
-                heard.a += factors.iter().zip(&self.steps.ba).map(|(f, ba)| f * ba).sum::<f64>();
-                heard.b += factors.iter().zip(&self.steps.bb).map(|(f, bb)| f * bb).sum::<f64>();
+                derivative.a += factors.iter().zip(&self.steps.ba).map(|(f, ba)| f * ba).sum::<f64>();
+                derivative.b += factors.iter().zip(&self.steps.bb).map(|(f, bb)| f * bb).sum::<f64>();
             }
         }
-        heard
+        derivative
     }
 
     /// The coefficients of the given rows (ascending), row after row.

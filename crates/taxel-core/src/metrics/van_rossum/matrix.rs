@@ -27,11 +27,11 @@ impl VanRossum {
             let rows = Train::all(frame.as_ref(), a, n, work)?;
             let columns = b.map(|b| Train::all(frame.as_ref(), b, n, work)).transpose()?;
             let columns = columns.as_ref().unwrap_or(&rows);
-            let told = |group: usize| {
+            let report = |group: usize| {
                 let share = pairs * (group * ROWS).min(a.count) / a.count;
                 ((pairs * n + share) / a.trains, pairs)
             };
-            work.each(a.count.div_ceil(ROWS), &told, |group, stop| {
+            work.each(a.count.div_ceil(ROWS), &report, |group, stop| {
                 let group = group * ROWS..((group + 1) * ROWS).min(a.count);
                 for (j, column) in columns.iter().enumerate().skip(matrix.first(group.start)) {
                     stop.check()?;

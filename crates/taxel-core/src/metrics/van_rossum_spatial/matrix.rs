@@ -115,11 +115,11 @@ impl Stored<'_> {
                 let ends = &self.columns.offsets[j * trains + n..=j * trains + n + 1];
                 &held[ends[0] - first..ends[1] - first]
             };
-            let told = |row: usize| {
+            let report = |row: usize| {
                 let pairs = matrix.pairs();
                 ((pairs * number + pairs * row / self.rows.count) / tiles, pairs)
             };
-            work.each(self.rows.count, &told, |i, stop| {
+            work.each(self.rows.count, &report, |i, stop| {
                 let begin = matrix.first(i).max(from);
                 let mut products = vec![0.0; to.saturating_sub(begin)];
                 if products.is_empty() {

@@ -17,7 +17,7 @@ pub(super) struct Script {
     intervals: Vec<Interval>,
     /// The train of each input, in order of time.
     inputs: Vec<u32>,
-    all_hear: bool,
+    loses_none: bool,
     /// The contributions of `a` and of `b` to the slope of the potential, per mV, 1/ms.
     slope: KernelSum,
     /// The base of the threshold minus the rounding error of the bound, mV.
@@ -74,7 +74,7 @@ impl Script {
         Ok(Self {
             begin: ContinuousStream::new(neuron, threshold, trains.start),
             inputs: spikes.iter().map(|s| s.train).collect(),
-            all_hear: neuron.after_spike == AfterSpike::Keep,
+            loses_none: neuron.after_spike == AfterSpike::Keep,
             slope: KernelSum {
                 a: shape.slope(KernelSum { a: 1.0, b: 0.0 }),
                 b: shape.slope(KernelSum { a: 0.0, b: 1.0 }),
@@ -153,12 +153,12 @@ fn one_input<W: Weight>(
     interval: &Interval,
     (step, fade): (Step, f64),
     weights: &[W; LANES],
-    hears: Option<&[f64; LANES]>,
+    receives: Option<&[f64; LANES]>,
 ) -> bool {
     let mut any = false;
     for l in 0..LANES {
         let (a, b, w) = (lanes.a[l], lanes.b[l], weights[l].into());
-        let w: f64 = hears.map_or(w, |hears| w * hears[l]);
+        let w: f64 = receives.map_or(w, |receives| w * receives[l]);
         let (a, b, rise) = (a * step.aa + w, b * step.bb + a * step.ba, lanes.rise[l] * fade);
         (lanes.a[l], lanes.b[l], lanes.rise[l]) = (a, b, rise);
         any |= may_matter(a, b, rise, lanes.edge[l], script, interval);
@@ -200,11 +200,11 @@ wide! {
             if let &[train] = inputs {
                 // Most intervals begin with a single input: decay and input in one pass.
                 let weights = &block[train as usize];
-                any = if script.all_hear {
+                any = if script.loses_none {
                     one_input(lanes, script, interval, (step, fade), weights, None)
                 } else {
-                    let hears = lanes.hears(interval.from);
-                    one_input(lanes, script, interval, (step, fade), weights, Some(&hears))
+                    let receives = lanes.receives(interval.from);
+                    one_input(lanes, script, interval, (step, fade), weights, Some(&receives))
                 };
             } else {
                 for l in 0..LANES {
@@ -213,11 +213,11 @@ wide! {
                     lanes.b[l] = b * step.bb + a * step.ba;
                     lanes.rise[l] *= fade;
                 }
-                let hears = if script.all_hear { [1.0; LANES] } else { lanes.hears(interval.from) };
+                let receives = if script.loses_none { [1.0; LANES] } else { lanes.receives(interval.from) };
                 for &train in inputs {
                     let weights = &block[train as usize];
                     for l in 0..LANES {
-                        lanes.a[l] += weights[l].into() * hears[l];
+                        lanes.a[l] += weights[l].into() * receives[l];
                     }
                 }
                 for l in 0..LANES {

@@ -20,7 +20,7 @@ pub(super) struct Script {
     step: Step,
     /// The share of a threshold rise that remains after one step.
     fade: f64,
-    all_hear: bool,
+    loses_none: bool,
 }
 
 struct Point {
@@ -49,14 +49,14 @@ impl Lanes {
 
     /// Adds inputs one after the other; if `now` is given, all of them arrive at that time.
     #[inline(always)]
-    fn hear<W: Weight>(&mut self, block: &[[W; LANES]], inputs: &[Input], now: Option<f64>, all_hear: bool) {
+    fn add_inputs<W: Weight>(&mut self, block: &[[W; LANES]], inputs: &[Input], now: Option<f64>, loses_none: bool) {
         // Local copies, so that the compiler keeps the sums in registers.
         let (mut a, mut b) = (self.a, self.b);
-        let hears = now.map(|now| self.hears(now));
+        let receives = now.map(|now| self.receives(now));
         for input in inputs {
             let weights = &block[input.train as usize];
             let one = input.one;
-            match (all_hear, &hears) {
+            match (loses_none, &receives) {
                 (true, _) if one.b == 0.0 => {
                     for l in 0..LANES {
                         a[l] += weights[l].into() * one.a;
@@ -69,15 +69,15 @@ impl Lanes {
                         b[l] += w * one.b;
                     }
                 }
-                (false, Some(hears)) if one.b == 0.0 => {
+                (false, Some(receives)) if one.b == 0.0 => {
                     for l in 0..LANES {
-                        a[l] += weights[l].into() * one.a * hears[l];
+                        a[l] += weights[l].into() * one.a * receives[l];
                     }
                 }
-                (false, hears) => {
-                    let hears = hears.unwrap_or_else(|| self.hears(input.t));
+                (false, receives) => {
+                    let receives = receives.unwrap_or_else(|| self.receives(input.t));
                     for l in 0..LANES {
-                        let w = weights[l].into() * hears[l];
+                        let w = weights[l].into() * receives[l];
                         a[l] += w * one.a;
                         b[l] += w * one.b;
                     }
@@ -124,7 +124,7 @@ impl Script {
             grid,
             step: shape.step(step_ms),
             fade: (-step_ms / neuron.tau_rec()).exp(),
-            all_hear: neuron.after_spike == AfterSpike::Keep,
+            loses_none: neuron.after_spike == AfterSpike::Keep,
             points,
             inputs,
         })
@@ -190,7 +190,7 @@ wide! {
         if let Some(from) = from {
             let point = &script.points[from];
             next = point.arriving_end;
-            lanes.hear(block, &script.inputs[point.aged_end..next], Some(point.t), script.all_hear);
+            lanes.add_inputs(block, &script.inputs[point.aged_end..next], Some(point.t), script.loses_none);
         }
         for (k, point) in script.points.iter().enumerate().skip(from.map_or(0, |from| from + 1)) {
             for l in 0..LANES {
@@ -199,7 +199,7 @@ wide! {
                 lanes.b[l] = b * bb + a * ba;
                 lanes.rise[l] *= script.fade;
             }
-            lanes.hear(block, &script.inputs[next..point.aged_end], None, script.all_hear);
+            lanes.add_inputs(block, &script.inputs[next..point.aged_end], None, script.loses_none);
             let mut any = false;
             for l in 0..LANES {
                 any |= may_matter(lanes, l, point.t, floor);
@@ -210,7 +210,7 @@ wide! {
                 }
                 return Some(k);
             }
-            lanes.hear(block, &script.inputs[point.aged_end..point.arriving_end], Some(point.t), script.all_hear);
+            lanes.add_inputs(block, &script.inputs[point.aged_end..point.arriving_end], Some(point.t), script.loses_none);
             next = point.arriving_end;
         }
         None

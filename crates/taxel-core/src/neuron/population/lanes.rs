@@ -26,9 +26,9 @@ pub(super) struct Lanes {
     pub(super) rise: [f64; LANES],
     /// The time at which the refractory time ends and the rise begins to decay, ms; infinite if neither is ahead.
     pub(super) edge: [f64; LANES],
-    /// Inputs after `deaf_from` and up to `deaf_until` have no effect, ms.
-    pub(super) deaf_from: [f64; LANES],
-    pub(super) deaf_until: [f64; LANES],
+    /// Inputs after `ignored_from` and up to `ignored_until` have no effect, ms.
+    pub(super) ignored_from: [f64; LANES],
+    pub(super) ignored_until: [f64; LANES],
 }
 
 impl Lanes {
@@ -39,8 +39,8 @@ impl Lanes {
             b: [0.0; LANES],
             rise: [0.0; LANES],
             edge: [edge.unwrap_or(f64::INFINITY); LANES],
-            deaf_from: [f64::NEG_INFINITY; LANES],
-            deaf_until: [f64::NEG_INFINITY; LANES],
+            ignored_from: [f64::NEG_INFINITY; LANES],
+            ignored_until: [f64::NEG_INFINITY; LANES],
         }
     }
 
@@ -49,21 +49,21 @@ impl Lanes {
         self.rise[lane] = f64::INFINITY;
         self.edge[lane] = edge;
         if after_spike != AfterSpike::Keep {
-            self.deaf_until[lane] = edge + AT_EDGE;
+            self.ignored_until[lane] = edge + AT_EDGE;
         }
         if after_spike == AfterSpike::Ignore {
-            self.deaf_from[lane] = t + AT_EDGE;
+            self.ignored_from[lane] = t + AT_EDGE;
         }
     }
 
     /// The gain of an input at `t` for each neuron: 1 if the input has an effect, 0 if it is lost.
     #[inline(always)]
-    pub(super) fn hears(&self, t: f64) -> [f64; LANES] {
-        let mut hears = [1.0; LANES];
-        for (l, hears) in hears.iter_mut().enumerate() {
-            let lost = (self.deaf_from[l] < t) & (t <= self.deaf_until[l]);
-            *hears = if lost { 0.0 } else { 1.0 };
+    pub(super) fn receives(&self, t: f64) -> [f64; LANES] {
+        let mut receives = [1.0; LANES];
+        for (l, receives) in receives.iter_mut().enumerate() {
+            let lost = (self.ignored_from[l] < t) & (t <= self.ignored_until[l]);
+            *receives = if lost { 0.0 } else { 1.0 };
         }
-        hears
+        receives
     }
 }

@@ -51,7 +51,7 @@ pub(super) fn polish(
                 break;
             }
         }
-        let exchanged = polish.mend();
+        let exchanged = polish.exchange();
         if exchanged == 0 || exchanged > most {
             break;
         }
@@ -222,7 +222,7 @@ impl<'a> Polish<'a> {
     }
 
     /// Exchanges rows and bounds with multipliers of the wrong sign; returns how many.
-    fn mend(&mut self) -> usize {
+    fn exchange(&mut self) -> usize {
         let program = self.program;
         let gradient = self.gradient();
         let mut changed = 0;
