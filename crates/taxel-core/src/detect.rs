@@ -1,4 +1,4 @@
-//! Spikes to detections, and their score.
+//! Detections from spikes, and their scores.
 
 mod frame_clock;
 mod readout;
@@ -19,23 +19,22 @@ use serde::{Deserialize, Serialize};
 pub struct Detection {
     /// The label of the neuron that fired.
     pub label: String,
-    /// Time of the event, us of the board's clock: the crossing minus the encoder's latency and the trained delay.
+    /// The time of the event by the board's clock, us: the crossing minus the encoder's latency and the trained delay.
     pub t: i64,
-    /// Earliest time at which the event could be known, us of the board's clock: the end of the frame in which the
-    /// potential crosses.
+    /// The earliest time by the board's clock at which the host can know, us: the end of the frame of the crossing.
     pub known: i64,
-    /// Slope of the potential at its threshold, mV/ms: a measure of confidence.
+    /// The slope of potential minus threshold at the crossing, mV/ms: a measure of confidence.
     pub slope: f64,
-    /// Whether the detection may depend on values that states of version 2 repaired: then the event may have happened
+    /// Whether the detection may rest on values that states of version 2 repaired: the event may then have happened
     /// before `t`.
     pub repaired: bool,
 }
 
-/// A reference event that took place, against which detections are scored.
+/// An event that took place, according to a reference.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reference {
-    /// Kind of the event.
+    /// The label of the event.
     pub label: String,
-    /// Time of the event, us of the board's clock.
+    /// The time of the event by the board's clock, us.
     pub t: i64,
 }

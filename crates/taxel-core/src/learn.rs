@@ -1,8 +1,8 @@
-//! Learns weights from examples: patterns of input spikes, and the times at which the neuron must fire.
+//! Learning weights from examples: patterns of input spikes, and the target times at which the neuron must fire.
 //!
-//! `statement` defines the conditions of the thesis' equations 6.9 to 6.14 on the weights; `engines` solve the
-//! minimisation over given rows; `cone` contains the learners CONE-X and CONE-R, `online` the learner with a sliding
-//! window; `rivals` the rules of other authors.
+//! `statement` turns the thesis' equations 6.9 to 6.14 into rows and an objective; `engines` are the solvers, which
+//! know rows only; `cone` has the learners CONE-X and CONE-R, `online` the sliding window; `rivals` has learning rules
+//! by other authors.
 
 mod cone;
 mod engines;

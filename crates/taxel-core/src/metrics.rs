@@ -1,8 +1,8 @@
 //! Distances between spike trains, and between patterns of many trains.
 //!
 //! A metric is a value of [`Metric`]; [`Metric::distance`] compares two patterns, [`Metric::pairwise`] computes
-//! matrices. A distance between two trains becomes one between patterns as the sum over trains of the same index; the
-//! metrics with `spatial` or `multi_unit` in their names compare different trains too.
+//! matrices. A distance between trains is extended to patterns as the sum over trains with the same number; the metrics
+//! with `spatial` or `multi_unit` in their names use other trains as well.
 
 mod edges;
 mod law;
@@ -27,21 +27,21 @@ use crate::parameters::Described;
 use crate::reading::{self, Unfit};
 use crate::{Error, Result, Stop, problem};
 
-/// The registry: one line per metric, `NAME: Kind`; the metric's file is `metrics/NAME.rs`, and its name in JSON is
-/// `NAME`.
+/// The registry: one line for each metric, `NAME: Kind`, with its file `metrics/NAME.rs` and `NAME` as its name in
+/// JSON.
 macro_rules! metrics {
     ($($(#[$about:meta])* $name:ident: $Kind:ident,)*) => {
         $(mod $name;)*
         $(pub use $name::$Kind;)*
 
-        /// A distance with its parameters.
+        /// A metric with its parameters.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "name", rename_all = "snake_case")]
         pub enum Metric {
             $($(#[$about])* $Kind($Kind),)*
         }
 
-        /// The names of all metrics, as in JSON.
+        /// The names of all metrics in JSON.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
         impl Metric {
@@ -49,7 +49,7 @@ macro_rules! metrics {
                 match self { $(Self::$Kind(metric) => metric,)* }
             }
 
-            /// Parses the parameters of the metric with this name; none if there is no such metric.
+            /// Reads the parameters of the metric with this name; `None` if there is no such metric.
             fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
                 $(if name == stringify!($name) {
                     return Some(reading::from_value(parameters).map(Self::$Kind));
@@ -57,7 +57,7 @@ macro_rules! metrics {
                 None
             }
 
-            /// The parameters of a metric, by its name, with their defaults and ranges.
+            /// The parameters of a metric with their defaults and ranges, by the metric's name.
             #[must_use]
             pub fn described(name: &str) -> Option<Described> {
                 $(if name == stringify!($name) {
@@ -69,28 +69,28 @@ macro_rules! metrics {
     };
 }
 
-// Rustfmt does not find modules in a macro, so the Makefile passes it their files.
+// Rustfmt does not find modules declared in a macro, so the Makefile lists their files for it.
 metrics! {
-    /// The minimal cost of transforming one train into the other.
+    /// The least cost of turning one train into the other.
     victor_purpura: VictorPurpura,
-    /// The minimal cost of the transformation if a spike may also change its train.
+    /// The least cost of turning one pattern into the other, if a spike may also change its train.
     victor_purpura_multi_unit: VictorPurpuraMultiUnit,
-    /// Euclidean distance of trains smoothed by an exponential.
+    /// Euclidean distance between trains smoothed by an exponential.
     van_rossum: VanRossum,
-    /// Time integral, or sum, of the absolute difference of trains smoothed by an exponential.
+    /// Time integral, or sum, of the absolute difference between trains smoothed by an exponential.
     van_rossum_absolute: VanRossumAbsolute,
-    /// Euclidean distance of patterns smoothed in time and over the array.
+    /// Euclidean distance between patterns smoothed in time and over the array.
     van_rossum_spatial: VanRossumSpatial,
-    /// Sum over taxels and time of the absolute difference of patterns smoothed in time and over the array.
+    /// Sum over taxels and time of the absolute difference between patterns smoothed in time and over the array.
     van_rossum_spatial_absolute: VanRossumSpatialAbsolute,
-    /// The difference between interspike intervals.
+    /// The difference between the trains' interspike intervals, averaged over time.
     isi_distance: IsiDistance,
-    /// The distance of spikes from their nearest ones in the other train, relative to the interspike intervals.
+    /// The distance of spikes to the nearest spikes of the other train, averaged over time.
     spike_distance: SpikeDistance,
 }
 
 impl Metric {
-    /// Parses a metric from JSON: an object whose `name` selects the metric.
+    /// Reads a metric from JSON: an object with the metric's `name`.
     ///
     /// # Errors
     ///
@@ -104,7 +104,8 @@ impl Metric {
             let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
             return Err(problem!("metric is '{name}': must be one of {}", names.join(", ")));
         };
-        // A metric can contain another metric's parameters, whose deserialiser would accept unknown names.
+        // A metric may contain the parameters of another type, whose reader ignores unknown keys, so all keys are
+        // checked here.
         let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
         if let Some(unknown) = given.keys().find(|key| !known.contains(&key.as_str())) {
             return Err(problem!("{unknown}: {name} takes {}", known.join(", ")));
@@ -127,16 +128,16 @@ impl Metric {
     ///
     /// # Errors
     ///
-    /// `Problem` if parameters or times are not valid, or if the numbers of trains differ; `Interrupted`.
+    /// `Problem` for parameters or times that are not valid, or different numbers of trains; `Interrupted`.
     pub fn distance(&self, a: &Patterns<'_>, b: &Patterns<'_>, stop: Stop<'_>) -> Result<f64> {
         self.prepare(a, Some(b))?.between((a, 0), (b, 0), stop)
     }
 
-    /// The distances of all patterns of `a` from all of `b`, row by row; without `b` the distances among those of `a`.
+    /// The distances of all patterns of `a` to all of `b`, row by row; without `b`, among the patterns of `a`.
     ///
     /// # Errors
     ///
-    /// As [`Self::distance`].
+    /// Those of [`Self::distance`].
     pub fn pairwise(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let ready = self.prepare(a, b)?;
         let matrix = Matrix::new(a.count, b.map(|b| b.count));

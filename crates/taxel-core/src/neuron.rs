@@ -1,7 +1,7 @@
-//! The SRM0 neuron, from spikes to spikes (thesis 6.3.1).
+//! The SRM0 neuron (thesis 6.3.1): output spikes from input spikes.
 //!
-//! [`Neuron`] contains the parameters, [`NeuronStream`] runs it spike by spike, in continuous time or on a grid;
-//! [`Neuron::run`] passes whole trains to the same stream, so live and recorded inputs give the same spikes.
+//! [`Neuron`] holds the parameters, [`NeuronStream`] runs it spike by spike, in continuous time or on a grid;
+//! [`Neuron::run`] is the same stream fed with whole trains, so live and recorded inputs give the same spikes.
 
 mod continuous;
 mod crossing;

@@ -1,26 +1,27 @@
-//! Arrays of numbers, aligned to cache lines.
+//! Arrays of numbers that are aligned to cache lines.
 
 use super::eight::LANES;
 
-/// Size of a cache line, bytes.
+/// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// A value aligned to a cache line.
+/// A value that is aligned to a cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct OnLine<T>(pub(crate) T);
 
-/// Numbers aligned to cache lines, so that no vector load crosses two lines.
+/// Numbers aligned to a cache line, so that no vector straddles two lines.
 #[derive(Debug, Default)]
 pub(crate) struct Aligned {
-    /// Padded at both ends, because the allocator does not align to cache lines.
+    /// Allocated a vector longer than needed, because the allocator does not align to cache lines;
+    /// the numbers begin at `from`.
     numbers: Vec<f64>,
     from: usize,
     len: usize,
 }
 
 impl Aligned {
-    /// Zeros; the system allocates their memory only when it is written.
+    /// Zeros, for which the operating system reserves no memory until they are written.
     pub(crate) fn zeros(len: usize) -> Self {
         let len = len.next_multiple_of(LANES);
         let numbers = vec![0.0; len + LANES];

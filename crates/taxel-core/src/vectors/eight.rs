@@ -1,9 +1,9 @@
-//! Vectors of eight numbers in registers.
+//! Vectors of eight numbers.
 
-/// Number of lanes in a vector of the widest kind.
+/// The number of values in a vector of the widest kind.
 pub(crate) const LANES: usize = 8;
 
-/// A vector of eight numbers.
+/// Eight numbers in one or two of the machine's vector registers.
 pub(crate) trait Vector: Copy {
     fn splat(value: f64) -> Self;
     fn load(from: &[f64; LANES]) -> Self;
@@ -68,14 +68,14 @@ mod x86 {
 
     use super::{LANES, Vector};
 
-    /// A vector for AVX-512; constructed only in functions compiled for AVX-512.
+    /// A vector of AVX-512; constructed only in functions compiled for it.
     #[derive(Clone, Copy)]
     pub(crate) struct Zmm(__m512d);
 
     impl Vector for Zmm {
         #[inline(always)]
         fn splat(value: f64) -> Self {
-            // SAFETY: `kernel!` uses this type only if the machine has AVX-512F.
+            // SAFETY: `kernel!` names this type only where the machine has AVX-512F.
             Self(unsafe { _mm512_set1_pd(value) })
         }
         #[inline(always)]
@@ -120,14 +120,14 @@ mod x86 {
         }
     }
 
-    /// Two vectors for AVX2; constructed only in functions compiled for AVX2.
+    /// Two vectors of AVX2; constructed only in functions compiled for it.
     #[derive(Clone, Copy)]
     pub(crate) struct Ymm(__m256d, __m256d);
 
     impl Vector for Ymm {
         #[inline(always)]
         fn splat(value: f64) -> Self {
-            // SAFETY: `kernel!` uses this type only if the machine has AVX2 and FMA.
+            // SAFETY: `kernel!` names this type only where the machine has AVX2 and FMA.
             let one = unsafe { _mm256_set1_pd(value) };
             Self(one, one)
         }
@@ -182,13 +182,13 @@ mod x86 {
     }
 }
 
-/// Splits numbers into groups of eight; the remainder is left out.
+/// Numbers in groups of eight; an incomplete last group is left out.
 #[inline(always)]
 pub(crate) fn lines(numbers: &[f64]) -> &[[f64; LANES]] {
     numbers.as_chunks().0
 }
 
-/// As [`lines`], for writing.
+/// Mutable [`lines`].
 #[inline(always)]
 pub(crate) fn lines_mut(numbers: &mut [f64]) -> &mut [[f64; LANES]] {
     numbers.as_chunks_mut().0

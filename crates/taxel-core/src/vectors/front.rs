@@ -1,14 +1,14 @@
-//! Moves the selected lanes of eight 16-bit lanes to the front, for machines without an instruction for it.
+//! Compaction of selected 16-bit lanes to the front of a vector, for machines without an instruction for it.
 
-/// For each selection of eight 16-bit lanes (a bit each) the `pshufb` indices: the selected lanes in order, then the
-/// last selected one repeated; zeros for an empty selection.
+/// For each selection of eight 16-bit lanes (one bit per lane) the byte indices for `pshufb`: the selected lanes in
+/// order, then the last selected lane repeated; for an empty selection, zeros.
 pub(crate) static TO_FRONT: [[u8; 16]; 256] = {
     let mut out = [[0x80; 16]; 256];
     let mut choice = 1_u32;
     while choice < 256 {
         let (mut from, mut to) = (0, 0);
         while to < 8 {
-            // The next selected lane; if there is none, the last one is repeated.
+            // Advances to the next selected lane; after the last one `from` stays.
             let rest = (choice >> from) & !1;
             if to == 0 {
                 from = choice.trailing_zeros();

@@ -1,30 +1,30 @@
-//! The machine's vector instruction sets, and macros that compile functions for each of them.
+//! Which vector instructions the machine has, and functions compiled for each of them.
 
 use std::sync::OnceLock;
 
 use crate::{Result, problem};
 
-/// The best set that may be used, once determined.
+/// The widest set that may be used, once it has been determined.
 static BEST: OnceLock<Instructions> = OnceLock::new();
 
-/// Sets of vector instructions that code is written or compiled for.
+/// A set of vector instructions for which code is written or compiled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Instructions {
-    /// No vector instructions beyond the target's baseline: runs on any machine.
+    /// No vector instructions: runs on every machine.
     Plain,
     /// AVX2 with fused multiply-add (and BMI1, POPCNT).
     Avx2,
     /// AVX-512 F, BW, DQ and VL.
     Avx512,
-    /// AVX-512 that also permutes single bytes: VBMI and VBMI2 (and BMI2, LZCNT).
+    /// AVX-512 with permutations of single bytes: VBMI and VBMI2 (and BMI2, LZCNT).
     Avx512Bytes,
 }
 
 impl Instructions {
-    /// All sets, from the smallest; a machine that has one has those before it.
+    /// All sets, from the narrowest; a machine that has one also has those before it.
     pub const ALL: [Self; 4] = [Self::Plain, Self::Avx2, Self::Avx512, Self::Avx512Bytes];
 
-    /// The best set that may be used: the widest of this machine, or a narrower one after [`cap`](Self::cap).
+    /// The widest set that may be used: that of this machine, or a narrower one after [`cap`](Self::cap).
     #[must_use]
     #[inline]
     pub fn best() -> Self {
@@ -36,11 +36,11 @@ impl Instructions {
         Self::ALL.into_iter().take_while(|set| set.detected()).last().unwrap_or(Self::Plain)
     }
 
-    /// Limits the set that this process uses; must be called before anything is computed.
+    /// Allows no set wider than the named one in this process; must be called before anything is computed.
     ///
     /// # Errors
     ///
-    /// `Problem` if no set has this name, if this machine does not have it, or if another set is in use already.
+    /// `Problem` if no set has this name, if this machine lacks it, or if another set is already in use.
     pub fn cap(name: &str) -> Result<()> {
         let set = Self::named(name).ok_or_else(|| {
             problem!("TAXEL_INSTRUCTIONS is {name:?}: must be {}", Self::ALL.map(Self::name).join(", "))
@@ -61,7 +61,7 @@ impl Instructions {
         Self::ALL.into_iter().find(|set| set.name() == name)
     }
 
-    /// The set's name in TAXEL_INSTRUCTIONS.
+    /// The name of the set in TAXEL_INSTRUCTIONS.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -79,16 +79,16 @@ impl Instructions {
         self <= Self::best()
     }
 
-    /// Returns the set, if this machine has it.
+    /// Returns the set if this machine has it.
     ///
     /// # Errors
     ///
-    /// `Problem` if this machine does not have the set.
+    /// `Problem` if the machine lacks the set.
     pub fn checked(self) -> Result<Self> {
         if self.present() { Ok(self) } else { Err(problem!("instructions {self:?}: this machine does not have them")) }
     }
 
-    /// Whether the machine has the instructions that this set adds to the previous one.
+    /// Whether the machine has the instructions that this set adds to the one before.
     fn detected(self) -> bool {
         match self {
             Self::Plain => true,
@@ -119,8 +119,7 @@ impl Instructions {
     }
 }
 
-/// Calls the variant for a set of [`Instructions`], in a function with arms compiled for AVX-512, for AVX2 and without
-/// either.
+/// Dispatches on a set of [`Instructions`] to a variant compiled for AVX-512, for AVX2 or without vector instructions.
 macro_rules! by_width {
     ($set:expr, ($($argument:ident: $kind:ty),*) -> $out:ty, [$($generic:tt)*], $avx512:expr, $avx2:expr, $plain:expr) => {{
         #[cfg(target_arch = "x86_64")]
@@ -135,7 +134,8 @@ macro_rules! by_width {
             }
             let set: $crate::vectors::Instructions = $set;
             if set >= $crate::vectors::Instructions::Avx512 {
-                // SAFETY: the machine has these instructions: the set is its best, or was just asserted to be present.
+                // SAFETY: the machine has these instructions: the set is its widest, or was just asserted to be
+                // present.
                 return unsafe { avx512($($argument),*) };
             }
             if set == $crate::vectors::Instructions::Avx2 {
@@ -143,17 +143,18 @@ macro_rules! by_width {
                 return unsafe { avx2($($argument),*) };
             }
         }
-        // Other architectures have one set only.
+        // Other architectures have one variant only.
         #[cfg(not(target_arch = "x86_64"))]
         let _: $crate::vectors::Instructions = $set;
         $plain($($argument),*)
     }};
 }
 
-/// Defines a function that is compiled for AVX-512, AVX2 and the baseline, and calls the best variant for the machine.
+/// Defines a function that is compiled for AVX-512, for AVX2 and without either, and dispatches to the machine's
+/// variant.
 ///
-/// Only the vector width differs, never the arithmetic (the compiler fuses no operations by itself), so all machines
-/// compute the same bits. Functions that it calls must be `#[inline(always)]` to be compiled with it.
+/// Only the width of the vectors differs, not the arithmetic (the compiler fuses no operations by itself), so every
+/// machine computes the same bits. Functions called inside must be `#[inline(always)]` to be compiled for the same set.
 macro_rules! wide {
     (
         $(#[$about:meta])*
@@ -177,10 +178,10 @@ macro_rules! wide {
     };
 }
 
-/// Defines a function over [`Vector`](super::Vector)s `V`, compiled for AVX-512, for AVX2 and for the baseline.
+/// Defines a function over [`Vector`](super::Vector)s `V`, compiled for AVX-512, for AVX2 and without either.
 ///
-/// By default the machine's best set is used; if the arguments begin with `on NAME;`, the caller chooses the set, which
-/// the machine must have.
+/// The widest set is used by default; if the arguments begin with `on NAME;`, the caller passes the set, which the
+/// machine must have.
 macro_rules! kernel {
     (
         $(#[$about:meta])*
