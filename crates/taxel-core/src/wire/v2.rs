@@ -11,7 +11,7 @@
 //! | 2-3 | board |
 //! | 4-7 | sequence: one more a datagram, 0 at reset |
 //! | 8-13 | base time, us since reset |
-//! | 14-15 | session: a number that each reset draws anew |
+//! | 14-15 | session: a random number, drawn at each reset |
 //! | 16 | 5 bits of stride: position = line << stride \| row; 3 low bits of the first event's line, from where positions count |
 //! | 17 | 4 bits of flags: 0 frame sync, 1 values are differences, 2 events were dropped since the last datagram; that line's 4 high bits |
 //! | 18 ... | body |

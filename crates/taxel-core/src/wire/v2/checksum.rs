@@ -22,7 +22,7 @@ pub(super) fn crc32c(bytes: &[u8]) -> u32 {
     }
     #[cfg(target_arch = "x86_64")]
     if (8..LONG).contains(&bytes.len()) && is_x86_feature_detected!("sse4.2") {
-        // SAFETY: the machine has SSE 4.2, as was just asked, and there are 8 bytes or more.
+        // SAFETY: the machine has SSE 4.2, as was just checked, and there are 8 bytes or more.
         return unsafe { short(bytes) };
     }
     crc32c::crc32c(bytes)

@@ -156,7 +156,7 @@ impl Decoder {
     ///
     /// # Errors
     ///
-    /// `Problem` if a column has fewer entries than [`stream_rows`] asks for, and nothing was read.
+    /// `Problem` if a column has fewer entries than [`stream_rows`] returns; nothing is read then.
     pub fn fill(&mut self, datagram: &[u8], arrived: Option<i64>, room: Room<'_>) -> Result<(Columns, Outcome)> {
         let mut laid = Laid::new(check_room(room, datagram.len())?);
         let heard = self.push_table(datagram, arrived, &mut laid);

@@ -125,8 +125,8 @@ impl Sink for Filling<'_> {
 ///
 /// # Errors
 ///
-/// `Problem` if a column has fewer entries than [`stream_rows`] asks for, and nothing was read; `Interrupted` if asked to
-/// stop.
+/// `Problem` if a column has fewer entries than [`stream_rows`] returns, in which case nothing is read; `Interrupted`
+/// if asked to stop.
 pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Result<Decoded> {
     /// Bytes between two checks of `stop`: some milliseconds of work, and more than a datagram.
     const PIECE: usize = 1 << 20;
