@@ -11,7 +11,7 @@ pub enum Error {
     /// Arguments, spike trains or a learning problem that are not valid.
     #[error("{0}")]
     Problem(String),
-    /// An invalid state of the board, its registers or its commands.
+    /// An error of the board, its registers or its commands.
     #[error("{0}")]
     Device(String),
     /// A simulated scene that cannot be played.

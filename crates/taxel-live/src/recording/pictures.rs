@@ -19,8 +19,9 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// The pictures of events: at each multiple of 100 ms with an event before it, and at the multiples of 10 ms before
-    /// and after each of the times `around`, within the range of events. None if no event has an intensity.
+    /// The pictures of events: at each multiple of 100 ms if an event occurred in the 100 ms up to it, and at the
+    /// multiples of 10 ms before and after each of the times `around`, within the range of events. None if no event has
+    /// an intensity.
     ///
     /// # Errors
     ///
