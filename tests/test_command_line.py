@@ -175,7 +175,7 @@ def test_ctrl_c_while_it_starts_ends_quietly(after_s: float) -> None:
         port = str(link.getsockname()[1])
     arguments = [program, "emulate", "--port", port, "--scenes", "3", "--json"]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        # Not before Python itself has begun: taxel is loading now.
+        # After Python itself has started: the process is importing taxel now.
         until = time.monotonic() + 60
         while "numpy" not in _maps(process.pid):
             assert time.monotonic() < until

@@ -156,7 +156,7 @@ def test_a_clock_that_is_ahead_and_drifts_is_one_clock_here(tmp_path, place):
     assert abs(clock["ahead_ns"] / 1e9 - AHEAD_S) < 0.01
     there, here = (taxel.open(tmp_path / f"{name}.mcap").datagrams().arrived_ns for name in ("near", "far"))
     apart = np.abs(here - there)
-    # A busy machine answers late; not by what was set off.
+    # On a busy machine some messages are delayed, so the median is tested; it must not contain the clocks' offset.
     assert np.median(apart) < 5e6, f"{np.median(apart)} ns"
     assert np.quantile(apart, 0.9) < 50e6
 
@@ -190,8 +190,8 @@ def test_three_processes_lose_nothing_and_a_killed_one_comes_back(tmp_path, plac
                 assert again.process.returncode == 0, printed
                 wait_for(lambda: far.counters["bridged"]["ended"])
         summary = far.stop()
-    # Between the first and the last datagram of a session none is missing; what the dead one did not bridge, the
-    # board's own sequence shows.
+    # Within a session of the bridge no datagram is missing; those that arrived while the bridge was down are missing in
+    # the board's own sequence.
     assert summary.counters["bridged"]["missing"] == 0
     assert summary.counters["wire_v2"]["missing"] > 0
     assert "began anew 1 times" in summary.verdict
@@ -233,7 +233,7 @@ def test_what_a_viewer_was_too_slow_for_is_counted_to_the_last_datagram(tmp_path
         published = Bridge(near, listen=place)
         with command("record", "--from", f"zenoh:{place}", "--json", str(tmp_path / "far.mcap")) as recorder:
             wait_for(lambda: published.counts["block"]["heard"])
-            # Some are kept between two that are not.
+            # Stops the recorder for one of three bursts, so that datagrams before and after the loss are recorded.
             for how in (signal.SIGCONT, signal.SIGSTOP, signal.SIGCONT):
                 recorder.process.send_signal(how)
                 send([bytes(1400)] * 10, *near.address, each=50, period_us=1000, seconds=6.0)

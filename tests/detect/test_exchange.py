@@ -107,7 +107,7 @@ def test_nodes_that_were_changed_since_hold_against_the_metadata(tmp_path: Path)
     assert two.array == one.array
     assert two.neurons["contact"].weights[3] == pytest.approx(0.25)
     assert two.neurons["lift"].delay_ms == 2.5
-    # The nodes' threshold holds the factor already: the neuron behaves alike.
+    # The nodes' threshold already includes the factor, so the neuron's behaviour is the same.
     assert two.run_threshold == 1.0
     assert two.neurons["lift"].neuron.theta_0 == pytest.approx(0.35)
     assert two.neurons["lift"].neuron.theta_plus == pytest.approx(0.1)
@@ -141,8 +141,8 @@ def test_first_spikes_agree_in_snntorch(tmp_path: Path, kernel: dict) -> None:
         assert len(ours) > 0, "something must fire to compare"
         assert fired[:, k].any()
         apart.append(abs(ours[0] - np.argmax(fired[:, k]) / 10))
-    # snnTorch steps 0.1 ms by Euler's rule, so its kernels are some steps off; a potential that only just touches the
-    # threshold may then cross at a later peak.
+    # snnTorch integrates by Euler's method with 0.1 ms, so its kernels deviate by some steps; a potential whose peak
+    # just reaches the threshold may then cross it at a later peak.
     assert np.median(apart) < 0.2
     assert np.quantile(apart, 0.9) < 0.5
 

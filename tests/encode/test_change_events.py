@@ -14,7 +14,7 @@ from .scenes import frames_of, spikes_of, wander
 seeds = st.integers(0, 2**32 - 1)
 
 REPAIRED = "silent"
-#: What the laws of all encoders are tried on (test_laws.py).
+#: Examples for the laws of all encoders (test_laws.py).
 EXAMPLES = {
     "change": ChangeEvents(bits=4),
     "change, last sample": ChangeEvents(previous="last_sample", rounding="floor", period_ms=0.3),

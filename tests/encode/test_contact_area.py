@@ -15,7 +15,7 @@ from .scenes import ARRAY, rest, spikes_of, touch
 seeds = st.integers(0, 2**32 - 1)
 
 REPAIRED = "read"
-#: What the laws of all encoders are tried on (test_laws.py).
+#: Examples for the laws of all encoders (test_laws.py).
 EXAMPLES = {"area": ContactArea(tare=rest(ARRAY), levels=[1, 2, 4, 8])}
 
 

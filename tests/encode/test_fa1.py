@@ -14,7 +14,7 @@ from .scenes import frames_of, spikes_of, wander
 seeds = st.integers(0, 2**32 - 1)
 
 REPAIRED = "silent"
-#: What the laws of all encoders are tried on (test_laws.py).
+#: Examples for the laws of all encoders (test_laws.py).
 EXAMPLES = {
     "FA-1": FA1(period_ms=0.5),
     "FA-1 of 4 bits": FA1(period_ms=1.0, bits=4),

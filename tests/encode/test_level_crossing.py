@@ -14,14 +14,14 @@ from .scenes import frames_of, spikes_of, wander
 seeds = st.integers(0, 2**32 - 1)
 
 REPAIRED = "read"
-#: What the laws of all encoders are tried on (test_laws.py).
+#: Examples for the laws of all encoders (test_laws.py).
 EXAMPLES = {
     "crossing": LevelCrossing([50.0, 60.0, 70.0], release_share=0.9),
     "crossing that holds": LevelCrossing([55.0, 65.0], hold_ms=0.3, tonic_ms=0.7, tonic_level=65.0),
     "crossing on the running range": LevelCrossing(
         [0.3, 0.6], hold_ms=0.2, tonic_ms=1.1, running_range=RunningRange(window_s=0.02, renew_s=0.005)
     ),
-    # Its first window comes late by definition.
+    # The spikes of its first window are late, because the window must be complete first.
     "crossing, first window by itself": LevelCrossing(
         [0.3, 0.6], running_range=RunningRange(window_s=0.02, renew_s=0.005, first_window="itself")
     ),

@@ -352,7 +352,7 @@ def test_a_shift_in_time_and_another_order_of_trains_change_nothing():
 def test_with_a_margin_the_trained_neuron_fires_at_its_targets_and_nowhere_else(after_spike):
     """Learner and neuron mean the same by after_spike, refractory time and thresholds."""
     patterns, targets = examples(10, trains=150, patterns=3, targets=3, duration=200.0, whole_ms=True)
-    # A target is met to rounding, from below as well: so the neuron is run a hair below its threshold.
+    # A target is reached to rounding, also from below, so the neuron is run slightly below its threshold.
     cone = fitted(
         ConeR(neuron=Neuron(after_spike=after_spike), lambdas=(0, 1e-4, 0, 100, 1e4), lb=-2.0, ub=2.0, margin=0.02),
         patterns,
@@ -369,7 +369,7 @@ def test_with_a_margin_the_trained_neuron_fires_at_its_targets_and_nowhere_else(
 
 def test_a_pattern_without_targets_teaches_silence():
     (pattern,), targets = examples(11, trains=40, patterns=1, targets=1)
-    # The same played faster: its potential comes higher, so the untaught neuron fires.
+    # The same pattern played faster: its potential is higher, so an untrained neuron fires.
     patterns = [pattern, SpikeTrains.from_lists([0.8 * train for train in pattern], stop=pattern.stop)]
     loud = fitted(ConeR(lambdas=(0, 1, 0, 100, 1000), lb=-2.0, ub=2.0), patterns[:1], targets[:1])
     taught = fitted(ConeR(lambdas=(0, 1, 0, 100, 1000), lb=-2.0, ub=2.0), patterns, [targets[0], []])

@@ -318,7 +318,7 @@ def test_a_problem_in_another_unit_of_potential_has_the_same_answer_in_that_unit
 
 def test_a_pattern_without_targets_teaches_silence():
     (pattern,), targets = examples(11, trains=40, patterns=1, targets=1)
-    # The same played faster: its potential comes higher, so the untaught neuron fires.
+    # The same pattern played faster: its potential is higher, so an untrained neuron fires.
     fast = SpikeTrains.from_lists([0.8 * train for train in pattern], stop=pattern.stop)
     loud = ConeX(lb=-1, ub=1).fit([pattern], targets)
     taught = ConeX(lb=-1, ub=1).fit([pattern, fast], [targets[0], []])

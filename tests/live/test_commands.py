@@ -112,7 +112,7 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, difference
     touch().save(tmp_path / "touch.json")
     files = ["--readout", tmp_path / "touch.json", "--record", tmp_path / "live.mcap"]
     arguments = command("live", *files, "--host", LOOPBACK, "--port", port, "--array", "4x4", "--json")
-    # The datagrams do not keep the board's time: here the host's clock moves nothing on.
+    # The datagrams' times do not follow the board's pace: the guard prevents the host's clock from advancing time here.
     arguments += ["--guard-frames", "1e6", *(["--differences"] if differences else [])]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
         while not (tmp_path / "live.mcap").exists():
@@ -144,7 +144,8 @@ def test_taxel_live_prints_a_line_a_detection_where_nobody_watches(tmp_path: Pat
         listening(process)
         play(presses(6), port)
         assert process.stdout is not None
-        # The guard lets each press be told by the next one; the last one is told at the end, where it had come by then.
+        # With this guard each press is reported when the next one arrives; the last one is reported at the end, if it
+        # had arrived by then.
         lines = [process.stdout.readline() for _ in range(5)]
         process.send_signal(signal.SIGINT)
         rest = process.stdout.read().splitlines()

@@ -26,7 +26,7 @@ def test_a_recording_of_version_2_says_that_nothing_was_lost(tmp_path):
     repaired = summary.counters["wire_v2"]["repaired"]
     assert len(events) == report.changes + repaired
     one = play(acts, seed=1, tare_ms=20.0).events
-    # Version 1 tells the same changes, its times cut to 100 us.
+    # Version 1 contains the same changes, with times rounded down to 100 us.
     assert len(one) == report.changes
     assert [start for _, start in events.markers] == [True, False]
 

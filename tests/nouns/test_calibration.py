@@ -103,7 +103,7 @@ def test_the_law_finds_the_force_of_a_ball_that_the_emulated_board_felt():
     contacts, force = taxel.simulate.truth(acts)
     law = Calibration.law(events.array, sensor=sensor)
     pictures = Frames.from_events(events, 960, int(contacts[0].start_us), int(contacts[0].stop_us))
-    # A taxel that said nothing is at rest.
+    # A taxel without any event is at rest.
     rest = law.readings(frames(0.0, "N", events.array)).values[0]
     held = Frames(np.maximum(pictures.values, rest), pictures.t, unit="ticks", array=events.array)
     assert held.values.max() < 150
@@ -213,7 +213,7 @@ def test_a_recording_finds_the_calibration_beside_it(tmp_path, name):
     assert recording.calibration == calibration
     assert recording.calibrated().unit == "N"
     assert np.array_equal(recording.calibrated().values, calibration.apply(recording.frames()).values)
-    # Nothing turns into N unasked: what encoders and readouts hear stays as it was read.
+    # Values are converted to N only on request: encoders and readouts receive them as they were read.
     assert recording.frames().unit == "counts"
 
 
@@ -284,7 +284,7 @@ def test_a_spoilt_file_is_one_line(tmp_path, entry, nonsense):
     said = json.loads(Calibration.fit([Load(frames(2.0), 6.0)], rest=np.ones(ARRAY.shape), date=DAY).to_json())
     file = tmp_path / "calibration.json"
     file.write_text(json.dumps(said | {entry: nonsense}))
-    # What is left out, or just as good.
+    # Missing entries and valid alternatives, with which the file still loads.
     if (entry, nonsense) in [("rest", None), ("loads", []), ("loads", {}), ("of", "x"), ("date", None)]:
         assert isinstance(Calibration.load(file), Calibration)
         return

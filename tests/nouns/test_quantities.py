@@ -82,7 +82,7 @@ def taught(targets: Any) -> list[float]:
     return rule.fit([TRAINS], [targets]).weights_.tolist()
 
 
-#: Each place that takes times: a call, and the times that it takes, in us.
+#: Each function that takes times: a call, and its times, in us.
 PLACES: dict[str, tuple[Any, Any]] = {
     "trains": (lambda t: SpikeTrains(t, [0, 2], 0.0, 9.0), [1000, 3000]),
     "start": (lambda t: SpikeTrains([5.0], [0, 1], t, 9.0), 2000),
@@ -98,7 +98,7 @@ PLACES: dict[str, tuple[Any, Any]] = {
     "potential": (lambda t: NEURON.potential([0.5, 0.5], TRAINS, t).tolist(), [1000, 3000]),
     "score window": (lambda t: taxel.detect.score(FOUND, {"a": [1500]}, window_ms=t).to_dict(), 3000),
 }
-#: The same, of places that count in us.
+#: The same for functions with times in us.
 PLACES_US: dict[str, tuple[Any, Any]] = {
     "events": (lambda t: Events(t, [0, 1], [0, 0], [1, 0], array=ARRAY), [0, 5000]),
     "markers": (lambda t: Events([], [], [], [], array=ARRAY, markers=[(t, True)]), 2000),

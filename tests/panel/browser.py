@@ -17,7 +17,7 @@ from queue import Empty, Queue
 
 import pytest
 
-#: How long anything may take on a machine at load 20, s.
+#: Timeout for any action on a machine at load 20, s.
 PATIENCE = 90
 FLAGS = [
     "--no-sandbox",

@@ -20,7 +20,7 @@ websockets = pytest.importorskip("websockets", reason="the test extra brings web
 client = pytest.importorskip("websockets.sync.client")
 
 
-#: How long what must happen may take on a busy machine, s.
+#: Timeout for an event on a busy machine, s.
 SOON = 60.0
 
 

@@ -29,7 +29,7 @@ from taxel.simulate.fem import (
 from taxel.simulate.fem.contact import Contact
 from taxel.simulate.fem.solids import Solids
 
-#: Seconds, not minutes.
+#: Chosen so that the tests take seconds, not minutes.
 COARSE = {"mesh_mm": 0.25, "step_um": 25.0}
 #: Programs by engine, and the Python that runs each: GetFEM lives in the system's.
 ENGINES = {

@@ -272,7 +272,7 @@ def test_an_array_of_any_size_feels_a_scene(tmp_path, rows, columns, preset):
     first = contacts[0].start_us
     before, after = events.between(first - 110_000, first - 10_000), events.between(first, first + 10_000)
     near = np.hypot(after.x * 2.67 - 50, after.y * 2.67 - 30) < 30
-    # Noise, of as long a time.
+    # Noise of the same duration.
     assert len(before) / 10 < 0.05 * len(after)
     assert near.mean() > 0.9
 

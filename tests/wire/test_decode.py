@@ -170,7 +170,7 @@ def test_events_come_back_from_their_bytes(drawn):
     steps, taxels, ticks, marks = drawn
     t = 100 * np.cumsum(np.array(steps, np.int64))
     x, y, p = (list(column) for column in zip(*taxels, strict=True)) if taxels else ([], [], [])
-    # Markers stand at times of events, so that no silence is longer than the clock can tell.
+    # Markers have the times of events, so that no silence is longer than the clock can resolve.
     markers = [(int(t[0]) if len(t) else 0, mark) for mark in marks]
     wraps = 6_553_600 * (markers[0][0] // 6_553_600 if markers else (int(t[0]) // 6_553_600 if len(t) else 0))
     pairs = {}

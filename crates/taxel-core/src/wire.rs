@@ -1,7 +1,7 @@
 //! Bytes to events and back: the board's wire, version 1 (thesis, Appendix 1, sections 3 to 5) and version 2 (ours).
 //!
-//! Nothing here does I/O: push bytes as they come, in pieces of any size, and take events. Socket, file and emulated
-//! board are shells around it.
+//! Nothing here does I/O: callers push bytes as they arrive, in pieces of any size, and receive events. Socket, file
+//! and emulated board are built around this module.
 
 mod columns;
 pub mod command;

@@ -1,4 +1,4 @@
-//! The emulated board as a process of its own: frames scanned, datagrams sent, commands carried out, in real time.
+//! Runs the emulated board in real time: scans frames, sends datagrams and executes commands.
 
 mod control;
 mod feed;
@@ -28,29 +28,29 @@ pub use replay::Replay;
 pub use scenes::Scenes;
 use sync::Sync;
 
-/// How often [`Emulator::run`] reads commands, checks whether to stop, and reports.
+/// Interval at which [`Emulator::run`] reads commands, checks whether to stop, and reports.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 const REPORT_EVERY: Duration = Duration::from_millis(100);
 
-/// Longest busy wait before a frame is due, and the step by which it is adapted.
+/// Longest busy wait before a frame is due, and the step by which the wait is adapted.
 const MOST_AWAKE: Duration = Duration::from_micros(30);
 const STEP: Duration = Duration::from_nanos(100);
 
-/// How often two clocks are read; the pair read within the shortest time counts.
+/// Number of times that two clocks are read together; the pair read within the shortest time is used.
 const READINGS: usize = 16;
 
-/// The touch that an emulated board scans: a scene, a recording played again, noise.
+/// The input that an emulated board scans: a scene, a replayed recording, noise.
 pub trait Touch: Send {
-    /// Writes the next frame's trip times (ticks of 1/300 us, one a taxel, by taxel index); false where there is none
-    /// any more, or the caller stops it while it waits, and the board stops.
+    /// Writes the next frame's trip times (ticks of 1/300 us, one per taxel, by taxel index). Returns false if there
+    /// are no more frames, or if the caller stops it while it waits; the board then stops.
     ///
     /// # Errors
     ///
-    /// Where the touch cannot be played; then the board stops too.
+    /// If the input cannot be played; the board then stops too.
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool>;
 
-    /// Whether the next frame can be written now, or there is none any more; waits for it some milliseconds at most, so
-    /// that a board without a frame yet carries out its commands.
+    /// Whether the next frame can be written now, or there is none. Waits for it for some milliseconds at most, so that
+    /// a board without a frame still executes its commands.
     ///
     /// # Errors
     ///
@@ -59,7 +59,7 @@ pub trait Touch: Send {
         Ok(true)
     }
 
-    /// Whether the frame that was written last is the last one, where that is known.
+    /// Whether the last written frame is the final one, if that is known.
     ///
     /// # Errors
     ///
@@ -76,44 +76,44 @@ impl<F: FnMut(&mut [u16]) -> bool + Send> Touch for F {
     }
 }
 
-/// How an [`Emulator`] works.
+/// The options of an [`Emulator`].
 #[derive(Debug, Clone)]
 pub struct EmulatorOptions {
-    /// Where the datagrams go.
+    /// Destination of the datagrams.
     pub to: SocketAddr,
-    /// Send trains of datagrams in one call where the kernel can cut them (`UDP_SEGMENT`).
+    /// Send several datagrams in one call if the kernel can split them (`UDP_SEGMENT`).
     pub segment: bool,
-    /// Frames take as long as on the board; else they are scanned as fast as possible.
+    /// Whether frames take as long as on the board; otherwise they are scanned as fast as possible.
     pub real_time: bool,
-    /// Where the board takes its commands: TCP in place of the UART, bytes in, status lines out (`None`: nowhere). Port 0
-    /// finds a free one.
+    /// Address of the command port: TCP in place of the UART, commands in, status lines out (`None`: no port). Port 0
+    /// selects a free one.
     pub control: Option<SocketAddr>,
-    /// The serial line: where its name is put (a link to a pseudo-terminal), and its baud rate.
+    /// The serial line: the path of its name (a link to a pseudo-terminal), and its baud rate.
     pub line: Option<(PathBuf, u32)>,
-    /// Where the sync line is written, and whether a file there may be replaced.
+    /// The file to which the sync line is written, and whether an existing file may be replaced.
     pub sync: Option<(PathBuf, bool)>,
-    /// Commands of the schedule: before which frame, and which; ascending.
+    /// Scheduled commands, each with the frame before which it is executed; ascending.
     pub commands: Vec<(u64, Command)>,
     /// Whether the first frame is scanned without sending ([`Board::arm`]).
     pub arms: bool,
-    /// Whether the board marks a stop at the end, where a recording runs.
+    /// Whether the board sends a stop marker at the end if a recording is running.
     pub marks_stop: bool,
-    /// What the network does to datagrams.
+    /// Faults of the simulated network.
     pub faults: Option<Faults>,
-    /// The circuit that the taxels share, where it is not ideal; flaws come after it.
+    /// The circuit that the taxels share, if it is not ideal; flaws are applied after it.
     pub circuit: Option<Chain>,
-    /// What is wrong with the taxels.
+    /// Flaws of the taxels.
     pub flaws: Option<Flaws>,
     /// Interval between resets of the board, s of its time.
     pub reset_every_s: Option<f64>,
-    /// How much faster the board's clock runs than the host's, parts per million.
+    /// Drift of the board's clock relative to the host's, parts per million.
     pub drift_ppm: f64,
-    /// The UDP port that the board sends from; 0: any that is free.
+    /// Local UDP port of the board; 0 selects a free one.
     pub source_port: u16,
 }
 
 impl EmulatorOptions {
-    /// In real time to `to`, without commands.
+    /// The default options: real time, to this destination, without commands.
     #[must_use]
     pub fn to(to: SocketAddr) -> Self {
         Self {
@@ -136,26 +136,26 @@ impl EmulatorOptions {
     }
 }
 
-/// What an [`Emulator`] has done.
+/// A report of an [`Emulator`].
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Report {
-    /// What the board counted.
+    /// Counts of the board.
     pub board: BoardCounts,
-    /// What was sent.
+    /// Counts of what was sent.
     pub sent: SendCounts,
-    /// What the network did to it, where it was asked to.
+    /// Counts of the simulated network, if there is one.
     pub network: Option<NetworkCounts>,
     /// Number of resets of the board.
     pub resets: u64,
-    /// How long after its end each frame was sent; nothing where frames go as fast as they can.
+    /// Delay of each frame's datagrams after the frame's end; empty if frames are not paced.
     pub late: Quantiles,
-    /// Frames that were sent more than a frame late.
+    /// Number of frames that were sent more than one frame late.
     pub late_frames: u64,
-    /// The host's clock at the board's time 0, ns since 1970: in real time all that the board does is due by it.
+    /// The host's clock at the board's time 0, ns since 1970; in real time, every frame is due relative to it.
     pub began_ns: i64,
-    /// Time by the board's clock, s.
+    /// Duration by the board's clock, s.
     pub board_seconds: f64,
-    /// Time by the host's clock, s.
+    /// Duration by the host's clock, s.
     pub seconds: f64,
 }
 
@@ -178,8 +178,8 @@ impl Emulator {
     ///
     /// # Errors
     ///
-    /// `Socket` where the control port is taken, `File` where line or sync line cannot be had; `Core(Problem)` where the
-    /// schedule does not ascend, or a fault, flaw, drift or reset makes no sense.
+    /// `Socket` if the control port is in use, `File` if the serial line or the sync line cannot be opened;
+    /// `Core(Problem)` if the schedule does not ascend, or if a fault, flaw, drift or reset is out of range.
     pub fn open(board: Board, array: &Array, options: EmulatorOptions) -> Result<Self> {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
             return Err(taxel_core::problem!("command {}: its frame lies before that of command {k}", k + 1).into());
@@ -207,13 +207,13 @@ impl Emulator {
         self.control.address()
     }
 
-    /// Plays `touch` to its end, or until `stop`, which is no error; `watch` gets a report ten times a second.
+    /// Plays `touch` to its end, or until `stop`, which is not an error; `watch` receives a report ten times a second.
     ///
     /// The datagrams of a frame are sent at its end. A late frame does not delay later ones.
     ///
     /// # Errors
     ///
-    /// `Socket` where the system refuses to send.
+    /// `Socket` if the system refuses to send.
     #[allow(clippy::cast_possible_truncation)]
     pub fn run<T: Touch + ?Sized>(
         &mut self,
@@ -235,7 +235,7 @@ impl Emulator {
         let mut report = Report { began_ns, ..Report::default() };
         let host_s_per_us = 1e-6 / (1.0 + 1e-6 * self.options.drift_ppm);
         let mut due = begun;
-        // The board's time since its start, us: a reset sets the board's own clock back to 0.
+        // The board's time since its start, us, which a reset does not change; the board's own clock returns to 0.
         let mut before_reset_us = -started_us;
         let (mut polled, mut reported) = (begun, begun);
         let mut last = false;
@@ -270,7 +270,7 @@ impl Emulator {
                 && !last
             {
                 match crossed.read(self.board.registers(), &mut ticks, stop) {
-                    // A request to stop is no error here; the loop checks for it.
+                    // A request to stop is not an error here; the loop checks for it.
                     Err(taxel_core::Error::Interrupted) => continue,
                     read => read?,
                 }
@@ -293,7 +293,7 @@ impl Emulator {
                 }
                 true
             })?;
-            // The board knows how long its frame was: a command may have changed that.
+            // The length of the frame that was scanned: a command may have changed it.
             let before = due;
             due = begun + Duration::from_secs_f64((before_reset_us + self.board.time_us()) * host_s_per_us);
             let now = if self.options.real_time { pace.wait_until(due) } else { Instant::now() };
@@ -343,7 +343,7 @@ impl Emulator {
     }
 }
 
-/// Datagrams that are sent when the frame ends, not earlier: a train is sent as soon as a datagram of another length follows.
+/// Datagrams that wait until the frame ends: a train is sent as soon as a datagram of another length follows.
 #[derive(Default)]
 struct Leaving {
     bytes: Vec<u8>,
@@ -369,8 +369,8 @@ impl Leaving {
     }
 }
 
-/// Now by the clock that paces frames, and by the one that arrivals are stamped with, ns since 1970. Where the thread was held
-/// up between the two, they are read again.
+/// The current time by the clock that paces frames, and by the one that stamps arrivals, ns since 1970. Both are read
+/// several times, because the thread may be interrupted between the two.
 fn now_by_both() -> (Instant, i64) {
     let read = |_| {
         let (before, now_ns) = (Instant::now(), now_ns());
@@ -381,15 +381,15 @@ fn now_by_both() -> (Instant, i64) {
     (before + took / 2, now_ns)
 }
 
-/// Waits until frames are due. A sleeping thread wakes some 10 us late, later on an idle core than on a busy one. So the sleep ends
-/// earlier by that much, and the rest is a busy wait.
+/// Waits until frames are due. A sleeping thread wakes some 10 us late, later on an idle core than on a busy one.
+/// Therefore the sleep ends earlier by that time, and the rest is a busy wait.
 #[derive(Debug, Default)]
 struct Pace {
     sooner: Duration,
 }
 
 impl Pace {
-    /// Waits until `due`, if it is not past; returns the time then.
+    /// Waits until `due` if it has not passed; returns the current time.
     fn wait_until(&mut self, due: Instant) -> Instant {
         let mut now = Instant::now();
         let Some(left) = due.checked_duration_since(now) else { return now };
@@ -398,7 +398,8 @@ impl Pace {
         {
             std::thread::sleep(sleep);
             let woken = Instant::now();
-            // Nine in ten wake in time; a later one had a busy core, which a longer busy wait does not help.
+            // Adapted so that nine in ten wake-ups are in time; a later one was caused by a busy core, where a longer
+            // busy wait does not help.
             self.sooner = if woken.saturating_duration_since(now + sleep) > self.sooner {
                 (self.sooner + 9 * STEP).min(MOST_AWAKE)
             } else {
@@ -414,9 +415,10 @@ impl Pace {
     }
 }
 
-/// Asks the kernel not to gather this thread's wake-ups: it may let them come 50 us late, a quarter of a frame.
+/// Disables the kernel's timer slack for this thread: it may delay wake-ups by 50 us, a quarter of a frame.
 fn wake_sharply() {
-    // SAFETY: PR_SET_TIMERSLACK takes one number and touches no memory of ours; where it fails, sleeps are coarser.
+    // SAFETY: PR_SET_TIMERSLACK takes one number and accesses no memory of ours; if it fails, wake-ups are less
+    // precise.
     unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64) };
 }
 
@@ -433,7 +435,7 @@ mod tests {
             assert!(pace.wait_until(due) >= due);
             assert!(pace.sooner <= MOST_AWAKE);
         }
-        // A frame that is already due is not waited for.
+        // The thread does not wait for a frame that is already due.
         let now = pace.wait_until(due);
         assert!(now >= due);
     }

@@ -1,4 +1,4 @@
-//! Change events: how far a taxel moved since its last event, with 1 to 10 bits (equation 5.7).
+//! Change events: the difference of a taxel's value from that of its last event, with 1 to 10 bits (equation 5.7).
 
 use serde::{Deserialize, Serialize};
 
@@ -14,31 +14,32 @@ use crate::{Array, Result, Spike, problem};
 
 /// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).
 ///
-/// A spike's value is the quantised change. A value that a state of version 2 repaired moves the previous one with it and gives
-/// none. The first sample is the first previous value and gives none. Reckoned in
-/// f32. One signed train a taxel.
+/// A spike's value is the quantised change. A value that a state of version 2 repaired replaces the previous value
+/// without a spike. The first sample becomes the first previous value without a spike. Computed in f32. One signed
+/// train per taxel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChangeEvents {
-    /// The smallest change that counts, in the sensor's unit, above 0; theta_0 of equation 5.7. Default 3 ticks, the
+    /// The smallest change that causes an event, in the sensor's unit, above 0; theta_0 of equation 5.7. Default 3
+    /// ticks, the
     /// floor of the board's fast presets (wire.md, section 3).
     #[serde(default = "three")]
     pub noise_floor: f64,
-    /// Bits an event, 1 to 10 (figure 5.7). Default 1: rise or fall.
+    /// Bits of an event's value, 1 to 10 (figure 5.7). Default 1: rise or fall.
     #[serde(default = "one_bit")]
     pub bits: u32,
-    /// What a sample is compared with. Default the value last sent.
+    /// The reference of a change. Default the value last sent.
     #[serde(default)]
     pub previous: Previous,
-    /// How U / theta_0 becomes whole. Default truncation.
+    /// How U / theta_0 is rounded to a whole number. Default truncation.
     #[serde(default)]
     pub rounding: Rounding,
-    /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+    /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
     #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
 }
 
-/// How U / theta_0 becomes whole.
+/// How U / theta_0 is rounded to a whole number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rounding {

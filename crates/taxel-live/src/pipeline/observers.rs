@@ -12,14 +12,14 @@ use super::shared::Shared;
 use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::capture::Batch;
 
-/// How often a new picture is published.
+/// Interval at which a new picture is published.
 const PICTURE_EVERY: Duration = Duration::from_millis(100);
 
 pub(super) struct Observers {
     shared: Arc<Shared>,
     viewers: Vec<ViewerQueue>,
     copiers: Vec<Copier>,
-    /// How many datagrams were received before the next one.
+    /// Number of datagrams that were received before the next one.
     received: u64,
     pictured: Instant,
 }
@@ -29,7 +29,7 @@ impl Observers {
         Self { shared, viewers: vec![], copiers: vec![], received: 0, pictured: Instant::now() }
     }
 
-    /// Adds a viewer of the events, where it still waits for that.
+    /// Adds a viewer of the events, if it is still connected.
     pub(super) fn add_viewer(&mut self, give: &channel::Sender<ViewerEvents>, held: &Held) {
         let counters = &self.shared.published().counters;
         let (queue, events) = viewer_queue(&self.shared.options.array, held, counters.board_us, counters.events);
@@ -38,7 +38,7 @@ impl Observers {
         }
     }
 
-    /// Adds another computer that gets the datagrams.
+    /// Adds another computer that receives the datagrams.
     pub(super) fn add_copier(&mut self, give: &channel::Sender<channel::Receiver<Vec<u8>>>) {
         let (copier, parcels) = copier(self.received);
         if give.send(parcels).is_ok() {
@@ -46,17 +46,17 @@ impl Observers {
         }
     }
 
-    /// How long datagrams may be waited for at most, so that parcels leave in time.
+    /// Longest time that the pipeline may wait for datagrams, so that parcels are sent in time.
     pub(super) fn longest_wait(&self, wait: Duration) -> Duration {
         if self.copiers.is_empty() { wait } else { wait.min(GATHER) }
     }
 
-    /// Copies events, whose values are among those that the taxels hold.
+    /// Copies events, whose values are already applied to `held`.
     pub(super) fn events(&mut self, events: &Events, held: &Held) {
         self.viewers.iter_mut().for_each(|queue| queue.push(events, held));
     }
 
-    /// The board was reset, and its taxels hold no value.
+    /// Handles a reset of the board, after which the taxels' values are unknown.
     pub(super) fn reset(&mut self, held: &Held) {
         self.viewers.iter_mut().for_each(|queue| queue.reset(held));
     }
@@ -81,7 +81,7 @@ impl Observers {
         self.viewers.retain_mut(|queue| queue.tick(held));
     }
 
-    /// Publishes the picture where it is time; returns whether it was.
+    /// Publishes the picture if it is due; returns whether it was.
     pub(super) fn picture(&mut self, held: &Held) -> bool {
         if self.pictured.elapsed() < PICTURE_EVERY {
             return false;
@@ -91,7 +91,7 @@ impl Observers {
         true
     }
 
-    /// Sends the last of what waits.
+    /// Sends the last data that wait.
     pub(super) fn finish(&mut self, held: &Held) {
         self.tick(held);
         let dropped = self.shared.receiver.counts().dropped_by_kernel;

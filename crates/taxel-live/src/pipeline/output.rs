@@ -1,5 +1,5 @@
-//! Hands detections to their sinks, to the recording and to waiting receivers: one after the other, by any thread that is
-//! free to.
+//! Passes detections to the sinks, to the recording and to waiting receivers: one after the other, in any thread that
+//! is free.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -13,10 +13,11 @@ use crate::locked::lock;
 use crate::recording::now_ns;
 use crate::{Error, Result};
 
-/// How many detections wait while a sink is slow; more are lost, and counted.
+/// Capacity of the queue of detections while a sink is slow; more are lost, and counted.
 const WAITING: usize = 1 << 14;
 
-/// Outputs detections in order, one at a time; a thread that finds another one outputting leaves them to it.
+/// Outputs detections in order, one at a time; a thread that finds another one outputting leaves its detections to that
+/// thread.
 pub(super) struct DetectionOutput(Mutex<State>);
 
 struct State {
@@ -25,12 +26,12 @@ struct State {
     receivers: Option<Receivers>,
 }
 
-/// Where detections go.
+/// The receivers of detections.
 struct Receivers {
     sinks: Vec<Box<dyn Sink>>,
     /// The queue of [`Live::next`](super::Live::next).
     queue: Sender<OutputDetection>,
-    /// A sink has failed, which ends the pipeline: nothing more is output.
+    /// Whether a sink has failed, which ends the pipeline: nothing more is output.
     failed: bool,
 }
 
@@ -40,7 +41,7 @@ impl DetectionOutput {
         Self(Mutex::new(State { waiting: VecDeque::new(), receivers }))
     }
 
-    /// Adds detections; returns whether no thread is outputting any.
+    /// Adds detections; returns whether no thread is outputting at present.
     pub(super) fn add(&self, shared: &Shared, found: &mut Vec<Detection>) -> bool {
         let mut state = lock(&self.0);
         let room = WAITING.saturating_sub(state.waiting.len()).min(found.len());
@@ -54,7 +55,7 @@ impl DetectionOutput {
         state.receivers.is_some()
     }
 
-    /// Hands on what waits, and what arrives in the meantime, unless another thread does.
+    /// Outputs the waiting detections, and those that are added meanwhile, unless another thread is outputting.
     pub(super) fn run(&self, shared: &Shared) {
         let mut state = lock(&self.0);
         let Some(mut receivers) = state.receivers.take() else { return };
@@ -73,7 +74,7 @@ impl DetectionOutput {
 }
 
 impl Receivers {
-    /// To the sinks first, then into the recording and to those that wait for it.
+    /// Passes a detection to the sinks first, then to the recording and the receivers.
     fn take(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
         let output_ns = now_ns();
         let offset = shared.published().counters.offset;
@@ -84,7 +85,7 @@ impl Receivers {
         };
         self.sinks.iter_mut().try_for_each(|sink| sink.take(&output)).map_err(Error::Sink)?;
         if let Some(recorder) = &*lock(&shared.recorder) {
-            // An error that ends only the recording is found, and kept, by the decoding thread too.
+            // The decoding thread detects and stores an error that ends only the recording, too.
             recorder
                 .detection(&output)
                 .or_else(|error| if recorder.since().is_some() { Ok(()) } else { Err(error) })?;

@@ -1,4 +1,4 @@
-//! The fourth stage: events to the readout, in this thread or, through a queue, to one behind it.
+//! The fourth stage: passes events to the readout, in this thread or through a queue to another one.
 
 use taxel_core::Events;
 use taxel_core::detect::Detection;
@@ -11,11 +11,11 @@ use super::shared::Shared;
 pub(super) struct ReadOutStage {
     /// Whether there is a readout at all.
     is_on: bool,
-    /// The readout, as long as it works in this thread.
+    /// The readout, while it runs in this thread.
     reader: Option<Reader>,
-    /// One that is to continue in a thread of its own.
+    /// A readout that is about to move to its own thread.
     separated: Option<Box<Reader>>,
-    /// Without a reader nothing is found.
+    /// An empty list, used while this thread has no reader.
     nothing: Vec<Detection>,
     /// The time up to which no more events will follow by the promises of version 2 that the readout has received, us.
     announced: Option<i64>,
@@ -37,7 +37,7 @@ impl ReadOutStage {
         }
     }
 
-    /// From now on another thread reads out.
+    /// Moves the readout to another thread.
     pub(super) fn separate(&mut self) {
         if let Some(reader) = self.reader.take() {
             self.separated = Some(Box::new(reader));
@@ -49,7 +49,7 @@ impl ReadOutStage {
         self.separated.take()
     }
 
-    /// Detections that no thread has taken for output yet.
+    /// Detections that no thread has output yet.
     pub(super) fn found(&mut self) -> &mut Vec<Detection> {
         self.reader.as_mut().map_or(&mut self.nothing, |reader| &mut reader.found)
     }
@@ -58,12 +58,12 @@ impl ReadOutStage {
         self.announced
     }
 
-    /// The board was reset: its earlier promises hold no more.
+    /// Handles a reset of the board: its earlier promises are void.
     pub(super) fn reset(&mut self) {
         self.announced = None;
     }
 
-    /// Reads events out, with the time before which the board has promised to send no more; a queue may leave them empty.
+    /// Processes events, with the time before which the board has promised no more; `events` may be empty after it.
     pub(super) fn push(&mut self, shared: &Shared, events: &mut Events, promised: Option<i64>) {
         if !self.is_on || (promised.is_none() && events.is_empty() && events.markers.is_empty()) {
             return;
@@ -80,7 +80,7 @@ impl ReadOutStage {
         self.announced = self.announced.max(promised);
     }
 
-    /// Nothing comes before a time.
+    /// Processes a silence: no events before a time.
     pub(super) fn quiet(&mut self, shared: &Shared, quiet: Quiet) {
         match &mut self.reader {
             Some(reader) => reader.wait(shared, Taken { quiet: Some(quiet), last: false }),
@@ -96,7 +96,7 @@ impl ReadOutStage {
         }
     }
 
-    /// No more data will arrive.
+    /// Ends the input.
     pub(super) fn close(&mut self, shared: &Shared, quiet: Option<Quiet>) {
         match &mut self.reader {
             Some(reader) => reader.wait(shared, Taken { quiet, last: true }),

@@ -1,4 +1,4 @@
-//! Encodes events and reads them out: in the thread that decodes, or in one behind it.
+//! Encodes events and runs the readout: in the decoding thread, or in a separate one.
 
 use taxel_core::Events;
 use taxel_core::detect::{Detection, FrameTime, Readout, ReadoutStream};
@@ -11,20 +11,20 @@ use super::readout_queue::{Quiet, Taken};
 use super::rest::Rest;
 use super::shared::Shared;
 
-/// What reads the events out.
+/// The receiver of the events.
 pub enum Listener {
     /// Nothing: datagrams are received and recorded only.
     None,
     /// A readout.
     Reading(Box<ReadoutStream>),
-    /// A readout that first takes a tare: from the first event on for so long (us of the board's clock), or until the
-    /// board marks a start.
+    /// A readout that first takes a tare: for this duration from the first event on (us of the board's clock), or until
+    /// the board marks a start.
     Taring(i64, Box<Readout>),
 }
 
 impl Listener {
-    /// The listener of a readout, where there is one: it takes a fresh tare of `tare_us` where that is given, else it reads at
-    /// once, with `tare` where its encoder needs one.
+    /// The listener of a readout, if there is one: it first takes a tare of `tare_us` if that is given, otherwise it
+    /// starts at once, with `tare` if its encoder needs one.
     ///
     /// # Errors
     ///
@@ -45,7 +45,7 @@ impl Listener {
 
 pub(super) struct Reader {
     mode: Mode,
-    /// Detections that no thread has taken for output yet.
+    /// Detections that no thread has output yet.
     pub(super) found: Vec<Detection>,
     events: Events,
     zeroings: Vec<Zeroing>,
@@ -55,7 +55,7 @@ pub(super) struct Reader {
 enum Mode {
     Reading(Ahead),
     Taring(Box<Rest>),
-    /// Between the two, and after an error.
+    /// State during a change between the two, and after an error.
     Idle,
 }
 
@@ -72,13 +72,13 @@ impl Reader {
         Self { mode, found: vec![], events, zeroings: vec![], frames: options.frames() }
     }
 
-    /// Publishes whether it takes a tare, and the rest that it reads with, before the first events.
+    /// Publishes whether a tare is being taken, and the current rest, before the first events.
     pub(super) fn begin(&self, shared: &Shared) {
         shared.published().counters.taring = matches!(self.mode, Mode::Taring(_));
         self.publish_rest(shared);
     }
 
-    /// In a thread of its own: reads out what is handed over until the last of it, and hands its detections to the output.
+    /// Runs in a separate thread: processes the queue until its end, and passes detections to the output.
     pub(super) fn run(mut self, shared: &Shared, output: &DetectionOutput) {
         let mut last = false;
         loop {
@@ -95,20 +95,20 @@ impl Reader {
         }
     }
 
-    /// In the thread that decodes: reads its events out, and leaves it the memory of the last ones.
+    /// Runs in the decoding thread: processes its events, and leaves it the buffer of the previous ones.
     pub(super) fn take(&mut self, shared: &Shared, events: &mut Events, taken: Taken) {
         std::mem::swap(&mut self.events, events);
         self.process(shared, taken);
         self.events.clear();
     }
 
-    /// Nothing arrived, but time has.
+    /// Advances time without events.
     pub(super) fn wait(&mut self, shared: &Shared, taken: Taken) {
         self.events.clear();
         self.process(shared, taken);
     }
 
-    /// Takes zeroings, each of which has its own time.
+    /// Applies zeroings, each of which has its own time.
     pub(super) fn zero(&mut self, zeroings: &[Zeroing]) {
         self.zeroings.extend_from_slice(zeroings);
     }
@@ -149,7 +149,7 @@ impl Reader {
         Ok(())
     }
 
-    /// The rest is over: reads from the first event after it on.
+    /// Ends the tare: runs the readout from the first event after it on.
     fn begin_reading(&mut self, shared: &Shared, stop: i64, inside: usize) -> crate::Result<()> {
         let Mode::Taring(rest) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
         let (tare, stream) = rest.finish(stop, self.frames)?;
@@ -163,7 +163,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Publishes the rest that the readout reads with, where it needs any.
+    /// Publishes the readout's current rest, if its encoder uses a tare.
     fn publish_rest(&self, shared: &Shared) {
         if let Mode::Reading(readout) = &self.mode {
             let rest = readout.rest();

@@ -7,7 +7,7 @@ use taxel_core::{Array, Events};
 
 use crate::locked::lock;
 
-/// Events that wait for the readout, and how far the board's time has arrived without any.
+/// Events that wait for the readout, and the time up to which there are no more.
 #[derive(Debug)]
 pub(super) struct ReadoutQueue {
     state: Mutex<Waiting>,
@@ -24,17 +24,17 @@ struct Waiting {
     closed: bool,
 }
 
-/// After the events that were handed over no data arrive before this time, us.
+/// A time before which no data follow the queued events, us.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Quiet {
-    /// By the host's clock: an event that comes late may contradict it.
+    /// By the host's clock: an event that arrives late may contradict it.
     Believed(i64),
     /// As the board has promised.
     Promised(i64),
 }
 
 impl Quiet {
-    /// us.
+    /// The time, us.
     pub(super) fn until(self) -> i64 {
         match self {
             Self::Believed(t) | Self::Promised(t) => t,
@@ -42,10 +42,10 @@ impl Quiet {
     }
 }
 
-/// What the readout processes at once, beside the events.
+/// Information for the readout that accompanies the events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Taken {
-    /// How far time has arrived after the events.
+    /// The time before which no more events follow.
     pub quiet: Option<Quiet>,
     /// No more data will arrive.
     pub last: bool,
@@ -58,8 +58,8 @@ impl ReadoutQueue {
         Self { state: Mutex::new(state), came: Condvar::new(), limit }
     }
 
-    /// Adds events, with the board's promise after them, and leaves `events` empty; those that find no room are dropped. Returns how
-    /// many were so far. One wake-up.
+    /// Adds events, with the board's promise after them, and leaves `events` empty; those that do not fit are dropped.
+    /// Returns the number dropped so far. Wakes the reader once.
     pub(super) fn put(&self, events: &mut Events, promised: Option<i64>) -> u64 {
         let mut state = self.state();
         let room = self.limit.saturating_sub(state.events.len());
@@ -78,7 +78,7 @@ impl ReadoutQueue {
         dropped
     }
 
-    /// Sets up to when no data arrive after the events that wait.
+    /// Sets the time before which no data follow the queued events.
     pub(super) fn quiet(&self, quiet: Quiet) {
         self.state().quiet = Some(quiet);
         self.came.notify_one();
@@ -90,7 +90,7 @@ impl ReadoutQueue {
         self.came.notify_one();
     }
 
-    /// Ends it; `quiet` is up to when nothing arrived.
+    /// Ends the queue; `quiet` is the time before which nothing arrived.
     pub(super) fn close(&self, quiet: Option<Quiet>) {
         let mut state = self.state();
         state.quiet = quiet.or(state.quiet);
@@ -99,7 +99,7 @@ impl ReadoutQueue {
         self.came.notify_one();
     }
 
-    /// Waits until something is there and takes all of it; adds to `zeroings`.
+    /// Waits until the queue is not empty, and takes everything; adds to `zeroings`.
     pub(super) fn take(&self, events: &mut Events, zeroings: &mut Vec<Zeroing>) -> Taken {
         events.clear();
         let nothing = |s: &mut Waiting| {
@@ -112,7 +112,8 @@ impl ReadoutQueue {
         Taken { quiet: state.quiet.take(), last: state.closed }
     }
 
-    /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
+    /// Locks the state. No holder of the lock can panic half-way through a change, so a poisoned lock still guards a
+    /// valid state.
     fn state(&self) -> MutexGuard<'_, Waiting> {
         lock(&self.state)
     }

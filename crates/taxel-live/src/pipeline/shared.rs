@@ -1,4 +1,4 @@
-//! What the threads of a pipeline share, what they publish, and what is requested of them.
+//! State that the threads of a pipeline share: what they publish, and what is requested of them.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
@@ -23,10 +23,10 @@ use crate::locked::lock;
 use crate::recording::Track;
 use crate::{Error, Result};
 
-/// How often a wait for an answer checks whether the decoding thread has ended.
+/// Interval at which a wait for a reply checks whether the decoding thread has ended.
 const ANSWER_EVERY: Duration = Duration::from_millis(50);
 
-/// What the threads publish: counts, the picture, the tare.
+/// The values that the threads publish: counts, the picture, the tare.
 #[derive(Debug, Default)]
 pub(super) struct Published {
     pub(super) counters: Counters,
@@ -35,16 +35,16 @@ pub(super) struct Published {
     pub(super) markers: Vec<Marker>,
     pub(super) picture: Vec<u16>,
     pub(super) tare: Option<Tare>,
-    /// The rest of each taxel that the readout reads with, by taxel index; empty where it needs none, or has none yet.
+    /// The readout's rest of each taxel, by taxel index; empty if its encoder uses no tare, or has none yet.
     pub(super) rest: Vec<Option<f64>>,
     /// The latest zeroing of each taxel, by its index.
     pub(super) zeroed: BTreeMap<usize, Zeroing>,
-    /// How often taxels were zeroed.
+    /// Number of zeroings.
     pub(super) zeroings: u64,
     pub(super) failed: Option<Error>,
 }
 
-/// What all threads share.
+/// State shared by all threads.
 pub(super) struct Shared {
     pub(super) options: LiveOptions,
     pub(super) begun: Instant,
@@ -52,40 +52,41 @@ pub(super) struct Shared {
     pub(super) readout_queue: ReadoutQueue,
     pub(super) published: Mutex<Published>,
     pub(super) recorder: Mutex<Option<Recorder>>,
-    /// The error that ended a recording early which was begun while the pipeline ran.
+    /// The error that ended a recording that began while the pipeline ran.
     pub(super) broken: Mutex<Option<Error>>,
-    /// Requests to the decoding thread, which it answers between two batches.
+    /// Requests to the decoding thread, which handles them between two batches.
     pub(super) requests: Mutex<Vec<Request>>,
     pub(super) requested: AtomicBool,
-    /// Times of detections, markers and notes, us, around which the recording gets pictures, since it last did.
+    /// Times of detections, markers and notes since the last picture was recorded, us; the pictures around them are
+    /// recorded.
     pub(super) picture_times: Mutex<Vec<i64>>,
-    /// Whether a recording runs that was begun while the pipeline ran.
+    /// Whether a recording that began while the pipeline ran is running.
     pub(super) records: AtomicBool,
     /// Further queues that get each detection; a slow one misses some.
     pub(super) subscribers: Mutex<Vec<channel::Sender<OutputDetection>>>,
-    /// Where detections go.
+    /// The destinations of detections.
     pub(super) sending: Vec<Arc<Line>>,
-    /// The registers as they are now.
+    /// The current registers.
     pub(super) registers: Mutex<Registers>,
-    /// The version of the wire that the board was newly set to; 0 where it was not.
+    /// The version of the wire to which the board was newly set; 0 if it was not.
     pub(super) expected: AtomicU8,
     pub(super) ended: AtomicBool,
 }
 
-/// The recording that ran, where one did, and the counters of its last datagram.
+/// The recording that was running, if any, and the counters after its last datagram.
 pub(super) type Ended = (Option<Recorder>, Counters);
 
-/// What the decoding thread does between two batches.
+/// A request that the decoding thread handles between two batches.
 pub(super) enum Request {
-    /// End the recording that runs, and record into this one, where there is one, from the next datagram on.
+    /// Ends the running recording, and records into this one, if there is one, from the next datagram on.
     Record(Option<Box<Recorder>>, channel::Sender<Result<Ended>>),
-    /// Give a viewer the events.
+    /// Copies the events for a viewer.
     View(channel::Sender<ViewerEvents>),
-    /// Give datagrams for another computer.
+    /// Copies the datagrams for another computer.
     Copy(channel::Sender<channel::Receiver<Vec<u8>>>),
-    /// The registers were written.
+    /// Notes a write of the registers.
     Registers(Registers),
-    /// Zero these taxels, and return the zeroings.
+    /// Zeroes these taxels, and returns the zeroings.
     Zero(Vec<(u16, u16)>, channel::Sender<Result<Vec<Zeroing>>>),
 }
 
@@ -94,27 +95,27 @@ impl Shared {
         lock(&self.published)
     }
 
-    /// Requests something of the decoding thread, which answers within 20 ms, and never after its end.
+    /// Adds a request to the decoding thread, which handles it within 20 ms, but not after its end.
     pub(super) fn request(&self, request: Request) {
         lock(&self.requests).push(request);
         self.requested.store(true, Ordering::Release);
     }
 
-    /// The recording gets the pictures around these times, us.
+    /// Selects the pictures around these times, us, for the recording.
     pub(super) fn picture_around(&self, times: impl IntoIterator<Item = i64>) {
         lock(&self.picture_times).extend(times);
     }
 
-    /// Everything that arrived was processed.
+    /// Notes that everything that arrived was processed.
     pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Release);
     }
 
-    /// Waits for the answer to a request.
+    /// Waits for the reply to a request.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the decoding thread has ended.
+    /// `Core(Problem)` if the decoding thread has ended.
     pub(super) fn wait<T>(&self, answer: &channel::Receiver<T>) -> Result<T> {
         loop {
             match answer.recv_timeout(ANSWER_EVERY) {
@@ -154,7 +155,8 @@ impl Shared {
         }
     }
 
-    /// Ends everything because of an error, which [`Live::next`](super::Live::next) and [`Live::stop`](super::Live::stop) then give.
+    /// Ends the pipeline because of an error, which [`Live::next`](super::Live::next) and
+    /// [`Live::stop`](super::Live::stop) then return.
     pub(super) fn fail(&self, error: Error) {
         self.published().failed.get_or_insert(error);
         self.receiver.stop();

@@ -4,8 +4,8 @@
 //! again afterwards; where a callback takes longer than [`TAKE_OVER`], the other thread acquires them and continues to receive:
 //! what arrives in the meantime waits in the kernel's buffer.
 //!
-//! A disk may delay a recording, and a readout may be slower than the events arrive: then one thread receives (or reads what a
-//! third one received), decodes and records, and the other reads out from then on.
+//! A disk may delay a recording, and a readout may be slower than the events arrive. In these cases one thread receives
+//! (or reads what a third one received), decodes and records, and the other reads out from then on.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
@@ -16,7 +16,7 @@ use super::shared::Shared;
 use super::stages::{Next, Stages};
 use crate::locked::lock;
 
-/// How often the follower checks whether the stages were released: a callback may delay receiving by this.
+/// Interval at which the follower checks whether the stages were released: a callback may delay receiving by this time.
 const TAKE_OVER: Duration = Duration::from_millis(2);
 
 /// The stages and the output, which one thread at a time owns.
@@ -27,12 +27,12 @@ pub(super) struct Threads {
 }
 
 struct Turn {
-    /// `None` while a thread, the leader, owns them.
+    /// `None` while a thread, the leader, owns the stages.
     stages: Option<Box<Stages>>,
-    /// A readout that is to continue in a thread of its own.
+    /// A readout that must move to its own thread.
     reader: Option<Reader>,
     over: bool,
-    /// Threads that have not ended.
+    /// Number of threads that have not ended.
     left: usize,
 }
 
@@ -42,7 +42,7 @@ impl Threads {
         Self { turn: Mutex::new(turn), changed: Condvar::new(), output }
     }
 
-    /// What each thread does, until the end.
+    /// The loop of each thread, until the end.
     pub(super) fn run(&self, shared: &Arc<Shared>) {
         let _leaving = Leaving { threads: self, shared };
         loop {
@@ -70,7 +70,7 @@ impl Threads {
             let alone = self.output.add(shared, stages.found());
             match next {
                 Next::Output if !alone => continue,
-                // The follower is not woken for it: the callback would wait for that.
+                // The follower is not woken for this, because the callback would have to wait for the wake-up.
                 Next::Output => lock(&self.turn).stages = Some(stages),
                 Next::Separate(reader) => {
                     lock(&self.turn).reader = Some(*reader);
@@ -88,7 +88,7 @@ impl Threads {
     }
 }
 
-/// Ends the wait of the other thread, however this one ends.
+/// Ends the other thread's wait when this one ends, in whichever way.
 struct Leaving<'a> {
     threads: &'a Threads,
     shared: &'a Shared,

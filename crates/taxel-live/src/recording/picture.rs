@@ -1,37 +1,37 @@
-//! The low-rate picture: held values as grey, so that a viewer shows a touch and not the rest of the sensor.
+//! The low-rate picture: values above rest in grey, so that a viewer shows touches and not the sensor's rest.
 
 use std::collections::VecDeque;
 
 use taxel_core::encode::Tare;
 use taxel_core::rest::{Rest, Value};
 
-/// White is the largest value of so long, us.
+/// White is the largest value of this period, us.
 const SCALE_US: i64 = 10_000_000;
 
-/// A picture of an event may be so much older than the last one, us: it is drawn on that one's scale.
+/// Largest age of a picture relative to the latest one, us, at which it is drawn with that one's scale.
 const LATE_US: i64 = 1_000_000;
 
-/// What pictures are made of: what each taxel reads at rest, and how strongly it was pressed lately.
+/// The state of the pictures: the rest of each taxel, and the largest recent values.
 #[derive(Debug)]
 pub(super) struct Pictures {
     rest: Rest<f64>,
-    /// Largest values above rest with their times, us: falling values, so that the first is the largest of all.
+    /// Largest recent values above rest, with their times, us; they decrease, so the first is the largest.
     peaks: VecDeque<(i64, f64)>,
 }
 
-/// A picture, and what its grey means.
+/// A picture, and the meaning of its grey values.
 #[derive(Debug, PartialEq)]
 pub(super) struct Grey {
     /// 0 at rest, 255 at `full`, row by row.
     pub(super) bytes: Vec<u8>,
-    /// What was subtracted.
+    /// The rest that was subtracted.
     pub(super) rest: &'static str,
-    /// What is white, ticks above rest.
+    /// Value of white, ticks above rest.
     pub(super) full: f64,
 }
 
 impl Pictures {
-    /// Pictures of so many taxels, above the lowest value of each.
+    /// Pictures of this number of taxels, above the lowest value of each.
     pub(super) fn new(taxels: usize) -> Self {
         Self { rest: Rest::lowest(vec![f64::NO_REST; taxels]), peaks: VecDeque::new() }
     }
@@ -43,14 +43,14 @@ impl Pictures {
         self.peaks.clear();
     }
 
-    /// Subtracts this from the values of a taxel from now on.
+    /// Subtracts this rest from the values of a taxel from now on.
     pub(super) fn zero(&mut self, taxel: usize, rest: f64) {
         if taxel < self.rest.values().len() {
             self.rest.set(taxel, rest);
         }
     }
 
-    /// The grey picture of the values at `t_us`; 0 is a taxel without any event so far.
+    /// The grey picture of the values at `t_us`; a value of 0 is also that of a taxel without any event so far.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn take(&mut self, t_us: i64, held: &[u16]) -> Grey {
         if self.rest.values().len() != held.len() {
@@ -64,7 +64,7 @@ impl Pictures {
         let rest = if self.rest.is_lowest() { "lowest so far" } else { "tare" };
         let peak = above.iter().copied().fold(0.0, f64::max);
         let late = self.peaks.back().is_some_and(|&(t, _)| (1..=LATE_US).contains(&t.saturating_sub(t_us)));
-        // Time that steps far back begins the scale anew.
+        // If time steps far back, the scale starts again.
         let t_us = if late { self.peaks.back().map_or(t_us, |&(t, _)| t) } else { t_us };
         while self.peaks.front().is_some_and(|&(t, _)| t <= t_us.saturating_sub(SCALE_US) || t > t_us) {
             self.peaks.pop_front();
@@ -73,7 +73,7 @@ impl Pictures {
             self.peaks.pop_back();
         }
         self.peaks.push_back((t_us, peak));
-        // One tick is the least that can be seen: a sensor at rest stays black.
+        // The scale is at least one tick, so that a sensor at rest stays black.
         let full = self.peaks.front().map_or(1.0, |&(_, largest)| largest.max(1.0));
         let bytes = above.iter().map(|&value| (value / full * 255.0).round().min(255.0) as u8).collect();
         Grey { bytes, rest, full }
@@ -92,10 +92,10 @@ mod tests {
         assert_eq!(first, Grey { bytes: vec![0, 0, 0], rest: "lowest so far", full: 1.0 });
         let pressed = pictures.take(100_000, &[160, 80, 0]);
         assert_eq!((pressed.bytes, pressed.full), (vec![255, 128, 0], 60.0));
-        // A weaker press beside the stronger one, then alone: ten seconds later it is white.
+        // A weaker press next to a stronger one, then alone: it becomes white ten seconds later.
         assert_eq!(pictures.take(5_000_000, &[130, 50, 7]).bytes, [128, 0, 0]);
         assert_eq!(pictures.take(10_100_000, &[130, 50, 7]).bytes, [255, 0, 0]);
-        // A lower value than ever moves the rest.
+        // A value below the lowest so far lowers the rest.
         assert_eq!(pictures.take(10_200_000, &[90, 50, 7]).bytes, [0, 0, 0]);
         assert_eq!(pictures.take(30_000_000, &[100, 50, 7]).full, 10.0);
     }
@@ -106,11 +106,11 @@ mod tests {
         pictures.take(0, &[100]);
         assert_eq!(pictures.take(1_000_000, &[140]).full, 40.0);
         assert_eq!(pictures.take(1_500_000, &[120]).full, 40.0);
-        // Of half a second ago, weaker and stronger than what arrived since.
+        // Pictures from half a second ago, weaker and stronger than the latest values.
         assert_eq!(pictures.take(1_400_000, &[110]).bytes, [64]);
         assert_eq!(pictures.take(1_450_000, &[180]).full, 80.0);
         assert_eq!(pictures.take(1_600_000, &[140]).bytes, [128]);
-        // A clock that restarts.
+        // The clock restarts.
         assert_eq!(pictures.take(0, &[140]).bytes, [255]);
     }
 
