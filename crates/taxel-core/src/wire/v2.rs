@@ -44,6 +44,12 @@ pub const TRAILER_BYTES: usize = 6;
 /// Bytes of a datagram at most: what an Ethernet frame carries over UDP, with room to spare.
 pub const DATAGRAM_BYTES: usize = 1400;
 
+/// Bytes of a body at most.
+const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
+
+/// Before any time, us.
+const NEVER: i64 = i64::MIN;
+
 /// Bytes of the length that stands before a datagram in files and on streams.
 const LENGTH_BYTES: usize = 2;
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use taxel_core::Events;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Decoder, Receiver};
+use taxel_core::wire::{DatagramInfo, Decoder, SenderDecoder};
 
 use super::counters::Counters;
 use super::options::LiveOptions;
@@ -16,7 +16,7 @@ use crate::clock::{BoardClock, leaves};
 const TICK: Duration = Duration::from_micros(500);
 
 pub(super) struct DecodeStage {
-    decoder: Receiver,
+    decoder: SenderDecoder,
     promise: Promise,
     clock: BoardClock,
     /// Decoded and not handed on yet.
@@ -69,8 +69,8 @@ impl Promise {
 }
 
 /// A decoder of either version of the wire that has seen nothing yet.
-pub(super) fn fresh_decoder(options: &LiveOptions) -> Receiver {
-    Receiver::new(Decoder::new(options.array.clone()).differences(options.differences), 1)
+pub(super) fn fresh_decoder(options: &LiveOptions) -> SenderDecoder {
+    SenderDecoder::new(Decoder::new(options.array.clone()).differences(options.differences), 1)
 }
 
 impl DecodeStage {

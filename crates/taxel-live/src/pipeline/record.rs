@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use taxel_core::encode::Zeroing;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Receiver, Registers};
+use taxel_core::wire::{DatagramInfo, Registers, SenderDecoder};
 use taxel_core::{Events, Marker};
 
 use super::counters::Counters;
@@ -27,7 +27,7 @@ pub(super) struct RecordStage {
     shared: Arc<Shared>,
     /// Decodes from a recording's first datagram on, as a reader will, until the offset between its clock and the pipeline's is
     /// known.
-    origin: Option<Box<Receiver>>,
+    origin: Option<Box<SenderDecoder>>,
     picture_buffer: PictureBuffer,
     /// Datagrams that had been decoded when the last picture was considered.
     considered: u64,

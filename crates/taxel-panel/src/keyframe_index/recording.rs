@@ -44,7 +44,7 @@ enum Source {
 /// The decoder of a recording.
 #[derive(Debug, Clone)]
 enum Decoding {
-    Datagrams(Box<wire::Receiver>),
+    Datagrams(Box<wire::SenderDecoder>),
     Bytes(Box<Decoder>),
 }
 
@@ -154,7 +154,7 @@ impl RecordingIndex {
     fn decoding(&self) -> Decoding {
         let decoder = Decoder::new(self.header.array.clone()).differences(self.header.difference);
         match &self.source {
-            Source::Mcap(_) => Decoding::Datagrams(Box::new(wire::Receiver::new(decoder, 1))),
+            Source::Mcap(_) => Decoding::Datagrams(Box::new(wire::SenderDecoder::new(decoder, 1))),
             Source::Lsa(..) => Decoding::Bytes(Box::new(decoder)),
         }
     }
@@ -170,13 +170,13 @@ impl RecordingIndex {
     ) -> Result<u64> {
         let mut bytes = 0;
         match (&self.source, &mut *decoding) {
-            (Source::Mcap(reader), Decoding::Datagrams(receiver)) => {
+            (Source::Mcap(reader), Decoding::Datagrams(decoder)) => {
                 reader.block(k, place, |message| {
                     if message.topic == Topic::Datagrams {
-                        receiver.push(message.data, Some(message.at_ns / 1000), events);
+                        decoder.push(message.data, Some(message.at_ns / 1000), events);
                         bytes += message.data.len() as u64;
                     } else if message.topic == Topic::Held {
-                        begin_with(receiver, message.data);
+                        begin_with(decoder, message.data);
                     } else if message.topic == Topic::Pressure {
                         return Ok(());
                     }
@@ -197,7 +197,7 @@ impl RecordingIndex {
         }
         if k + 1 == self.blocks() {
             match decoding {
-                Decoding::Datagrams(receiver) => receiver.finish_into(events),
+                Decoding::Datagrams(decoder) => decoder.finish_into(events),
                 Decoding::Bytes(decoder) => decoder.finish_into(events),
             }
         }

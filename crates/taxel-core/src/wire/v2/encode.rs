@@ -5,20 +5,14 @@
 
 use super::packer::{add, first_line, put, steps};
 use super::{
-    BASE_BITS, DATAGRAM_BYTES, HEADER_BYTES, Header, Kind, LATEST_OFFSET, Layout, START, STOP, TRAILER_BYTES, before,
+    BASE_BITS, BODY_BYTES, DATAGRAM_BYTES, Header, Kind, LATEST_OFFSET, Layout, NEVER, START, STOP, before,
     checked_stride,
 };
 use crate::events::EventsView;
 use crate::{Result, problem};
 
-/// Bytes of a body at most.
-const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
-
 /// The first number: 0 would say that the board was reset, and that every taxel holds 0.
 const FIRST_SEQUENCE: u32 = 1;
-
-/// Before any time.
-const NEVER: i64 = i64::MIN;
 
 /// Events as datagrams.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

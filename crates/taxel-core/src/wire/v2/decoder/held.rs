@@ -1,7 +1,7 @@
 //! What each taxel holds, and since when, as far as it is known.
 
 use crate::Array;
-use crate::wire::v2::stride;
+use crate::wire::v2::{NEVER, stride};
 
 /// Laid out as the wire names places (position = line << stride | row, with the array's own stride), so that a line is
 /// written as it comes.
@@ -19,9 +19,6 @@ pub(super) struct Held {
     /// What a taxel holds of which nothing was received: 0 where the session was received from its start.
     pub(super) unheard: Option<u16>,
 }
-
-/// Before any time.
-pub(super) const NEVER: i64 = i64::MIN;
 
 /// Of what is known from elsewhere: before anything that is received.
 const BEFORE: i64 = NEVER + 1;
