@@ -16,13 +16,13 @@ mod options;
 mod output;
 mod picture_buffer;
 mod read_out;
-mod reader;
 mod readout_queue;
 mod receive;
 mod record;
 mod recorder;
 mod recordings;
 mod rest;
+mod running_readout;
 mod sending;
 mod shared;
 mod sink;
@@ -52,11 +52,11 @@ pub use counters::{Counters, SourceCounts, Summary};
 pub use handle::Handle;
 pub use options::{LiveOptions, Record};
 use output::DetectionOutput;
-pub use reader::Listener;
-use reader::Reader;
 use readout_queue::ReadoutQueue;
 use recorder::{Part, Recorder};
 use recordings::Recordings;
+pub use running_readout::ReadoutSetup;
+use running_readout::RunningReadout;
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{Published, Shared};
@@ -92,12 +92,12 @@ impl Live {
     pub fn start(
         address: SocketAddr,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         let capture = options.capture;
         // The socket is opened before the file: where the port is taken no empty file is left behind.
-        Self::start_from(|| Receiver::bind(address, capture), options, listener, sinks)
+        Self::start_from(|| Receiver::bind(address, capture), options, readout, sinks)
     }
 
     /// As [`Live::start`], from what another computer receives ([`Receiver::fed`]).
@@ -108,16 +108,16 @@ impl Live {
     pub fn start_fed(
         receiver: Receiver,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        Self::start_from(|| Ok(receiver), options, listener, sinks)
+        Self::start_from(|| Ok(receiver), options, readout, sinks)
     }
 
     fn start_from(
         receiver: impl FnOnce() -> Result<Receiver>,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
@@ -130,14 +130,14 @@ impl Live {
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
         }
-        Self::begin(Box::new(receiver), options, listener, sinks, None)
+        Self::begin(Box::new(receiver), options, readout, sinks, None)
     }
 
     /// Begins; `host` is whose recording this one's is a part of.
     fn begin(
         receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
         host: Option<Part>,
     ) -> Result<Self> {
@@ -151,15 +151,15 @@ impl Live {
         }
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
-        if let (Listener::None, Some(to)) = (&listener, options.send.first()) {
+        if let (ReadoutSetup::None, Some(to)) = (&readout, options.send.first()) {
             return Err(taxel_core::problem!("send to {to} without a readout: nothing would be detected").into());
         }
-        match &listener {
-            Listener::Taring(stretch_us, _) if *stretch_us <= 0 => {
+        match &readout {
+            ReadoutSetup::Taring(stretch_us, _) if *stretch_us <= 0 => {
                 return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
             }
-            Listener::Taring(_, readout) => readout.check()?,
-            Listener::None | Listener::Reading(_) => {}
+            ReadoutSetup::Taring(_, readout) => readout.check()?,
+            ReadoutSetup::None | ReadoutSetup::Reading(_) => {}
         }
         let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
         let receiver = receiver()?;
@@ -188,10 +188,10 @@ impl Live {
             ended: AtomicBool::new(false),
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
-        let reads_out = !matches!(listener, Listener::None);
+        let reads_out = !matches!(readout, ReadoutSetup::None);
         let board = |address, own: LiveOptions, part| {
             let capture = own.capture;
-            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Listener::None, vec![], Some(part))
+            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, ReadoutSetup::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing arrived: a new file is not left behind.
@@ -206,8 +206,8 @@ impl Live {
         // A device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
-        let reader = reads_out.then(|| Reader::new(listener, &options));
-        let stages = Stages::new(&shared, reader);
+        let readout = reads_out.then(|| RunningReadout::new(readout, &options));
+        let stages = Stages::new(&shared, readout);
         let names: &[&str] = if reads_out { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
         let threads = Arc::new(Threads::new(stages, output, names.len()));
         for name in names {
@@ -374,12 +374,12 @@ impl Live {
         self.handle().record(record)
     }
 
-    /// Lets the recording that runs restart, where no source has given anything; returns whether it does.
+    /// Restarts the recording that runs, where no source has given anything; returns whether it did.
     #[must_use]
     pub fn record_again(&self) -> bool {
         // Before the recorder is locked: counting and recording must not wait for each other.
         let now = self.shared.counters();
-        lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.again(&now))
+        lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.restart_if_empty(&now))
     }
 
     /// As [`Handle::end_recording`].

@@ -7,14 +7,14 @@
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
 mod base64;
+mod event_pictures;
+mod grey_picture;
 mod limits;
 mod lsa;
 mod mcap_reader;
 mod mcap_writer;
 mod metadata;
 mod output;
-mod picture;
-mod pictures;
 mod stream;
 mod topic;
 
@@ -27,11 +27,11 @@ use taxel_core::{Array, problem};
 
 use crate::bridged::Bridged;
 
+pub use event_pictures::EventPictures;
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
-pub use pictures::Pictures;
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 
@@ -39,6 +39,9 @@ pub use topic::Topic;
 ///
 /// Half of it is waited on average; the rest of the 100 ms that a kill may cost is left to compression and a busy machine.
 pub const FLUSH_EVERY: Duration = Duration::from_millis(20);
+
+/// From one low-rate picture to the next: in recordings where something comes, as the pipeline publishes them, and to other computers.
+pub const PICTURE_EVERY: Duration = Duration::from_millis(100);
 
 /// A chunk that has waited so long means that the writing thread gets no processor: the next caller writes it.
 pub const LATE: Duration = Duration::from_millis(40);
@@ -60,7 +63,7 @@ pub struct Header {
     /// What was left behind on the way to this file, a line each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<String>,
-    /// The numbers of events that a state gave, in a file made of events whose datagrams do not say so.
+    /// The numbers of events that a state gave, in a file made of events whose datagrams do not state it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<u64>,
     /// Whether intensity words are differences (the board's option) instead of values.
@@ -352,7 +355,7 @@ pub enum Change {
     Wire {
         /// From here on.
         version: u8,
-        /// Whether the host told it to; else its datagrams showed it.
+        /// Whether the host commanded it; else its datagrams showed it.
         asked: bool,
     },
 }

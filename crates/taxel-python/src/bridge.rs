@@ -43,7 +43,7 @@ impl Feed {
 
     /// Takes a parcel; False where it begins a session and `begin_session` has to come first.
     fn take(&self, py: Python<'_>, parcel: Vec<u8>) -> bool {
-        py.detach(|| self.feed.take(&parcel))
+        py.detach(|| self.feed.push(&parcel))
     }
 
     /// A session begins.

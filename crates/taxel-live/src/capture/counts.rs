@@ -13,11 +13,11 @@ pub struct Counts {
     pub bytes: u64,
     /// Messages that the kernel threw away because its own queue was full.
     pub dropped_by_kernel: u64,
-    /// Datagrams that were dropped because they were not taken in time.
+    /// Datagrams that were dropped because they were not read in time.
     pub dropped_by_queue: u64,
     /// Payload bytes in those.
     pub bytes_dropped_by_queue: u64,
-    /// Datagrams that wait to be taken.
+    /// Datagrams that wait to be read.
     pub waiting: u64,
     /// What the kernel's own queue may hold, bytes, as it counts them (its overhead included).
     pub kernel_buffer_bytes: u64,

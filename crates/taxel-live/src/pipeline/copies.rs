@@ -12,15 +12,12 @@ use serde_json::json;
 use super::shared::Shared;
 use super::sink::OutputDetection;
 use crate::capture::{Batch, Packer};
-use crate::recording::now_ns;
+use crate::recording::{PICTURE_EVERY, now_ns};
 
 /// So long a parcel gathers ...
 pub(super) const GATHER: Duration = Duration::from_millis(5);
 /// ... and after so long without one an empty parcel states up to when nothing arrived.
 const STILL_HERE: Duration = Duration::from_millis(10);
-
-/// From picture to picture.
-const PICTURE_EVERY: Duration = Duration::from_millis(100);
 
 /// Parcels that wait at most: 64 MiB.
 const WAITING: usize = 1 << 8;
@@ -66,7 +63,7 @@ impl Copies {
         }
     }
 
-    /// Whether the pipeline has ended, and every copy was taken.
+    /// Whether the pipeline has ended, and every copy was read.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.shared.has_ended() && self.parcels.is_empty() && self.detections.is_empty()
@@ -113,8 +110,8 @@ pub(super) fn copier(received: u64) -> (Copier, channel::Receiver<Vec<u8>>) {
 }
 
 impl Copier {
-    /// Takes what arrived.
-    pub(super) fn take(&mut self, batch: &Batch, dropped_by_kernel: u64) {
+    /// Adds what arrived.
+    pub(super) fn push(&mut self, batch: &Batch, dropped_by_kernel: u64) {
         for (datagram, bytes) in batch.iter() {
             if self.packer.waiting() == 0 {
                 self.since = Instant::now();

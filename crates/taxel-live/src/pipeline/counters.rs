@@ -44,8 +44,8 @@ pub struct Counters {
     pub read_out: u64,
     /// Events that found no room before the readout.
     pub events_dropped: u64,
-    /// Events that arrived out of order, or more than 0.1 s after a silence that was assumed: the readout took them at
-    /// the time that it had arrived to.
+    /// Events that arrived out of order, or more than 0.1 s after a silence that was assumed: the readout counted them
+    /// at the time that it had come to.
     pub late: u64,
     /// Detections that were output.
     pub detections: u64,
@@ -61,7 +61,8 @@ pub struct Counters {
     /// From the kernel's stamp to the end of decoding, a datagram each.
     pub decode_latency: Quantiles,
     /// From `known` to the output, by the board's clock.
-    pub said_latency: Quantiles,
+    #[serde(rename = "said_latency")]
+    pub output_latency: Quantiles,
     /// What the host's clock shows when the board's shows a time; from the first datagram on.
     pub offset: Option<Offset>,
     /// The latest stamp, us.
@@ -72,7 +73,7 @@ pub struct Counters {
     pub marked_start: Option<bool>,
     /// Since the socket was opened, s.
     pub seconds: f64,
-    /// Whether a tare is being taken.
+    /// Whether a tare is being measured.
     pub taring: bool,
 }
 

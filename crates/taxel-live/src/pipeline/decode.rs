@@ -113,7 +113,7 @@ impl DecodeStage {
     }
 
     /// Counts a datagram, and takes from it the board's clock and its promise. `announced` is the time up to which the readout was
-    /// told that no more events will follow, us: events before it are late.
+    /// informed that no more events will follow, us: events before it are late.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn note(&mut self, decoded: &Decoded, announced: Option<i64>) {
         let Decoded { info, arrived_ns, bytes, first: (row, _) } = decoded;
@@ -137,7 +137,7 @@ impl DecodeStage {
         (self.events.t.get(row).copied(), self.events.markers.get(marker).map(|marker| marker.t))
     }
 
-    /// Takes the values of the events that are about to be handed on.
+    /// Holds the values of the events that are about to be handed on.
     pub(super) fn hold(&mut self) {
         self.has_intensities |= self.events.intensity.is_some();
         self.held.push(self.events.view());

@@ -29,11 +29,11 @@ impl ReceiveStage {
     /// Waits for datagrams no longer than `wait`; false, and an empty batch, where none came.
     pub(super) fn next(&mut self, wait: Duration) -> Result<(Batch, bool)> {
         let mut batch = std::mem::take(&mut self.batch);
-        let came = self.shared.receiver.take(&mut batch, wait)?;
+        let came = self.shared.receiver.receive(&mut batch, wait)?;
         Ok((batch, came))
     }
 
-    /// Takes back a batch that was processed, for its memory.
+    /// Returns a batch that was processed, for its memory.
     pub(super) fn reuse(&mut self, batch: Batch) {
         self.batch = batch;
     }

@@ -80,7 +80,7 @@ impl RecordStage {
         }
         let wire = info.changed.then_some(Change::Wire { version: info.version, asked: false });
         self.with(|recorder| {
-            recorder.takes(info.version)?;
+            recorder.check_version(info.version)?;
             for change in wire.into_iter().chain(info.reset.then_some(Change::Reset)) {
                 recorder.board_change(&BoardChange { at_ns, t_us: info.now, change })?;
             }
@@ -209,7 +209,7 @@ impl RecordStage {
                 recorder.tare(&tare)?;
             }
             recorder.flush()?;
-            if due { recorder.so_far(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
+            if due { recorder.counts(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
         })
     }
 }

@@ -83,8 +83,8 @@ impl Recordings {
             ended.push((recorder, counts));
         }
         for (name, numbers) in &self.numbers {
-            let track = next.as_ref().map(|next| next.writer(name)).transpose()?;
-            sources.insert(name.clone(), numbers.keep_in(track));
+            let track = next.as_ref().map(|next| next.track_of(name)).transpose()?;
+            sources.insert(name.clone(), numbers.record_into(track));
         }
         let (recorder, counters) = replace_of(&self.shared, next)?;
         // Parts end before the whole.
@@ -108,8 +108,8 @@ impl Recordings {
 fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
     // Set before the request, so that the recording runs for callers that ask after this call.
     shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
-    let (give, ended) = channel::bounded(1);
-    shared.request(Request::Record(next.map(Box::new), give));
+    let (answer, ended) = channel::bounded(1);
+    shared.request(Request::Record(next.map(Box::new), answer));
     let ended = shared.wait(&ended).and_then(std::convert::identity);
     if ended.is_err() {
         shared.records.store(lock(&shared.recorder).is_some(), Ordering::Release);

@@ -31,7 +31,7 @@ const ANSWER_EVERY: Duration = Duration::from_millis(50);
 pub(super) struct Published {
     pub(super) counters: Counters,
     pub(super) decode_latency: Latencies,
-    pub(super) said_latency: Latencies,
+    pub(super) output_latency: Latencies,
     pub(super) markers: Vec<Marker>,
     pub(super) picture: Vec<u16>,
     pub(super) tare: Option<Tare>,
@@ -135,7 +135,7 @@ impl Shared {
             capture: self.receiver.counts(),
             bridged: self.receiver.bridged(),
             decode_latency: published.decode_latency.quantiles(),
-            said_latency: published.said_latency.quantiles(),
+            output_latency: published.output_latency.quantiles(),
             sent: self.sending.iter().map(|line| line.counts()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),
             ..published.counters.clone()
@@ -164,7 +164,7 @@ impl Shared {
 impl Host for Shared {
     fn part(&self, name: &str) -> Result<Track> {
         match &*lock(&self.recorder) {
-            Some(recorder) => recorder.writer(name),
+            Some(recorder) => recorder.track_of(name),
             None => Err(taxel_core::problem!("source {name}: nothing is recorded").into()),
         }
     }

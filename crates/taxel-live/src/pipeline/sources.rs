@@ -25,7 +25,7 @@ pub(super) struct Numbers {
     part: Part,
     /// Whether they are recorded from the first one on; else while a recording runs.
     always: bool,
-    track: Mutex<Kept>,
+    track: Mutex<NumbersTrack>,
     stream: Stream,
     lines: AtomicU64,
     strange: AtomicU64,
@@ -35,7 +35,7 @@ pub(super) struct Numbers {
 
 /// Where numbers go.
 #[derive(Default)]
-struct Kept {
+struct NumbersTrack {
     track: Option<Track>,
     /// Lines, and strange ones, that arrived before it.
     before: (u64, u64),
@@ -57,22 +57,22 @@ impl Numbers {
 
     /// Records numbers that arrived.
     pub(super) fn sample(&self, arrived_ns: i64, values: &[f64]) -> Result<()> {
-        if !self.stream.takes(values) {
+        if !self.stream.fits(values) {
             let columns = self.stream.columns.join(", ");
             let (name, n) = (&self.part.name, values.len());
             return Err(problem!("source {name}: {n} values; its columns are {columns}").into());
         }
-        self.keep(|track, number| track.sample(arrived_ns, number, values))
+        self.record(|track, number| track.sample(arrived_ns, number, values))
     }
 
     /// Counts a line, and records it while a recording runs. Each line belongs to one recording.
-    fn keep(&self, keep: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
-        let mut kept = lock(&self.track);
-        if self.always && kept.track.is_none() {
-            kept.track = Some(self.part.open()?);
+    fn record(&self, write: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
+        let mut current = lock(&self.track);
+        if self.always && current.track.is_none() {
+            current.track = Some(self.part.open()?);
         }
         let number = self.lines.fetch_add(1, Ordering::Relaxed);
-        kept.track.as_ref().map_or(Ok(()), |track| keep(track, number))
+        current.track.as_ref().map_or(Ok(()), |track| write(track, number))
     }
 
     /// Records a line that arrived.
@@ -81,7 +81,7 @@ impl Numbers {
             Some(values) => self.sample(arrived_ns, &values),
             // A line that names the columns again holds no numbers.
             None if fields(line).eq(self.stream.columns.iter().map(String::as_str)) || line.trim().is_empty() => Ok(()),
-            None => self.keep(|track, number| {
+            None => self.record(|track, number| {
                 self.strange.fetch_add(1, Ordering::Relaxed);
                 track.strange_line(arrived_ns, number, line)
             }),
@@ -90,11 +90,12 @@ impl Numbers {
 
     /// Records what arrives from now on into this part of a recording, or none; ends the part before with its counts, and returns
     /// those.
-    pub(super) fn keep_in(&self, track: Option<Track>) -> SourceCounts {
-        let mut kept = lock(&self.track);
+    pub(super) fn record_into(&self, track: Option<Track>) -> SourceCounts {
+        let mut current = lock(&self.track);
         let now = (self.lines.load(Ordering::Relaxed), self.strange.load(Ordering::Relaxed));
-        let Kept { track: ended, before } = std::mem::replace(&mut *kept, Kept { track, before: now });
-        drop(kept);
+        let NumbersTrack { track: ended, before } =
+            std::mem::replace(&mut *current, NumbersTrack { track, before: now });
+        drop(current);
         let (lines, strange) = (now.0 - before.0, now.1 - before.1);
         if let Some(track) = ended {
             let decoder = BTreeMap::from([("lines_that_could_not_be_read".to_owned(), strange)]);
@@ -109,10 +110,10 @@ impl Numbers {
         SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone() }
     }
 
-    /// Takes no more lines: ends its part of the recording with its counts.
+    /// Records no more lines: ends its part of the recording with its counts.
     pub(super) fn end(&self) {
         self.ends.store(true, Ordering::Release);
-        self.keep_in(None);
+        self.record_into(None);
     }
 
     /// Reads lines until the end, in a thread of its own; a line that breaks is opened again. `begun`: they were opened before,
@@ -137,8 +138,8 @@ impl Numbers {
                 let at_ns = reader.came_ns;
                 while let Some(line) = reader.line() {
                     let cut = std::mem::take(&mut first) && numbers.stream.parse(&line).is_none();
-                    let kept = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
-                    if let Err(error) = kept {
+                    let recorded = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
+                    if let Err(error) = recorded {
                         if !numbers.ends.load(Ordering::Acquire)
                             && let Some(host) = numbers.part.host.upgrade()
                         {

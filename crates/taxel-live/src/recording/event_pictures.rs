@@ -5,20 +5,22 @@ use std::collections::BTreeSet;
 use taxel_core::held::HeldOverTime;
 use taxel_core::{EventsView, Result};
 
+use super::PICTURE_EVERY;
+
 /// From one picture to the next where events come, us.
-const EVERY_US: i64 = 100_000;
+const EVERY_US: i64 = PICTURE_EVERY.as_micros() as i64;
 
 /// From a picture to the next around a time of interest (a detection, a note, a marker), us.
 const NEAR_US: i64 = 10_000;
 
 /// The pictures, one by one, in order of time.
 #[derive(Debug)]
-pub struct Pictures {
+pub struct EventPictures {
     times: std::vec::IntoIter<i64>,
     held: HeldOverTime<u16>,
 }
 
-impl Pictures {
+impl EventPictures {
     /// The pictures of events: at each whole 100 ms up to which an event came, and at the whole 10 ms before and behind each of
     /// the times `around`, as far as events reach. None where no event has an intensity.
     ///

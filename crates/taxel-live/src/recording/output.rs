@@ -104,7 +104,7 @@ impl OutputFile {
         Err(Error::file(&self.path)(IoError::new(ErrorKind::NotFound, text)))
     }
 
-    /// Removes the file where it is new: nothing is to be kept in it. An earlier one stays.
+    /// Removes the file where it is new: nothing is to stay in it. An earlier one stays.
     ///
     /// # Errors
     ///

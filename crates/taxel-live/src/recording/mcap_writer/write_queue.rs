@@ -64,7 +64,7 @@ pub(super) struct Pending {
     pub(super) ends: BTreeMap<String, Counts>,
     /// How the recording ends: set once.
     end: Option<Option<Counts>>,
-    /// Why writing failed; nothing is taken after it.
+    /// Why writing failed; nothing is queued after it.
     failure: Option<WriteFailure>,
 }
 
@@ -223,14 +223,14 @@ impl WriteQueue {
         }
     }
 
-    /// Takes all that waits and writes it. Order is kept: the writer is locked from before the one to after the other.
+    /// Writes all that waits, in order: the writer is locked from before the one to after the other.
     fn drain(&self) -> Result<()> {
         let mut slot = lock(&self.writer);
         let Some(writer) = slot.as_mut() else {
             // Writing failed meanwhile, which the queue keeps; or it is at its end, and nothing is added any more.
             return self.lock().failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(&self.path)));
         };
-        std::mem::swap(&mut self.lock().queue, &mut writer.taken);
+        std::mem::swap(&mut self.lock().queue, &mut writer.batch);
         self.room.notify_all();
         match writer.write() {
             Ok(()) => Ok(()),
