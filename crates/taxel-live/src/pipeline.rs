@@ -59,7 +59,7 @@ pub use running_readout::ReadoutSetup;
 use running_readout::RunningReadout;
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{Published, Shared};
+use shared::{Published, RecordingSlot, Shared};
 pub use sink::{Lines, OutputDetection, Sink};
 pub use source::{Place, Source, SourceKind};
 use sources::Others;
@@ -173,12 +173,9 @@ impl Live {
             receiver,
             readout_queue: ReadoutQueue::new(&options.array, options.readout_events),
             published: Mutex::new(published),
-            recorder: Mutex::new(recorder),
-            broken: Mutex::default(),
+            recording: RecordingSlot { recorder: Mutex::new(recorder), ..RecordingSlot::default() },
             requests: Mutex::default(),
             requested: AtomicBool::new(false),
-            picture_times: Mutex::default(),
-            records: AtomicBool::new(false),
             subscribers: Mutex::default(),
             sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
@@ -195,7 +192,7 @@ impl Live {
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing arrived: a new file is not left behind.
-            let recorder = lock(&shared.recorder).take();
+            let recorder = lock(&shared.recording.recorder).take();
             drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
         })?;
         let boards = others.boards.iter().map(|(name, board)| (name.clone(), Arc::clone(&board.shared)));
@@ -379,7 +376,7 @@ impl Live {
     pub fn record_again(&self) -> bool {
         // Before the recorder is locked: counting and recording must not wait for each other.
         let now = self.shared.counters();
-        lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.restart_if_empty(&now))
+        lock(&self.shared.recording.recorder).as_mut().is_some_and(|recorder| recorder.restart_if_empty(&now))
     }
 
     /// As [`Handle::end_recording`].
@@ -412,7 +409,7 @@ impl Live {
         let joined = self.join();
         let (sources, ended) = others.map_or_else(|error| (BTreeMap::new(), Err(error)), |counts| (counts, Ok(())));
         let counters = Counters { sources, ..self.shared.counters() };
-        let recorder = lock(&self.shared.recorder).take();
+        let recorder = lock(&self.shared.recording.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
         let lost = recorder::losses(&counters, None);
         let verdict = recordings::verdict(self.place(), &counters, counters.nothing_came(), &lost);

@@ -62,8 +62,8 @@ impl Feed {
     }
 
     /// Ends the pipeline because of an error.
-    fn fail(&self, said: &str) {
-        self.feed.fail(said);
+    fn fail(&self, reason: &str) {
+        self.feed.fail(reason);
     }
 
     /// Whether the pipeline has ended.

@@ -306,7 +306,7 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.records())).unwrap_or(false)
     }
 
-    /// Announces that the host told the board to speak this version of the wire.
+    /// Announces that the host has set the board to this version of the wire.
     fn expect_version(&self, py: Python<'_>, version: u8) -> PyResult<()> {
         self.with(py, |pipeline| pipeline.expect_version(version))
     }

@@ -132,7 +132,7 @@ impl Handle {
     /// Whether anything is recorded, also from the beginning on.
     #[must_use]
     pub fn is_recording(&self) -> bool {
-        lock(&self.shared.recorder).is_some()
+        lock(&self.shared.recording.recorder).is_some()
     }
 
     /// As [`Live::note`](super::Live::note).

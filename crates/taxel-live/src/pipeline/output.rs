@@ -83,7 +83,7 @@ impl Targets {
             output_ns,
         };
         self.sinks.iter_mut().try_for_each(|sink| sink.output(&output)).map_err(Error::Sink)?;
-        if let Some(recorder) = &*lock(&shared.recorder) {
+        if let Some(recorder) = &*lock(&shared.recording.recorder) {
             // An error that ends only the recording is found, and reported, by the decoding thread too.
             recorder
                 .detection(&output)

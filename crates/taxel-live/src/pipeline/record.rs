@@ -50,19 +50,19 @@ impl RecordStage {
     }
 
     pub(super) fn runs(&self) -> bool {
-        lock(&self.shared.recorder).is_some()
+        lock(&self.shared.recording.recorder).is_some()
     }
 
     /// Works with the recording that runs. An error ends the pipeline where the recording was asked for from its beginning, and the
     /// recording alone where it began later.
     fn with(&self, work: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<()> {
-        let mut slot = lock(&self.shared.recorder);
+        let mut slot = lock(&self.shared.recording.recorder);
         let Some(recorder) = &mut *slot else { return Ok(()) };
         match work(recorder) {
             Err(error) if recorder.since().is_some() => {
                 *slot = None;
-                lock(&self.shared.broken).get_or_insert(error);
-                self.shared.records.store(false, Ordering::Release);
+                lock(&self.shared.recording.broken).get_or_insert(error);
+                self.shared.recording.runs.store(false, Ordering::Release);
                 Ok(())
             }
             outcome => outcome,
@@ -129,22 +129,22 @@ impl RecordStage {
     /// come so far belongs to the former, what arrives from now on to the latter.
     pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &Held) -> Result<Ended> {
         let now = self.shared.counters();
-        let ended = lock(&self.shared.recorder).take();
+        let ended = lock(&self.shared.recording.recorder).take();
         self.origin = None;
         if let Some(mut next) = next {
             if let Err(error) = next.begin(&now, held.values()) {
-                *lock(&self.shared.recorder) = ended;
+                *lock(&self.shared.recording.recorder) = ended;
                 return Err(error);
             }
             self.origin = Some(Box::new(fresh_decoder(&self.shared.options)));
             self.tared = false;
             let timed = next.is_timed();
-            *lock(&self.shared.recorder) = Some(*next);
+            *lock(&self.shared.recording.recorder) = Some(*next);
             if timed {
                 self.earlier_zeroings()?;
             }
         }
-        self.shared.records.store(self.origin.is_some(), Ordering::Release);
+        self.shared.recording.runs.store(self.origin.is_some(), Ordering::Release);
         Ok((ended, now))
     }
 
@@ -156,7 +156,7 @@ impl RecordStage {
 
     /// Records zeroings; on an error the caller zeroes nothing.
     pub(super) fn zeroings(&self, zeroings: &[Zeroing]) -> Result<()> {
-        match &*lock(&self.shared.recorder) {
+        match &*lock(&self.shared.recording.recorder) {
             Some(recorder) => zeroings.iter().try_for_each(|zeroing| recorder.zeroing(zeroing)),
             None => Ok(()),
         }
@@ -168,7 +168,7 @@ impl RecordStage {
         if !(last || self.picture_buffer.is_due(now)) {
             return Ok(());
         }
-        let times = std::mem::take(&mut *lock(&self.shared.picture_times));
+        let times = std::mem::take(&mut *lock(&self.shared.recording.picture_times));
         if !self.runs() {
             self.picture_buffer.clear();
             return Ok(());

@@ -44,6 +44,18 @@ pub(super) struct Published {
     pub(super) failed: Option<Error>,
 }
 
+/// The recording that runs, where one does.
+#[derive(Default)]
+pub(super) struct RecordingSlot {
+    pub(super) recorder: Mutex<Option<Recorder>>,
+    /// Whether it runs and was begun while the pipeline ran.
+    pub(super) runs: AtomicBool,
+    /// The error that ended one early which was begun while the pipeline ran.
+    pub(super) broken: Mutex<Option<Error>>,
+    /// Times of detections, markers and notes, us, around which it gets pictures, since it last did.
+    pub(super) picture_times: Mutex<Vec<i64>>,
+}
+
 /// What all threads share.
 pub(super) struct Shared {
     pub(super) options: LiveOptions,
@@ -51,16 +63,10 @@ pub(super) struct Shared {
     pub(super) receiver: Receiver,
     pub(super) readout_queue: ReadoutQueue,
     pub(super) published: Mutex<Published>,
-    pub(super) recorder: Mutex<Option<Recorder>>,
-    /// The error that ended a recording early which was begun while the pipeline ran.
-    pub(super) broken: Mutex<Option<Error>>,
+    pub(super) recording: RecordingSlot,
     /// Requests to the decoding thread, which it answers between two batches.
     pub(super) requests: Mutex<Vec<Request>>,
     pub(super) requested: AtomicBool,
-    /// Times of detections, markers and notes, us, around which the recording gets pictures, since it last did.
-    pub(super) picture_times: Mutex<Vec<i64>>,
-    /// Whether a recording runs that was begun while the pipeline ran.
-    pub(super) records: AtomicBool,
     /// Further queues that get each detection; a slow one misses some.
     pub(super) subscribers: Mutex<Vec<channel::Sender<OutputDetection>>>,
     /// Where detections go.
@@ -102,7 +108,7 @@ impl Shared {
 
     /// The recording gets the pictures around these times, us.
     pub(super) fn picture_around(&self, times: impl IntoIterator<Item = i64>) {
-        lock(&self.picture_times).extend(times);
+        lock(&self.recording.picture_times).extend(times);
     }
 
     /// Everything that arrived was processed.
@@ -145,7 +151,7 @@ impl Shared {
     /// Writes a note, with the current time or without one.
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
         let board_us = self.published().counters.board_us.filter(|_| timed);
-        match &*lock(&self.recorder) {
+        match &*lock(&self.recording.recorder) {
             Some(recorder) => {
                 self.picture_around(board_us);
                 recorder.note(board_us, text)
@@ -163,7 +169,7 @@ impl Shared {
 
 impl Host for Shared {
     fn part(&self, name: &str) -> Result<Track> {
-        match &*lock(&self.recorder) {
+        match &*lock(&self.recording.recorder) {
             Some(recorder) => recorder.track_of(name),
             None => Err(taxel_core::problem!("source {name}: nothing is recorded").into()),
         }
