@@ -246,13 +246,14 @@ impl Emulator {
                 self.control.serve(&mut self.board);
             }
             if run.is_report_due(now) {
-                watch(self.report(&mut run), touch);
+                watch(&self.report(&run), touch);
             }
         }
         self.send_delayed()?;
         self.write_sync(run.since_us(&self.board));
-        watch(self.report(&mut run), touch);
-        Ok(run.report)
+        let report = self.report(&run);
+        watch(&report, touch);
+        Ok(report)
     }
 
     /// The state of a run that begins now.
@@ -266,10 +267,10 @@ impl Emulator {
     /// Resets the board where its time since its start, us, has reached the next reset.
     fn reset_where_due(&mut self, run: &mut Run, since_us: f64) -> Result<()> {
         if let Some(every) = self.options.reset_every_s
-            && since_us >= (run.report.resets + 1) as f64 * every * 1e6
+            && since_us >= (run.resets + 1) as f64 * every * 1e6
         {
             run.before_reset_us = since_us;
-            run.report.resets += 1;
+            run.resets += 1;
             self.board.reset()?;
             self.control.greet(&self.board);
         }
@@ -333,16 +334,17 @@ impl Emulator {
     }
 
     /// What was done up to now.
-    fn report<'a>(&self, run: &'a mut Run) -> &'a Report {
-        run.report = Report {
+    fn report(&self, run: &Run) -> Report {
+        Report {
             board: *self.board.counts(),
             sent: self.sender.counts(),
             network: self.network.as_ref().map(|network| *network.counts()),
+            resets: run.resets,
             late: run.late.quantiles(),
+            late_frames: run.late_frames,
+            began_ns: run.began_ns,
             board_seconds: run.board_us(&self.board) * 1e-6,
             seconds: run.begun.elapsed().as_secs_f64(),
-            ..run.report
-        };
-        &run.report
+        }
     }
 }

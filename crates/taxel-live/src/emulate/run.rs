@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use taxel_core::board::Board;
 use taxel_core::wire::Command;
 
-use super::Report;
 use super::pace::Pace;
 use crate::latency::Latencies;
 use crate::recording::now_ns;
@@ -22,11 +21,14 @@ const READINGS: usize = 16;
 
 /// A run of the board, from its first frame on.
 pub(super) struct Run {
-    pub(super) report: Report,
     pub(super) leaving: Leaving,
     pub(super) pace: Pace,
-    /// How long after its end each frame was sent.
+    /// How long after its end each frame was sent, and how many were sent more than a frame late.
     pub(super) late: Latencies,
+    pub(super) late_frames: u64,
+    pub(super) resets: u64,
+    /// The host's clock at the board's time 0, ns since 1970.
+    pub(super) began_ns: i64,
     pub(super) begun: Instant,
     /// When the last frame was due.
     pub(super) due: Instant,
@@ -46,10 +48,12 @@ impl Run {
         let (begun, begun_ns) = now_by_both();
         let started_us = board.time_us();
         Self {
-            report: Report { began_ns: begun_ns - (started_us * 1e3) as i64, ..Report::default() },
             leaving: Leaving::default(),
             pace: Pace::default(),
             late: Latencies::default(),
+            late_frames: 0,
+            resets: 0,
+            began_ns: begun_ns - (started_us * 1e3) as i64,
             begun,
             due: begun,
             before_reset_us: -started_us,
@@ -87,7 +91,7 @@ impl Run {
     pub(super) fn note_late(&mut self, now: Instant, frame: Duration) {
         let behind = now.saturating_duration_since(self.due);
         self.late.note(i64::try_from(behind.as_nanos()).unwrap_or(i64::MAX));
-        self.report.late_frames += u64::from(behind > frame);
+        self.late_frames += u64::from(behind > frame);
     }
 
     /// Whether commands are to be read now.
