@@ -169,7 +169,7 @@ fn soak(registers: Registers, faults: Faults, seed: u64) {
     let mut random = StdRng::seed_from_u64(seed);
     let mut board = Board::new(registers, &array).unwrap();
     let mut network = Network::new(faults).unwrap();
-    let mut receiver = wire::Receiver::new(Decoder::new(array.clone()), 1);
+    let mut decoder = wire::SenderDecoder::new(Decoder::new(array.clone()), 1);
     let mut events = Events::empty(array);
     let (mut ticks, mut still, mut heard, mut latest) = (vec![40_u16; 4096], 0_u32, 0_u64, 0_i64);
     let frame_us = registers.frame_us();
@@ -184,7 +184,7 @@ fn soak(registers: Registers, faults: Faults, seed: u64) {
         }
         let (now, begun) = (board.time_us(), events.len());
         let mut hear = |datagram: &[u8]| {
-            receiver.push(datagram, Some((now + frame_us) as i64), &mut events);
+            decoder.push(datagram, Some((now + frame_us) as i64), &mut events);
         };
         board
             .frame(&ticks, |datagram| {
@@ -212,7 +212,7 @@ fn soak(registers: Registers, faults: Faults, seed: u64) {
     if *network
         == (taxel_core::board::NetworkCounts { given: network.given, delivered: network.given, ..Default::default() })
     {
-        assert_eq!(heard, counts.changes + receiver.two().counts().repaired);
+        assert_eq!(heard, counts.changes + decoder.two().counts().repaired);
     } else {
         assert!(heard > counts.changes / 2);
     }

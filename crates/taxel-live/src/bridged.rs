@@ -28,7 +28,8 @@ pub struct Bridged {
     /// Number of times that nothing was received for a second or more.
     pub silences: u64,
     /// Whether something was received within the last second.
-    pub heard: bool,
+    #[serde(rename = "heard")]
+    pub received: bool,
     /// Whether the bridge reported its end.
     pub ended: bool,
     /// The other computer's clock against this one's.

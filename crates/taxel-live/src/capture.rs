@@ -174,30 +174,30 @@ impl Receiver {
     /// # Errors
     ///
     /// `Socket` if receiving ended because the socket failed.
-    pub fn take(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
-        let taken = match &self.from {
+    pub fn receive(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
+        let received = match &self.from {
             From::Socket(socket, _) => {
                 let mut socket = lock(socket);
                 match &mut *socket {
                     Some(own) => {
-                        let taken = self.receive(own, batch, timeout);
+                        let came = self.receive_here(own, batch, timeout);
                         if self.queue.is_done() {
                             // Closing the socket lets another receiver bind the address while the counts are still
                             // read.
                             *socket = None;
                         }
-                        taken
+                        came
                     }
-                    None => self.queue.take(batch, timeout),
+                    None => self.queue.pop(batch, timeout),
                 }
             }
-            From::Feed(_) => self.queue.take(batch, timeout),
+            From::Feed(_) => self.queue.pop(batch, timeout),
         };
-        taken.map_err(Error::socket(&self.place))
+        received.map_err(Error::socket(&self.place))
     }
 
     /// Receives in the caller's thread.
-    fn receive(&self, socket: &mut Socket, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
+    fn receive_here(&self, socket: &mut Socket, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
         batch.begin(AT_ONCE);
         if self.queue.is_done() {
             return Ok(false);

@@ -243,7 +243,7 @@ mod tests {
             }
         }
 
-        /// Error of the line at a time, without the shortest delay of the link, us.
+        /// How far the line is from the truth at a time, less the shortest link, us.
         fn off(&self, clock: &BoardClock, board_us: i64) -> f64 {
             let offset = clock.offset().expect("something came");
             (offset.host_ns(board_us) - self.truth(board_us) - 5_000) as f64 * 1e-3
@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_stays_bounded() {
+    fn memory_stays_bounded() {
         let mut clock = BoardClock::default();
         for k in 0..2_000_000_i64 {
             clock.note(k * 50, k * 50_000 - k * k / 1000);

@@ -3,13 +3,15 @@
 mod control;
 mod feed;
 mod line;
+mod pace;
 mod replay;
+mod run;
 mod scenes;
 mod sync;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde::Serialize;
 use taxel_core::board::{Board, BoardCounts, Crossed, Faults, Flawed, Flaws, Network, NetworkCounts};
@@ -19,25 +21,15 @@ use taxel_core::{Array, Stop};
 
 use crate::Result;
 use crate::capture::{SendCounts, Sender};
-use crate::latency::{Latencies, Quantiles};
-use crate::recording::now_ns;
+use crate::latency::Quantiles;
 use control::Control;
 pub use feed::Feed;
 use line::Line;
+use pace::wake_sharply;
 pub use replay::Replay;
+use run::Run;
 pub use scenes::Scenes;
 use sync::Sync;
-
-/// Interval at which [`Emulator::run`] reads commands, checks whether to stop, and reports.
-const LOOK_EVERY: Duration = Duration::from_millis(1);
-const REPORT_EVERY: Duration = Duration::from_millis(100);
-
-/// Longest busy wait before a frame is due, and the step by which the wait is adapted.
-const MOST_AWAKE: Duration = Duration::from_micros(30);
-const STEP: Duration = Duration::from_nanos(100);
-
-/// Number of times that two clocks are read together; the pair read within the shortest time is used.
-const READINGS: usize = 16;
 
 /// The input that an emulated board scans: a scene, a replayed recording, noise.
 pub trait Touch: Send {
@@ -178,8 +170,8 @@ impl Emulator {
     ///
     /// # Errors
     ///
-    /// `Socket` if the control port is in use, `File` if the serial line or the sync line cannot be opened;
-    /// `Core(Problem)` if the schedule does not ascend, or if a fault, flaw, drift or reset is out of range.
+    /// `Socket` where the control port is taken, `File` where line or sync line cannot be opened; `Core(Problem)` where the
+    /// schedule does not ascend, or a fault, flaw, drift or reset makes no sense.
     pub fn open(board: Board, array: &Array, options: EmulatorOptions) -> Result<Self> {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
             return Err(taxel_core::problem!("command {}: its frame lies before that of command {k}", k + 1).into());
@@ -214,7 +206,6 @@ impl Emulator {
     /// # Errors
     ///
     /// `Socket` if the system refuses to send.
-    #[allow(clippy::cast_possible_truncation)]
     pub fn run<T: Touch + ?Sized>(
         &mut self,
         touch: &mut T,
@@ -222,22 +213,7 @@ impl Emulator {
         stop: Stop<'_>,
     ) -> Result<Report> {
         let mut ticks = vec![0; self.array.len()];
-        let mut leaving = Leaving::default();
-        let mut late = Latencies::default();
-        let mut schedule = std::mem::take(&mut self.options.commands).into_iter().peekable();
-        if self.options.real_time {
-            wake_sharply();
-        }
-        let (begun, begun_ns) = now_by_both();
-        let mut pace = Pace::default();
-        let started_us = self.board.time_us();
-        let began_ns = begun_ns - (started_us * 1e3) as i64;
-        let mut report = Report { began_ns, ..Report::default() };
-        let host_s_per_us = 1e-6 / (1.0 + 1e-6 * self.options.drift_ppm);
-        let mut due = begun;
-        // The board's time since its start, us, which a reset does not change; the board's own clock returns to 0.
-        let mut before_reset_us = -started_us;
-        let (mut polled, mut reported) = (begun, begun);
+        let mut run = self.begin();
         let mut last = false;
         while !last {
             while !stop.asked() && !touch.is_there()? {
@@ -250,193 +226,125 @@ impl Emulator {
             if self.options.marks_stop && (last || touch.is_last(stop)?) {
                 self.board.record(false);
             }
-            let since_us = before_reset_us + self.board.time_us();
-            if let Some(every) = self.options.reset_every_s
-                && since_us >= (report.resets + 1) as f64 * every * 1e6
-            {
-                before_reset_us = since_us;
-                report.resets += 1;
-                self.board.reset()?;
-                self.control.greet(&self.board);
-            }
+            let since_us = run.since_us(&self.board);
+            self.reset_where_due(&mut run, since_us)?;
             let frame = self.board.counts().frames;
-            while let Some((_, command)) = schedule.next_if(|(at, _)| *at <= frame) {
+            while let Some(command) = run.next_command(frame) {
                 self.board.command(&command.to_bytes());
             }
-            if let Some(sync) = &mut self.sync {
-                sync.follow(since_us, self.board.registers().record);
+            self.write_sync(since_us);
+            // A request to stop is not an error here; the loop checks for it.
+            if !last && !self.read_taxels(&mut ticks, since_us, stop)? {
+                continue;
             }
-            if let Some(crossed) = &mut self.crossed
-                && !last
-            {
-                match crossed.read(self.board.registers(), &mut ticks, stop) {
-                    // A request to stop is not an error here; the loop checks for it.
-                    Err(taxel_core::Error::Interrupted) => continue,
-                    read => read?,
-                }
-            }
-            if let Some(flawed) = &mut self.flawed
-                && !last
-            {
-                flawed.read(since_us, &mut ticks);
-            }
-            let (sender, network) = (&mut self.sender, &mut self.network);
             if frame == 0 && self.options.arms {
                 self.board.arm(&ticks)?;
                 continue;
             }
-            leaving.clear();
-            self.board.frame(&ticks, |datagram| {
-                match network {
-                    None => leaving.push(datagram),
-                    Some(network) => network.pass(datagram, &mut |out| leaving.push(out)),
-                }
-                true
-            })?;
-            // The length of the frame that was scanned: a command may have changed it.
-            let before = due;
-            due = begun + Duration::from_secs_f64((before_reset_us + self.board.time_us()) * host_s_per_us);
-            let now = if self.options.real_time { pace.wait_until(due) } else { Instant::now() };
-            leaving.iter().try_for_each(|datagram| sender.push(datagram))?;
-            self.sender.flush()?;
-            if self.options.real_time {
-                let behind = now.saturating_duration_since(due);
-                late.note(i64::try_from(behind.as_nanos()).unwrap_or(i64::MAX));
-                report.late_frames += u64::from(behind > due - before);
-            }
-            if now.duration_since(polled) >= LOOK_EVERY {
-                polled = now;
+            let now = self.send_frame(&mut run, &ticks)?;
+            if run.is_poll_due(now) {
                 self.control.serve(&mut self.board);
             }
-            if now.duration_since(reported) >= REPORT_EVERY {
-                reported = now;
-                self.complete(&mut report, &late, begun, started_us + before_reset_us + self.board.time_us());
-                watch(&report, touch);
+            if run.is_report_due(now) {
+                watch(&self.report(&run), touch);
             }
         }
-        if let Some(network) = &mut self.network {
-            let mut sent = Ok(());
-            let sender = &mut self.sender;
-            network.flush(&mut |out| {
-                if sent.is_ok() && !out.is_empty() {
-                    sent = sender.push(out);
-                }
-            });
-            sent?;
-            self.sender.flush()?;
-        }
-        if let Some(sync) = &mut self.sync {
-            sync.follow(before_reset_us + self.board.time_us(), self.board.registers().record);
-        }
-        self.complete(&mut report, &late, begun, started_us + before_reset_us + self.board.time_us());
+        self.send_delayed()?;
+        self.write_sync(run.since_us(&self.board));
+        let report = self.report(&run);
         watch(&report, touch);
         Ok(report)
     }
 
-    fn complete(&self, report: &mut Report, late: &Latencies, begun: Instant, board_us: f64) {
-        report.board = *self.board.counts();
-        report.sent = self.sender.counts();
-        report.network = self.network.as_ref().map(|network| *network.counts());
-        report.late = late.quantiles();
-        report.board_seconds = board_us * 1e-6;
-        report.seconds = begun.elapsed().as_secs_f64();
-    }
-}
-
-/// Datagrams that wait until the frame ends: a train is sent as soon as a datagram of another length follows.
-#[derive(Default)]
-struct Leaving {
-    bytes: Vec<u8>,
-    ends: Vec<usize>,
-}
-
-impl Leaving {
-    fn push(&mut self, datagram: &[u8]) {
-        if !datagram.is_empty() {
-            self.bytes.extend_from_slice(datagram);
-            self.ends.push(self.bytes.len());
+    /// The state of a run that begins now.
+    fn begin(&mut self) -> Run {
+        if self.options.real_time {
+            wake_sharply();
         }
+        Run::new(&self.board, std::mem::take(&mut self.options.commands), self.options.drift_ppm)
     }
 
-    fn clear(&mut self) {
-        self.bytes.clear();
-        self.ends.clear();
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &[u8]> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.bytes[start..end])
-    }
-}
-
-/// The current time by the clock that paces frames, and by the one that stamps arrivals, ns since 1970. Both are read
-/// several times, because the thread may be interrupted between the two.
-fn now_by_both() -> (Instant, i64) {
-    let read = |_| {
-        let (before, now_ns) = (Instant::now(), now_ns());
-        (before.elapsed(), before, now_ns)
-    };
-    let (took, before, now_ns) =
-        (1..READINGS).map(read).fold(read(0), |best, next| if next.0 < best.0 { next } else { best });
-    (before + took / 2, now_ns)
-}
-
-/// Waits until frames are due. A sleeping thread wakes some 10 us late, later on an idle core than on a busy one.
-/// Therefore the sleep ends earlier by that time, and the rest is a busy wait.
-#[derive(Debug, Default)]
-struct Pace {
-    sooner: Duration,
-}
-
-impl Pace {
-    /// Waits until `due` if it has not passed; returns the current time.
-    fn wait_until(&mut self, due: Instant) -> Instant {
-        let mut now = Instant::now();
-        let Some(left) = due.checked_duration_since(now) else { return now };
-        if let Some(sleep) = left.checked_sub(self.sooner)
-            && !sleep.is_zero()
+    /// Resets the board where its time since its start, us, has reached the next reset.
+    fn reset_where_due(&mut self, run: &mut Run, since_us: f64) -> Result<()> {
+        if let Some(every) = self.options.reset_every_s
+            && since_us >= (run.resets + 1) as f64 * every * 1e6
         {
-            std::thread::sleep(sleep);
-            let woken = Instant::now();
-            // Adapted so that nine in ten wake-ups are in time; a later one was caused by a busy core, where a longer
-            // busy wait does not help.
-            self.sooner = if woken.saturating_duration_since(now + sleep) > self.sooner {
-                (self.sooner + 9 * STEP).min(MOST_AWAKE)
-            } else {
-                self.sooner.saturating_sub(STEP)
-            };
-            now = woken;
+            run.before_reset_us = since_us;
+            run.resets += 1;
+            self.board.reset()?;
+            self.control.greet(&self.board);
         }
-        while now < due {
-            std::hint::spin_loop();
-            now = Instant::now();
-        }
-        now
+        Ok(())
     }
-}
 
-/// Disables the kernel's timer slack for this thread: it may delay wake-ups by 50 us, a quarter of a frame.
-fn wake_sharply() {
-    // SAFETY: PR_SET_TIMERSLACK takes one number and accesses no memory of ours; if it fails, wake-ups are less
-    // precise.
-    unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64) };
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_frame_is_never_sent_before_it_is_due_nor_waited_for_awake_for_long() {
-        let mut pace = Pace::default();
-        let mut due = Instant::now();
-        for _ in 0..300 {
-            due += Duration::from_micros(400);
-            assert!(pace.wait_until(due) >= due);
-            assert!(pace.sooner <= MOST_AWAKE);
+    fn write_sync(&mut self, since_us: f64) {
+        if let Some(sync) = &mut self.sync {
+            sync.follow(since_us, self.board.registers().record);
         }
-        // The thread does not wait for a frame that is already due.
-        let now = pace.wait_until(due);
-        assert!(now >= due);
+    }
+
+    /// From what the taxels feel to what the board reads of them, through the circuit and the flaws; false where it was stopped.
+    fn read_taxels(&mut self, ticks: &mut [u16], since_us: f64, stop: Stop<'_>) -> Result<bool> {
+        if let Some(crossed) = &mut self.crossed {
+            match crossed.read(self.board.registers(), ticks, stop) {
+                Err(taxel_core::Error::Interrupted) => return Ok(false),
+                read => read?,
+            }
+        }
+        if let Some(flawed) = &mut self.flawed {
+            flawed.read(since_us, ticks);
+        }
+        Ok(true)
+    }
+
+    /// Scans a frame, and sends its datagrams at its end; returns the time then.
+    fn send_frame(&mut self, run: &mut Run, ticks: &[u16]) -> Result<Instant> {
+        let (network, leaving) = (&mut self.network, &mut run.leaving);
+        leaving.clear();
+        self.board.frame(ticks, |datagram| {
+            match network {
+                None => leaving.push(datagram),
+                Some(network) => network.pass(datagram, &mut |out| leaving.push(out)),
+            }
+            true
+        })?;
+        // The length of the frame that was scanned: a command may have changed it.
+        let frame = run.next_due(&self.board);
+        let now = if self.options.real_time { run.pace.wait_until(run.due) } else { Instant::now() };
+        run.leaving.iter().try_for_each(|datagram| self.sender.push(datagram))?;
+        self.sender.flush()?;
+        if self.options.real_time {
+            run.note_late(now, frame);
+        }
+        Ok(now)
+    }
+
+    /// Sends the datagrams that the network has delayed.
+    fn send_delayed(&mut self) -> Result<()> {
+        let Some(network) = &mut self.network else { return Ok(()) };
+        let mut sent = Ok(());
+        let sender = &mut self.sender;
+        network.flush(&mut |out| {
+            if sent.is_ok() && !out.is_empty() {
+                sent = sender.push(out);
+            }
+        });
+        sent?;
+        self.sender.flush()
+    }
+
+    /// What was done up to now.
+    fn report(&self, run: &Run) -> Report {
+        Report {
+            board: *self.board.counts(),
+            sent: self.sender.counts(),
+            network: self.network.as_ref().map(|network| *network.counts()),
+            resets: run.resets,
+            late: run.late.quantiles(),
+            late_frames: run.late_frames,
+            began_ns: run.began_ns,
+            board_seconds: run.board_us(&self.board) * 1e-6,
+            seconds: run.begun.elapsed().as_secs_f64(),
+        }
     }
 }

@@ -89,7 +89,7 @@ impl Allowed {
 #[derive(Debug, Clone, Default)]
 pub struct HostClock {
     /// The narrowest exchange of each completed stretch.
-    kept: VecDeque<Allowed>,
+    finished: VecDeque<Allowed>,
     /// The narrowest exchange of the current stretch.
     narrowest: Option<Allowed>,
     astray: u32,
@@ -103,7 +103,7 @@ impl HostClock {
         else {
             return;
         };
-        let Some(here) = trip.back.checked_sub(trip.asked).map(|took| trip.asked + took / 2) else { return };
+        let Some(here) = trip.back.checked_sub(trip.asked).map(|passed| trip.asked + passed / 2) else { return };
         let allowed = Allowed { here, least, most };
         if !(0..=LONGEST_NS).contains(&most.saturating_sub(least)) {
             return;
@@ -123,10 +123,10 @@ impl HostClock {
                 }
             }
             before => {
-                if self.kept.len() == STRETCHES {
-                    self.kept.pop_front();
+                if self.finished.len() == STRETCHES {
+                    self.finished.pop_front();
                 }
-                self.kept.extend(before);
+                self.finished.extend(before);
                 self.narrowest = Some(allowed);
             }
         }
@@ -151,13 +151,13 @@ impl HostClock {
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
     fn fit(&mut self) {
         let Some(last) = self.narrowest else { return };
-        let kept: Vec<Allowed> = self.kept.iter().copied().chain([last]).collect();
+        let narrow: Vec<Allowed> = self.finished.iter().copied().chain([last]).collect();
         let (mut drift, mut counts) = (0.0, 1);
-        if kept.len() >= BELIEVED {
-            let mut slopes: Vec<f64> = kept
+        if narrow.len() >= BELIEVED {
+            let mut slopes: Vec<f64> = narrow
                 .iter()
                 .enumerate()
-                .flat_map(|(k, a)| kept.iter().skip(k + 1).map(move |b| (a, b)))
+                .flat_map(|(k, a)| narrow.iter().skip(k + 1).map(move |b| (a, b)))
                 .filter(|(a, b)| b.here > a.here)
                 .map(|(a, b)| (b.middle() - a.middle()) as f64 / (b.here - a.here) as f64)
                 .collect();
@@ -167,7 +167,7 @@ impl HostClock {
                 counts = NEWEST;
             }
         }
-        let newest = kept.iter().rev().take(counts);
+        let newest = narrow.iter().rev().take(counts);
         let moved = |bound: i64, at: i64| bound - ((at - last.here) as f64 * drift) as i64;
         let least = newest.clone().map(|a| moved(a.least, a.here)).max().unwrap_or(last.least);
         let most = newest.map(|a| moved(a.most, a.here)).min().unwrap_or(last.most);

@@ -17,13 +17,13 @@ mod options;
 mod output;
 mod picture_buffer;
 mod read_out;
-mod reader;
 mod readout_queue;
 mod receive;
 mod record;
 mod recorder;
 mod recordings;
 mod rest;
+mod running_readout;
 mod sending;
 mod shared;
 mod sink;
@@ -53,14 +53,14 @@ pub use counters::{Counters, SourceCounts, Summary};
 pub use handle::Handle;
 pub use options::{LiveOptions, Record};
 use output::DetectionOutput;
-pub use reader::Listener;
-use reader::Reader;
 use readout_queue::ReadoutQueue;
 use recorder::{Part, Recorder};
 use recordings::Recordings;
+pub use running_readout::ReadoutSetup;
+use running_readout::RunningReadout;
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{Published, Shared};
+use shared::{Published, RecordingSlot, Shared};
 pub use sink::{Lines, OutputDetection, Sink};
 pub use source::{Place, Source, SourceKind};
 use sources::Others;
@@ -93,12 +93,12 @@ impl Live {
     pub fn start(
         address: SocketAddr,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         let capture = options.capture;
         // The socket is opened before the file, so that a port that is in use leaves no empty file.
-        Self::start_from(|| Receiver::bind(address, capture), options, listener, sinks)
+        Self::start_from(|| Receiver::bind(address, capture), options, readout, sinks)
     }
 
     /// As [`Live::start`], for datagrams that another computer receives ([`Receiver::fed`]).
@@ -109,16 +109,16 @@ impl Live {
     pub fn start_fed(
         receiver: Receiver,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        Self::start_from(|| Ok(receiver), options, listener, sinks)
+        Self::start_from(|| Ok(receiver), options, readout, sinks)
     }
 
     fn start_from(
         receiver: impl FnOnce() -> Result<Receiver>,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
@@ -131,14 +131,14 @@ impl Live {
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
         }
-        Self::begin(Box::new(receiver), options, listener, sinks, None)
+        Self::begin(Box::new(receiver), options, readout, sinks, None)
     }
 
     /// Starts the pipeline; `host` is the pipeline whose recording contains this one's as a part.
     fn begin(
         receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
         host: Option<Part>,
     ) -> Result<Self> {
@@ -152,15 +152,15 @@ impl Live {
         }
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
-        if let (Listener::None, Some(to)) = (&listener, options.send.first()) {
+        if let (ReadoutSetup::None, Some(to)) = (&readout, options.send.first()) {
             return Err(taxel_core::problem!("send to {to} without a readout: nothing would be detected").into());
         }
-        match &listener {
-            Listener::Taring(stretch_us, _) if *stretch_us <= 0 => {
+        match &readout {
+            ReadoutSetup::Taring(stretch_us, _) if *stretch_us <= 0 => {
                 return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
             }
-            Listener::Taring(_, readout) => readout.check()?,
-            Listener::None | Listener::Reading(_) => {}
+            ReadoutSetup::Taring(_, readout) => readout.check()?,
+            ReadoutSetup::None | ReadoutSetup::Reading(_) => {}
         }
         let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
         let receiver = receiver()?;
@@ -174,12 +174,9 @@ impl Live {
             receiver,
             readout_queue: ReadoutQueue::new(&options.array, options.readout_events),
             published: Mutex::new(published),
-            recorder: Mutex::new(recorder),
-            broken: Mutex::default(),
+            recording: RecordingSlot { recorder: Mutex::new(recorder), ..RecordingSlot::default() },
             requests: Mutex::default(),
             requested: AtomicBool::new(false),
-            picture_times: Mutex::default(),
-            records: AtomicBool::new(false),
             subscribers: Mutex::default(),
             sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
@@ -189,14 +186,14 @@ impl Live {
             ended: AtomicBool::new(false),
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
-        let reads_out = !matches!(listener, Listener::None);
+        let reads_out = !matches!(readout, ReadoutSetup::None);
         let board = |address, own: LiveOptions, part| {
             let capture = own.capture;
-            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Listener::None, vec![], Some(part))
+            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, ReadoutSetup::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing arrived: a new file is removed.
-            let recorder = lock(&shared.recorder).take();
+            let recorder = lock(&shared.recording.recorder).take();
             drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
         })?;
         let boards = others.boards.iter().map(|(name, board)| (name.clone(), Arc::clone(&board.shared)));
@@ -207,8 +204,8 @@ impl Live {
         // The destinations come first: a device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
-        let reader = reads_out.then(|| Reader::new(listener, &options));
-        let stages = Stages::new(&shared, reader);
+        let readout = reads_out.then(|| RunningReadout::new(readout, &options));
+        let stages = Stages::new(&shared, readout);
         let names: &[&str] = if reads_out { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
         let threads = Arc::new(Threads::new(stages, output, names.len()));
         for name in names {
@@ -375,12 +372,12 @@ impl Live {
         self.handle().record(record)
     }
 
-    /// Restarts the running recording, if no source has passed data yet; returns whether it does.
+    /// Restarts the recording that runs, where no source has given anything; returns whether it did.
     #[must_use]
     pub fn record_again(&self) -> bool {
         // Read before the recorder is locked: counting and recording must not wait for each other.
         let now = self.shared.counters();
-        lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.again(&now))
+        lock(&self.shared.recording.recorder).as_mut().is_some_and(|recorder| recorder.restart_if_empty(&now))
     }
 
     /// As [`Handle::end_recording`].
@@ -413,7 +410,7 @@ impl Live {
         let joined = self.join();
         let (sources, ended) = others.map_or_else(|error| (BTreeMap::new(), Err(error)), |counts| (counts, Ok(())));
         let counters = Counters { sources, ..self.shared.counters() };
-        let recorder = lock(&self.shared.recorder).take();
+        let recorder = lock(&self.shared.recording.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
         let lost = recorder::losses(&counters, None);
         let verdict = recordings::verdict(self.place(), &counters, counters.nothing_came(), &lost);

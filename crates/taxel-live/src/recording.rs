@@ -8,14 +8,14 @@
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
 mod base64;
+mod event_pictures;
+mod grey_picture;
 mod limits;
 mod lsa;
 mod mcap_reader;
 mod mcap_writer;
 mod metadata;
 mod output;
-mod picture;
-mod pictures;
 mod stream;
 mod topic;
 
@@ -28,11 +28,11 @@ use taxel_core::{Array, problem};
 
 use crate::bridged::Bridged;
 
+pub use event_pictures::EventPictures;
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
-pub use pictures::Pictures;
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 
@@ -41,6 +41,9 @@ pub use topic::Topic;
 /// The average wait is half of it; the rest of the 100 ms that a kill may cost is reserved for compression and a busy
 /// machine.
 pub const FLUSH_EVERY: Duration = Duration::from_millis(20);
+
+/// From one low-rate picture to the next: in recordings where something comes, as the pipeline publishes them, and to other computers.
+pub const PICTURE_EVERY: Duration = Duration::from_millis(100);
 
 /// Age of the oldest queued message at which the writing thread counts as starved of the processor: the next caller
 /// writes the queue.
@@ -63,8 +66,7 @@ pub struct Header {
     /// What conversions to this file left out, one line each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<String>,
-    /// Indices of events that were decoded from states, in a file converted from events whose datagrams cannot mark
-    /// this.
+    /// The numbers of events that a state gave, in a file made of events whose datagrams do not state it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<u64>,
     /// Whether intensity words are differences (the board's option) instead of values.
@@ -356,7 +358,7 @@ pub enum Change {
     Wire {
         /// The version from here on.
         version: u8,
-        /// Whether the host requested the change; otherwise the datagrams revealed it.
+        /// Whether the host commanded it; else its datagrams showed it.
         asked: bool,
     },
 }

@@ -3,7 +3,7 @@
 use super::{Board, Crossed, session};
 use crate::circuit::Chain;
 use crate::contact::{Act, Narrow, Sensor, Stage, Taxels};
-use crate::wire::{Command, Decoder, Receiver, Registers, WORD_BYTES};
+use crate::wire::{Command, Decoder, Registers, SenderDecoder, WORD_BYTES};
 use crate::{Array, Events, Result, Stop};
 
 /// The scene to play, and the board that receives it.
@@ -104,11 +104,11 @@ impl Play {
     pub fn run(&self, mut watch: impl FnMut(f64), stop: Stop<'_>) -> Result<Played> {
         let Armed { mut board, mut crossed, mut stage, commands } = self.arm(stop)?;
         let version = self.registers.wire_version;
-        let mut receiver = Receiver::new(Decoder::new(self.array.clone()), version);
+        let mut decoder = SenderDecoder::new(Decoder::new(self.array.clone()), version);
         let mut events = Events::empty(self.array.clone());
         let (mut datagrams, mut bytes) = (0, 0);
         let sink = |datagram: &[u8]| {
-            receiver.push(datagram, None, &mut events);
+            decoder.push(datagram, None, &mut events);
             datagrams += 1;
             bytes += datagram.len() as u64;
             true

@@ -18,24 +18,19 @@ use crate::{Array, Result, Spike, problem};
 /// without a spike. The first sample becomes the first previous value without a spike. Computed in f32. One signed
 /// train per taxel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct ChangeEvents {
     /// The smallest change that causes an event, in the sensor's unit, above 0; theta_0 of equation 5.7. Default 3
     /// ticks, the
     /// floor of the board's fast presets (wire.md, section 3).
-    #[serde(default = "three")]
     pub noise_floor: f64,
     /// Bits of an event's value, 1 to 10 (figure 5.7). Default 1: rise or fall.
-    #[serde(default = "one_bit")]
     pub bits: u32,
     /// The reference of a change. Default the value last sent.
-    #[serde(default)]
     pub previous: Previous,
     /// How U / theta_0 is rounded to a whole number. Default truncation.
-    #[serde(default)]
     pub rounding: Rounding,
     /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
 }
 
@@ -50,19 +45,11 @@ pub enum Rounding {
     Floor,
 }
 
-fn three() -> f64 {
-    3.0
-}
-
-fn one_bit() -> u32 {
-    1
-}
-
 impl Default for ChangeEvents {
     fn default() -> Self {
         Self {
-            noise_floor: three(),
-            bits: one_bit(),
+            noise_floor: 3.0,
+            bits: 1,
             previous: Previous::default(),
             rounding: Rounding::default(),
             period_ms: super::periods::stamp_period(),

@@ -23,31 +23,21 @@ use crate::{Array, EventsView, Result, Spike, problem};
 /// is unloaded. The area is computed once per stamp, after its last event; spikes have the stamp's time. Trains,
 /// unsigned: rises through each level, then falls below each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct ContactArea {
     /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
-    #[serde(default = "three")]
     pub noise_floor: f64,
     /// Numbers of taxels, ascending; default 2, 4, 8, 16, 32.
-    #[serde(default = "doubling")]
     pub levels: Vec<u32>,
     /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
     /// used.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
-}
-
-fn three() -> f64 {
-    3.0
-}
-
-fn doubling() -> Vec<u32> {
-    vec![2, 4, 8, 16, 32]
 }
 
 impl Default for ContactArea {
     fn default() -> Self {
-        Self { noise_floor: three(), levels: doubling(), tare: None }
+        Self { noise_floor: 3.0, levels: vec![2, 4, 8, 16, 32], tare: None }
     }
 }
 

@@ -33,35 +33,27 @@ use crate::{Array, Result, Spike, problem};
 /// Computed in f64; pressure below 0 counts as 0 before 5.1. A value that a state of version 2 repaired is no change in
 /// 5.3. The initial state is that of a constant input equal to the first sample. One signed train per taxel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Fa1 {
     /// Power of the compression 5.1, above 0; default 0.7 (Table 5.3).
-    #[serde(default = "alpha")]
     pub alpha: f64,
     /// A, 1/ms: how much a spike raises the threshold; default 20 (Table 5.3).
-    #[serde(default = "twenty")]
     pub a: f64,
     /// B: how fast the threshold decays; default 0.05 (Table 5.3).
-    #[serde(default = "one_twentieth")]
     pub b: f64,
     /// The unit of time of B; default the sample.
-    #[serde(default)]
     pub decay: Decay,
     /// The baseline threshold itself, 0 or more, in compressed units; by default it is computed from `range`. Table 5.3
     /// prints 0, with which every change fires.
-    #[serde(default)]
     pub theta_0: Option<f64>,
     /// The largest pressure, in the sensor's unit: theta_0 = range^alpha / 1024 (text to Table 5.3). Default 150 ticks,
     /// the ramp of the board's 5.2 kHz preset.
-    #[serde(default)]
     pub range: Option<f64>,
     /// Bits of a spike's value, 1 to 10: by equation 5.7 the value is U in units of theta_0, rounded towards zero, from
     /// +-1 to +-(2^bits - 1). Spike times remain those of 5.4. Default 1: rise or fall.
-    #[serde(default = "one_bit")]
     pub bits: u32,
     /// T, ms: the sampling period of events and frames; default 1, for which the thesis states "about 100 Hz". Frames
     /// must arrive at this period, within half of it.
-    #[serde(default = "one")]
     pub period_ms: f64,
 }
 
@@ -76,40 +68,20 @@ pub enum Decay {
     Ms,
 }
 
-fn alpha() -> f64 {
-    0.7
-}
-
-fn twenty() -> f64 {
-    20.0
-}
-
-fn one_twentieth() -> f64 {
-    0.05
-}
-
-fn one_bit() -> u32 {
-    1
-}
-
-fn one() -> f64 {
-    1.0
-}
-
 /// Length of the ramp of the preset 5.2 kHz, ticks (wire.md, section 3).
 const RAMP: f64 = 150.0;
 
 impl Default for Fa1 {
     fn default() -> Self {
         Self {
-            alpha: alpha(),
-            a: twenty(),
-            b: one_twentieth(),
+            alpha: 0.7,
+            a: 20.0,
+            b: 0.05,
             decay: Decay::default(),
             theta_0: None,
             range: None,
-            bits: one_bit(),
-            period_ms: one(),
+            bits: 1,
+            period_ms: 1.0,
         }
     }
 }

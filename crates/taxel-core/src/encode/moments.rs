@@ -29,78 +29,41 @@ use crate::{Array, Result, Spike, problem};
 /// a train per level that spikes when the level is reached, then one per level that spikes when it is left, then, with
 /// `tonic_ms`, one that spikes while the level is exceeded. The first sample causes no spike of the first two kinds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Moments {
     /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
-    #[serde(default = "three")]
     pub noise_floor: f64,
     /// Number of levels of each moment, for a displacement on each side of 0. Default 20.
-    #[serde(default = "twenty")]
     pub levels: usize,
     /// Smallest and largest level of the number of taxels; `None` omits the moment.
-    #[serde(default = "areas")]
     pub area: Option<[f64; 2]>,
     /// Smallest and largest level of the sum above rest, in the sensor's unit.
-    #[serde(default = "totals")]
     pub total: Option<[f64; 2]>,
     /// Smallest and largest level of the largest value above rest, in the sensor's unit.
-    #[serde(default = "peaks")]
     pub peak: Option<[f64; 2]>,
     /// Smallest and largest level of the centre's displacement in x and in y, mm.
-    #[serde(default = "ways")]
     pub displacement_mm: Option<[f64; 2]>,
     /// Period of the tonic spikes while a level is exceeded, ms, the first when it is reached; `None` for none. Default
     /// 0.5.
-    #[serde(default = "half")]
     pub tonic_ms: Option<f64>,
     /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
     /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
     /// used.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
-}
-
-fn three() -> f64 {
-    3.0
-}
-
-fn twenty() -> usize {
-    20
-}
-
-fn areas() -> Option<[f64; 2]> {
-    Some([2.0, 500.0])
-}
-
-fn totals() -> Option<[f64; 2]> {
-    Some([8.0, 20_000.0])
-}
-
-fn peaks() -> Option<[f64; 2]> {
-    Some([4.0, 120.0])
-}
-
-fn ways() -> Option<[f64; 2]> {
-    Some([0.2, 20.0])
-}
-
-#[allow(clippy::unnecessary_wraps)] // None is a value of its own: no tonic spikes
-fn half() -> Option<f64> {
-    Some(0.5)
 }
 
 impl Default for Moments {
     fn default() -> Self {
         Self {
-            noise_floor: three(),
-            levels: twenty(),
-            area: areas(),
-            total: totals(),
-            peak: peaks(),
-            displacement_mm: ways(),
-            tonic_ms: half(),
+            noise_floor: 3.0,
+            levels: 20,
+            area: Some([2.0, 500.0]),
+            total: Some([8.0, 20_000.0]),
+            peak: Some([4.0, 120.0]),
+            displacement_mm: Some([0.2, 20.0]),
+            tonic_ms: Some(0.5),
             period_ms: super::periods::stamp_period(),
             tare: None,
         }

@@ -16,22 +16,17 @@ use crate::{Result, problem};
 /// `low` and `high` are percentiles (linear between ranks) of the samples in the window that ends, exclusive, at the
 /// last update. Updates take place at the time of the first sample plus the window plus multiples of `renew_s`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RunningRange {
     /// The percentile that maps to 0, from 0; default 10.
-    #[serde(default = "ten")]
     pub low: f64,
     /// The percentile that maps to 1, to 100; default 95.
-    #[serde(default = "ninety_five")]
     pub high: f64,
     /// Length of the window, s; default 10.
-    #[serde(default = "ten")]
     pub window_s: f64,
     /// Interval between updates of the percentiles, s; default 1.
-    #[serde(default = "one")]
     pub renew_s: f64,
     /// How samples before the end of the first window are treated.
-    #[serde(default)]
     pub first_window: FirstWindow,
 }
 
@@ -47,21 +42,9 @@ pub enum FirstWindow {
     Itself,
 }
 
-fn ten() -> f64 {
-    10.0
-}
-
-fn ninety_five() -> f64 {
-    95.0
-}
-
-fn one() -> f64 {
-    1.0
-}
-
 impl Default for RunningRange {
     fn default() -> Self {
-        Self { low: ten(), high: ninety_five(), window_s: ten(), renew_s: one(), first_window: FirstWindow::default() }
+        Self { low: 10.0, high: 95.0, window_s: 10.0, renew_s: 1.0, first_window: FirstWindow::default() }
     }
 }
 

@@ -45,6 +45,12 @@ pub const TRAILER_BYTES: usize = 6;
 /// Largest datagram, bytes: fits a UDP datagram in one Ethernet frame, with room to spare.
 pub const DATAGRAM_BYTES: usize = 1400;
 
+/// Bytes of a body at most.
+const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
+
+/// Before any time, us.
+const NEVER: i64 = i64::MIN;
+
 /// Size of the length that precedes each datagram in files and on streams, bytes.
 const LENGTH_BYTES: usize = 2;
 

@@ -13,11 +13,11 @@ pub struct Counts {
     pub bytes: u64,
     /// Number of messages that the kernel dropped because its own queue was full.
     pub dropped_by_kernel: u64,
-    /// Number of datagrams that were dropped because they were not read in time.
+    /// Datagrams that were dropped because they were not read in time.
     pub dropped_by_queue: u64,
     /// Number of payload bytes in those datagrams.
     pub bytes_dropped_by_queue: u64,
-    /// Number of datagrams in the queue.
+    /// Datagrams that wait to be read.
     pub waiting: u64,
     /// Size of the kernel's own queue, bytes, as the kernel counts them (including its overhead).
     pub kernel_buffer_bytes: u64,

@@ -49,7 +49,7 @@ impl Feed {
     /// [`Feed::begin_session`] was not called for it.
     ///
     /// Parcels that cannot be read, and repeated ones, are counted and ignored.
-    pub fn take(&self, parcel: &[u8]) -> bool {
+    pub fn push(&self, parcel: &[u8]) -> bool {
         let mut state = lock(&self.state);
         let FeedState { bridged, session, received, batch, clock } = &mut *state;
         let Some(parcel) = Parcel::read(parcel) else {
@@ -113,8 +113,8 @@ impl Feed {
     #[must_use]
     pub fn bridged(&self) -> Bridged {
         let state = lock(&self.state);
-        let heard = state.received.is_some_and(|received| received.elapsed() < SILENT);
-        Bridged { heard, clock: state.clock.offset(), ..state.bridged }
+        let received = state.received.is_some_and(|received| received.elapsed() < SILENT);
+        Bridged { received, clock: state.clock.offset(), ..state.bridged }
     }
 
     /// Ends the pipeline with an error.

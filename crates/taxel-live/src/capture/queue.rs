@@ -165,7 +165,7 @@ impl Queue {
         received.number_from(first);
     }
 
-    pub(super) fn take(&self, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
+    pub(super) fn pop(&self, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
         batch.clear();
         let state = self.state();
         let nothing = |s: &mut Received| s.waiting.is_empty() && !s.closed;

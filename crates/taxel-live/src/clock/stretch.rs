@@ -65,8 +65,7 @@ impl Stretch {
         self.quick.iter().copied().min_by_key(|quick| quick.1)
     }
 
-    /// Number of points that may be below the line: a fixed fraction of all points, but at most half of the stored
-    /// ones.
+    /// How many points may lie below the line: where so many came that few were stored, as many as the stored ones can show.
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn early(&self) -> f64 {
         (EARLY * self.points as f64).min(self.quick.len() as f64 / 2.0)

@@ -12,15 +12,12 @@ use serde_json::json;
 use super::shared::Shared;
 use super::sink::OutputDetection;
 use crate::capture::{Batch, Packer};
-use crate::recording::now_ns;
+use crate::recording::{PICTURE_EVERY, now_ns};
 
 /// Longest time for which a parcel gathers datagrams.
 pub(super) const GATHER: Duration = Duration::from_millis(5);
 /// Interval without datagrams after which an empty parcel states the time before which nothing arrived.
 const STILL_HERE: Duration = Duration::from_millis(10);
-
-/// Interval between pictures.
-const PICTURE_EVERY: Duration = Duration::from_millis(100);
 
 /// Capacity of the queue of parcels: 64 MiB.
 const WAITING: usize = 1 << 8;
@@ -113,8 +110,8 @@ pub(super) fn copier(received: u64) -> (Copier, channel::Receiver<Vec<u8>>) {
 }
 
 impl Copier {
-    /// Adds a batch of datagrams.
-    pub(super) fn take(&mut self, batch: &Batch, dropped_by_kernel: u64) {
+    /// Adds what arrived.
+    pub(super) fn push(&mut self, batch: &Batch, dropped_by_kernel: u64) {
         for (datagram, bytes) in batch.iter() {
             if self.packer.waiting() == 0 {
                 self.since = Instant::now();

@@ -44,8 +44,8 @@ pub struct Counters {
     pub read_out: u64,
     /// Events that did not fit in the queue before the readout.
     pub events_dropped: u64,
-    /// Events that arrived out of order, or more than 0.1 s after an assumed silence: the readout processed them at its
-    /// current time.
+    /// Events that arrived out of order, or more than 0.1 s after a silence that was assumed: the readout counted them
+    /// at the time that it had come to.
     pub late: u64,
     /// Detections that were output.
     pub detections: u64,
@@ -61,7 +61,8 @@ pub struct Counters {
     /// Latency from the kernel's stamp to the end of decoding, per datagram.
     pub decode_latency: Quantiles,
     /// Latency from `known` to the output, by the board's clock.
-    pub said_latency: Quantiles,
+    #[serde(rename = "said_latency")]
+    pub output_latency: Quantiles,
     /// The relation of the host's clock to the board's; from the first datagram on.
     pub offset: Option<Offset>,
     /// The latest stamp, us.
@@ -72,7 +73,7 @@ pub struct Counters {
     pub marked_start: Option<bool>,
     /// Time since the socket was opened, s.
     pub seconds: f64,
-    /// Whether a tare is being taken.
+    /// Whether a tare is being measured.
     pub taring: bool,
 }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use taxel_core::Events;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Decoder, Receiver};
+use taxel_core::wire::{DatagramInfo, Decoder, SenderDecoder};
 
 use super::counters::Counters;
 use super::options::LiveOptions;
@@ -17,7 +17,7 @@ use crate::clock::{BoardClock, leaves};
 const TICK: Duration = Duration::from_micros(500);
 
 pub(super) struct DecodeStage {
-    decoder: Receiver,
+    decoder: SenderDecoder,
     promise: Promise,
     clock: BoardClock,
     /// Events that were decoded and not passed on yet.
@@ -71,8 +71,8 @@ impl Promise {
 }
 
 /// A decoder of either version of the wire in its initial state.
-pub(super) fn fresh_decoder(options: &LiveOptions) -> Receiver {
-    Receiver::new(Decoder::new(options.array.clone()).differences(options.differences), 1)
+pub(super) fn fresh_decoder(options: &LiveOptions) -> SenderDecoder {
+    SenderDecoder::new(Decoder::new(options.array.clone()).differences(options.differences), 1)
 }
 
 impl DecodeStage {
@@ -114,8 +114,8 @@ impl DecodeStage {
         self.events.append(later, later.len());
     }
 
-    /// Counts a datagram, and updates the board's clock and its promise. `announced` is the time before which the
-    /// readout was promised no more events, us: events before it are late.
+    /// Counts a datagram, and takes from it the board's clock and its promise. `announced` is the time up to which the readout was
+    /// informed that no more events will follow, us: events before it are late.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn note(&mut self, decoded: &Decoded, announced: Option<i64>) {
         let Decoded { info, arrived_ns, bytes, first: (row, _) } = decoded;
@@ -139,7 +139,7 @@ impl DecodeStage {
         (self.events.t.get(row).copied(), self.events.markers.get(marker).map(|marker| marker.t))
     }
 
-    /// Applies the values of the events that are about to be passed on.
+    /// Holds the values of the events that are about to be handed on.
     pub(super) fn hold(&mut self) {
         self.has_intensities |= self.events.intensity.is_some();
         self.held.push(self.events.view());

@@ -78,8 +78,8 @@ impl Handle {
     ///
     /// `Core(Problem)` if the pipeline has ended.
     pub fn events(&self) -> Result<ViewerEvents> {
-        let (give, events) = channel::bounded(1);
-        self.shared.request(Request::View(give));
+        let (answer, events) = channel::bounded(1);
+        self.shared.request(Request::View(answer));
         self.shared.wait(&events)
     }
 
@@ -89,9 +89,9 @@ impl Handle {
     ///
     /// `Core(Problem)` if the pipeline has ended.
     pub fn copy(&self) -> Result<Copies> {
-        let (give, parcels) = channel::bounded(1);
+        let (answer, parcels) = channel::bounded(1);
         let detections = self.detections(COPIED_WAITING);
-        self.shared.request(Request::Copy(give));
+        self.shared.request(Request::Copy(answer));
         Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, detections))
     }
 
@@ -132,7 +132,7 @@ impl Handle {
     /// Whether any recording is running, including one from the pipeline's beginning.
     #[must_use]
     pub fn is_recording(&self) -> bool {
-        lock(&self.shared.recorder).is_some()
+        lock(&self.shared.recording.recorder).is_some()
     }
 
     /// As [`Live::note`](super::Live::note).
@@ -154,16 +154,16 @@ impl Handle {
         self.shared.note(text, false)
     }
 
-    /// Sets the rest of these taxels (column, row) to their current values, in the readout and in the recording's
-    /// pictures; the recording states the time, and the rests before and after. Only done on request.
+    /// Makes the values that these taxels (column, row) hold their rest from now on, in the readout and in the recording's
+    /// pictures; the recording states when that was, and the rests before and after. Only done on request.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` if a taxel does not exist or has had no event so far, a tare is being taken, or a `.lsa` is recorded, which
-    /// cannot hold it: then none is zeroed. `File` if the disk is full.
+    /// `Core(Problem)` where a taxel does not exist or has had no event so far, a tare is being measured, or a `.lsa` is recorded, which
+    /// cannot hold it: then none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
-        let (give, zeroed) = channel::bounded(1);
-        self.shared.request(Request::Zero(taxels.to_vec(), give));
+        let (answer, zeroed) = channel::bounded(1);
+        self.shared.request(Request::Zero(taxels.to_vec(), answer));
         self.shared.wait(&zeroed).and_then(std::convert::identity)
     }
 

@@ -11,9 +11,7 @@ use super::copies::{Copier, GATHER, copier};
 use super::shared::Shared;
 use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::capture::Batch;
-
-/// Interval at which a new picture is published.
-const PICTURE_EVERY: Duration = Duration::from_millis(100);
+use crate::recording::PICTURE_EVERY;
 
 pub(super) struct Observers {
     shared: Arc<Shared>,
@@ -30,18 +28,18 @@ impl Observers {
     }
 
     /// Adds a viewer of the events, if it is still connected.
-    pub(super) fn add_viewer(&mut self, give: &channel::Sender<ViewerEvents>, held: &Held) {
+    pub(super) fn add_viewer(&mut self, answer: &channel::Sender<ViewerEvents>, held: &Held) {
         let counters = &self.shared.published().counters;
         let (queue, events) = viewer_queue(&self.shared.options.array, held, counters.board_us, counters.events);
-        if give.send(events).is_ok() {
+        if answer.send(events).is_ok() {
             self.viewers.push(queue);
         }
     }
 
     /// Adds another computer that receives the datagrams.
-    pub(super) fn add_copier(&mut self, give: &channel::Sender<channel::Receiver<Vec<u8>>>) {
+    pub(super) fn add_copier(&mut self, answer: &channel::Sender<channel::Receiver<Vec<u8>>>) {
         let (copier, parcels) = copier(self.received);
-        if give.send(parcels).is_ok() {
+        if answer.send(parcels).is_ok() {
             self.copiers.push(copier);
         }
     }
@@ -71,7 +69,7 @@ impl Observers {
         }
         let dropped = self.shared.receiver.counts().dropped_by_kernel;
         self.copiers.retain_mut(|copier| {
-            copier.take(batch, dropped);
+            copier.push(batch, dropped);
             copier.tick(silent_until, dropped)
         });
     }

@@ -1,5 +1,5 @@
-//! Passes detections to the sinks, to the recording and to waiting receivers: one after the other, in any thread that
-//! is free.
+//! Hands detections to their sinks, to the recording and to waiting callers: one after the other, by any thread that is
+//! free to.
 
 use std::collections::VecDeque;
 use std::sync::Mutex;
@@ -23,11 +23,11 @@ pub(super) struct DetectionOutput(Mutex<State>);
 struct State {
     waiting: VecDeque<Detection>,
     /// `None` while a thread uses them.
-    receivers: Option<Receivers>,
+    targets: Option<Targets>,
 }
 
 /// The receivers of detections.
-struct Receivers {
+struct Targets {
     sinks: Vec<Box<dyn Sink>>,
     /// The queue of [`Live::next`](super::Live::next).
     queue: Sender<OutputDetection>,
@@ -37,8 +37,8 @@ struct Receivers {
 
 impl DetectionOutput {
     pub(super) fn new(sinks: Vec<Box<dyn Sink>>, queue: Sender<OutputDetection>) -> Self {
-        let receivers = Some(Receivers { sinks, queue, failed: false });
-        Self(Mutex::new(State { waiting: VecDeque::new(), receivers }))
+        let targets = Some(Targets { sinks, queue, failed: false });
+        Self(Mutex::new(State { waiting: VecDeque::new(), targets }))
     }
 
     /// Adds detections; returns whether no thread is outputting at present.
@@ -52,30 +52,30 @@ impl DetectionOutput {
             counters.detections += lost as u64;
             counters.detections_dropped += lost as u64;
         }
-        state.receivers.is_some()
+        state.targets.is_some()
     }
 
     /// Outputs the waiting detections, and those that are added meanwhile, unless another thread is outputting.
     pub(super) fn run(&self, shared: &Shared) {
         let mut state = lock(&self.0);
-        let Some(mut receivers) = state.receivers.take() else { return };
+        let Some(mut targets) = state.targets.take() else { return };
         while let Some(detection) = state.waiting.pop_front() {
             drop(state);
-            if !receivers.failed
-                && let Err(error) = receivers.take(shared, detection)
+            if !targets.failed
+                && let Err(error) = targets.output(shared, detection)
             {
-                receivers.failed = true;
+                targets.failed = true;
                 shared.fail(error);
             }
             state = lock(&self.0);
         }
-        state.receivers = Some(receivers);
+        state.targets = Some(targets);
     }
 }
 
-impl Receivers {
+impl Targets {
     /// Passes a detection to the sinks first, then to the recording and the receivers.
-    fn take(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
+    fn output(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
         let output_ns = now_ns();
         let offset = shared.published().counters.offset;
         let output = OutputDetection {
@@ -83,9 +83,9 @@ impl Receivers {
             detection,
             output_ns,
         };
-        self.sinks.iter_mut().try_for_each(|sink| sink.take(&output)).map_err(Error::Sink)?;
-        if let Some(recorder) = &*lock(&shared.recorder) {
-            // The decoding thread detects and stores an error that ends only the recording, too.
+        self.sinks.iter_mut().try_for_each(|sink| sink.output(&output)).map_err(Error::Sink)?;
+        if let Some(recorder) = &*lock(&shared.recording.recorder) {
+            // An error that ends only the recording is found, and reported, by the decoding thread too.
             recorder
                 .detection(&output)
                 .or_else(|error| if recorder.since().is_some() { Ok(()) } else { Err(error) })?;
@@ -99,7 +99,7 @@ impl Receivers {
         let mut published = shared.published();
         published.counters.detections += 1;
         published.counters.detections_dropped += u64::from(dropped);
-        published.said_latency.note(late_ns);
+        published.output_latency.note(late_ns);
         Ok(())
     }
 }

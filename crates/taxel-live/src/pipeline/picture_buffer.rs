@@ -3,8 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Interval of a recording's pictures while events arrive.
-const PICTURE_EVERY: Duration = Duration::from_millis(100);
+use crate::recording::PICTURE_EVERY;
 
 /// Interval at which pictures are buffered until it is known whether they are recorded: the largest rate in a
 /// recording.
@@ -113,21 +112,20 @@ impl PictureBuffer {
 mod tests {
     use super::*;
 
-    /// Adds a picture every 10 ms in `from..to` (hundredths of a second) and returns the board's times of those that
-    /// are recorded.
+    /// Pushes a picture each 10 ms in `from..to` (hundredths of a second) and gives the board's times of those that are recorded.
     fn recorded(picture_buffer: &mut PictureBuffer, begun: Instant, times: std::ops::Range<i64>) -> Vec<i64> {
-        let mut taken = vec![];
+        let mut recorded_now = vec![];
         for k in times {
             let now = begun + BUFFERED_EVERY * u32::try_from(k).unwrap();
             assert!(picture_buffer.is_due(now));
             picture_buffer.push(now, k, 10_000 * k, std::iter::once(k as u16));
             assert!(!picture_buffer.is_due(now + BUFFERED_EVERY / 2));
-            taken.extend(picture_buffer.take_wanted().map(|picture| {
+            recorded_now.extend(picture_buffer.take_wanted().map(|picture| {
                 assert_eq!((picture.at_ns * 10_000, i64::from(picture.held[0]) * 10_000), (picture.t_us, picture.t_us));
                 picture.t_us
             }));
         }
-        taken
+        recorded_now
     }
 
     #[test]
@@ -138,8 +136,8 @@ mod tests {
         picture_buffer.around(123_456);
         picture_buffer.around(150_000);
         picture_buffer.around(365_000);
-        let taken: Vec<i64> = picture_buffer.take_wanted().map(|picture| picture.t_us).collect();
-        assert_eq!(taken, [120_000, 130_000, 140_000, 150_000, 360_000]);
+        let recorded_now: Vec<i64> = picture_buffer.take_wanted().map(|picture| picture.t_us).collect();
+        assert_eq!(recorded_now, [120_000, 130_000, 140_000, 150_000, 360_000]);
         picture_buffer.around(123_456);
         assert_eq!(picture_buffer.take_wanted().count(), 0, "each once");
         assert_eq!(recorded(&mut picture_buffer, begun, 37..45), [370_000, 400_000]);
@@ -148,13 +146,13 @@ mod tests {
     #[test]
     fn events_of_long_ago_and_many_of_them_cost_no_more_than_a_hundred_pictures_a_second() {
         let (mut picture_buffer, begun) = (PictureBuffer::new(), Instant::now());
-        let mut taken = recorded(&mut picture_buffer, begun, 0..100).len();
-        assert_eq!(taken, 10);
+        let mut recorded_now = recorded(&mut picture_buffer, begun, 0..100).len();
+        assert_eq!(recorded_now, 10);
         for t in 0..1_200_000 {
             picture_buffer.around(t);
         }
-        taken = picture_buffer.take_wanted().count() + recorded(&mut picture_buffer, begun, 100..200).len();
-        assert!(taken <= BUFFERED + 100, "{taken}");
+        recorded_now = picture_buffer.take_wanted().count() + recorded(&mut picture_buffer, begun, 100..200).len();
+        assert!(recorded_now <= BUFFERED + 100, "{recorded_now}");
         assert!(picture_buffer.pictures.len() <= BUFFERED && picture_buffer.awaited.len() <= BUFFERED);
         picture_buffer.clear();
         assert_eq!(picture_buffer.take_wanted().count(), 0);

@@ -4,26 +4,26 @@ use taxel_core::Events;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 
-use super::reader::Reader;
-use super::readout_queue::{Quiet, Taken};
+use super::readout_queue::{BatchEnd, Quiet};
+use super::running_readout::RunningReadout;
 use super::shared::Shared;
 
 pub(super) struct ReadOutStage {
     /// Whether there is a readout at all.
     is_on: bool,
     /// The readout, while it runs in this thread.
-    reader: Option<Reader>,
+    readout: Option<RunningReadout>,
     /// A readout that is about to move to its own thread.
-    separated: Option<Box<Reader>>,
-    /// An empty list, used while this thread has no reader.
+    separated: Option<Box<RunningReadout>>,
+    /// Without a readout nothing is found.
     nothing: Vec<Detection>,
     /// The time up to which no more events will follow by the promises of version 2 that the readout has received, us.
     announced: Option<i64>,
 }
 
 impl ReadOutStage {
-    pub(super) fn new(reader: Option<Reader>) -> Self {
-        Self { is_on: reader.is_some(), reader, separated: None, nothing: vec![], announced: None }
+    pub(super) fn new(readout: Option<RunningReadout>) -> Self {
+        Self { is_on: readout.is_some(), readout, separated: None, nothing: vec![], announced: None }
     }
 
     pub(super) fn is_on(&self) -> bool {
@@ -32,26 +32,26 @@ impl ReadOutStage {
 
     /// Publishes its state before the first events.
     pub(super) fn begin(&self, shared: &Shared) {
-        if let Some(reader) = &self.reader {
-            reader.begin(shared);
+        if let Some(readout) = &self.readout {
+            readout.begin(shared);
         }
     }
 
     /// Moves the readout to another thread.
     pub(super) fn separate(&mut self) {
-        if let Some(reader) = self.reader.take() {
-            self.separated = Some(Box::new(reader));
+        if let Some(readout) = self.readout.take() {
+            self.separated = Some(Box::new(readout));
         }
     }
 
-    /// The reader for that thread, once.
-    pub(super) fn take_separated(&mut self) -> Option<Box<Reader>> {
+    /// The readout for that thread, once.
+    pub(super) fn take_separated(&mut self) -> Option<Box<RunningReadout>> {
         self.separated.take()
     }
 
-    /// Detections that no thread has output yet.
+    /// Detections that do not wait for output yet.
     pub(super) fn found(&mut self) -> &mut Vec<Detection> {
-        self.reader.as_mut().map_or(&mut self.nothing, |reader| &mut reader.found)
+        self.readout.as_mut().map_or(&mut self.nothing, |readout| &mut readout.found)
     }
 
     pub(super) fn announced(&self) -> Option<i64> {
@@ -68,12 +68,12 @@ impl ReadOutStage {
         if !self.is_on || (promised.is_none() && events.is_empty() && events.markers.is_empty()) {
             return;
         }
-        match &mut self.reader {
-            Some(reader) => {
-                reader.take(shared, events, Taken { quiet: promised.map(Quiet::Promised), last: false });
+        match &mut self.readout {
+            Some(readout) => {
+                readout.push(shared, events, BatchEnd { quiet: promised.map(Quiet::Promised), last: false });
             }
             None => {
-                let dropped = shared.readout_queue.put(events, promised);
+                let dropped = shared.readout_queue.push(events, promised);
                 shared.published().counters.events_dropped = dropped;
             }
         }
@@ -82,15 +82,15 @@ impl ReadOutStage {
 
     /// Processes a silence: no events before a time.
     pub(super) fn quiet(&mut self, shared: &Shared, quiet: Quiet) {
-        match &mut self.reader {
-            Some(reader) => reader.wait(shared, Taken { quiet: Some(quiet), last: false }),
+        match &mut self.readout {
+            Some(readout) => readout.advance(shared, BatchEnd { quiet: Some(quiet), last: false }),
             None => shared.readout_queue.quiet(quiet),
         }
     }
 
     pub(super) fn zero(&mut self, shared: &Shared, zeroings: &[Zeroing]) {
-        match &mut self.reader {
-            Some(reader) => reader.zero(zeroings),
+        match &mut self.readout {
+            Some(readout) => readout.zero(zeroings),
             None if self.is_on => shared.readout_queue.zero(zeroings),
             None => {}
         }
@@ -98,8 +98,8 @@ impl ReadOutStage {
 
     /// Ends the input.
     pub(super) fn close(&mut self, shared: &Shared, quiet: Option<Quiet>) {
-        match &mut self.reader {
-            Some(reader) => reader.wait(shared, Taken { quiet, last: true }),
+        match &mut self.readout {
+            Some(readout) => readout.advance(shared, BatchEnd { quiet, last: true }),
             None => shared.readout_queue.close(quiet),
         }
     }

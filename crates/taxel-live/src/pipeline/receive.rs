@@ -29,11 +29,11 @@ impl ReceiveStage {
     /// Waits for datagrams at most `wait`; returns false and an empty batch if none arrived.
     pub(super) fn next(&mut self, wait: Duration) -> Result<(Batch, bool)> {
         let mut batch = std::mem::take(&mut self.batch);
-        let came = self.shared.receiver.take(&mut batch, wait)?;
+        let came = self.shared.receiver.receive(&mut batch, wait)?;
         Ok((batch, came))
     }
 
-    /// Returns a processed batch, whose memory is reused.
+    /// Returns a batch that was processed, for its memory.
     pub(super) fn reuse(&mut self, batch: Batch) {
         self.batch = batch;
     }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use taxel_core::encode::Zeroing;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Receiver, Registers};
+use taxel_core::wire::{DatagramInfo, Registers, SenderDecoder};
 use taxel_core::{Events, Marker};
 
 use super::counters::Counters;
@@ -27,7 +27,7 @@ pub(super) struct RecordStage {
     shared: Arc<Shared>,
     /// Decodes from a recording's first datagram on, as a reader of the file will, until the offset between the
     /// recording's clock and the pipeline's is known.
-    origin: Option<Box<Receiver>>,
+    origin: Option<Box<SenderDecoder>>,
     picture_buffer: PictureBuffer,
     /// Number of decoded datagrams when the last picture was considered.
     considered: u64,
@@ -50,19 +50,19 @@ impl RecordStage {
     }
 
     pub(super) fn runs(&self) -> bool {
-        lock(&self.shared.recorder).is_some()
+        lock(&self.shared.recording.recorder).is_some()
     }
 
     /// Calls `work` with the running recording. An error ends the pipeline if the recording was requested at its start,
     /// and only the recording if it began later.
     fn with(&self, work: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<()> {
-        let mut slot = lock(&self.shared.recorder);
+        let mut slot = lock(&self.shared.recording.recorder);
         let Some(recorder) = &mut *slot else { return Ok(()) };
         match work(recorder) {
             Err(error) if recorder.since().is_some() => {
                 *slot = None;
-                lock(&self.shared.broken).get_or_insert(error);
-                self.shared.records.store(false, Ordering::Release);
+                lock(&self.shared.recording.broken).get_or_insert(error);
+                self.shared.recording.runs.store(false, Ordering::Release);
                 Ok(())
             }
             outcome => outcome,
@@ -80,7 +80,7 @@ impl RecordStage {
         }
         let wire = info.changed.then_some(Change::Wire { version: info.version, asked: false });
         self.with(|recorder| {
-            recorder.takes(info.version)?;
+            recorder.check_version(info.version)?;
             for change in wire.into_iter().chain(info.reset.then_some(Change::Reset)) {
                 recorder.board_change(&BoardChange { at_ns, t_us: info.now, change })?;
             }
@@ -130,22 +130,22 @@ impl RecordStage {
     /// so far belongs to the former, what arrives from now on to the latter.
     pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &Held) -> Result<Ended> {
         let now = self.shared.counters();
-        let ended = lock(&self.shared.recorder).take();
+        let ended = lock(&self.shared.recording.recorder).take();
         self.origin = None;
         if let Some(mut next) = next {
             if let Err(error) = next.begin(&now, held.values()) {
-                *lock(&self.shared.recorder) = ended;
+                *lock(&self.shared.recording.recorder) = ended;
                 return Err(error);
             }
             self.origin = Some(Box::new(fresh_decoder(&self.shared.options)));
             self.tared = false;
             let timed = next.is_timed();
-            *lock(&self.shared.recorder) = Some(*next);
+            *lock(&self.shared.recording.recorder) = Some(*next);
             if timed {
                 self.earlier_zeroings()?;
             }
         }
-        self.shared.records.store(self.origin.is_some(), Ordering::Release);
+        self.shared.recording.runs.store(self.origin.is_some(), Ordering::Release);
         Ok((ended, now))
     }
 
@@ -157,7 +157,7 @@ impl RecordStage {
 
     /// Records zeroings; on an error the caller zeroes nothing.
     pub(super) fn zeroings(&self, zeroings: &[Zeroing]) -> Result<()> {
-        match &*lock(&self.shared.recorder) {
+        match &*lock(&self.shared.recording.recorder) {
             Some(recorder) => zeroings.iter().try_for_each(|zeroing| recorder.zeroing(zeroing)),
             None => Ok(()),
         }
@@ -169,7 +169,7 @@ impl RecordStage {
         if !(last || self.picture_buffer.is_due(now)) {
             return Ok(());
         }
-        let times = std::mem::take(&mut *lock(&self.shared.picture_times));
+        let times = std::mem::take(&mut *lock(&self.shared.recording.picture_times));
         if !self.runs() {
             self.picture_buffer.clear();
             return Ok(());
@@ -210,7 +210,7 @@ impl RecordStage {
                 recorder.tare(&tare)?;
             }
             recorder.flush()?;
-            if due { recorder.so_far(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
+            if due { recorder.counts(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
         })
     }
 }

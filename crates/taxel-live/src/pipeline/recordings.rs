@@ -38,7 +38,7 @@ impl Recordings {
 
     /// As [`Handle::record`](super::Handle::record).
     pub(super) fn record(&self, record: &Record) -> Result<Option<Summary>> {
-        if !self.shared.records.load(Ordering::Acquire) {
+        if !self.shared.recording.runs.load(Ordering::Acquire) {
             // Returns an error that ended an earlier recording and that no call has returned yet.
             self.take_error()?;
         }
@@ -55,14 +55,14 @@ impl Recordings {
 
     /// As [`Handle::records`](super::Handle::records).
     pub(super) fn run(&self) -> bool {
-        let whole = |board: &Arc<Shared>| lock(&board.broken).is_none();
-        self.shared.records.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| whole(board))
+        let whole = |board: &Arc<Shared>| lock(&board.recording.broken).is_none();
+        self.shared.recording.runs.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| whole(board))
     }
 
     /// The error that ended a recording early, of this board or another one.
     fn take_error(&self) -> Result<()> {
         let all = self.boards.iter().map(|(_, board)| board).chain([&self.shared]);
-        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.broken).take()).collect();
+        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.recording.broken).take()).collect();
         errors.into_iter().next().map_or(Ok(()), Err)
     }
 
@@ -83,8 +83,8 @@ impl Recordings {
             ended.push((recorder, counts));
         }
         for (name, numbers) in &self.numbers {
-            let track = next.as_ref().map(|next| next.writer(name)).transpose()?;
-            sources.insert(name.clone(), numbers.keep_in(track));
+            let track = next.as_ref().map(|next| next.track_of(name)).transpose()?;
+            sources.insert(name.clone(), numbers.record_into(track));
         }
         let (recorder, counters) = replace_of(&self.shared, next)?;
         // The parts must end before the whole recording.
@@ -107,12 +107,12 @@ impl Recordings {
 /// Makes the decoding thread of one board record into `next`, or not at all; returns the previous recorder.
 fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
     // Set before the request, so that the recording runs for callers that ask after this call.
-    shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
-    let (give, ended) = channel::bounded(1);
-    shared.request(Request::Record(next.map(Box::new), give));
+    shared.recording.runs.fetch_or(next.is_some(), Ordering::AcqRel);
+    let (answer, ended) = channel::bounded(1);
+    shared.request(Request::Record(next.map(Box::new), answer));
     let ended = shared.wait(&ended).and_then(std::convert::identity);
     if ended.is_err() {
-        shared.records.store(lock(&shared.recorder).is_some(), Ordering::Release);
+        shared.recording.runs.store(lock(&shared.recording.recorder).is_some(), Ordering::Release);
     }
     ended
 }

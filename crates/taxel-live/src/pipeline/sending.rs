@@ -33,7 +33,7 @@ const AGAIN: Duration = Duration::from_millis(250);
 const LAST: Duration = Duration::from_secs(1);
 
 /// Default speed of a serial line, baud.
-const BAUD: u32 = 115_200;
+pub(super) const BAUD: u32 = 115_200;
 
 /// A destination of detections: `udp:HOST:PORT`, `pipe:PATH` (a named pipe), `serial:PATH` or `serial:PATH@BAUD`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -83,7 +83,7 @@ impl Display for Destination {
 pub struct Sent {
     /// The destination.
     pub to: String,
-    /// Number of lines that the system accepted whole.
+    /// Lines that were written whole.
     pub sent: u64,
     /// Number of lines that were lost because there was no room, or no reader.
     pub lost: u64,
@@ -144,7 +144,7 @@ impl Sending {
 }
 
 impl Sink for Sending {
-    fn take(&mut self, detection: &OutputDetection) -> io::Result<()> {
+    fn output(&mut self, detection: &OutputDetection) -> io::Result<()> {
         let mut state = lock(&self.line.state);
         if state.device.is_none() && matches!(self.line.to, Destination::Pipe(_)) {
             // A pipe may have a reader by now; a serial line takes longer to open, which is left to the other thread.

@@ -31,7 +31,7 @@ const ANSWER_EVERY: Duration = Duration::from_millis(50);
 pub(super) struct Published {
     pub(super) counters: Counters,
     pub(super) decode_latency: Latencies,
-    pub(super) said_latency: Latencies,
+    pub(super) output_latency: Latencies,
     pub(super) markers: Vec<Marker>,
     pub(super) picture: Vec<u16>,
     pub(super) tare: Option<Tare>,
@@ -44,6 +44,18 @@ pub(super) struct Published {
     pub(super) failed: Option<Error>,
 }
 
+/// The recording that runs, where one does.
+#[derive(Default)]
+pub(super) struct RecordingSlot {
+    pub(super) recorder: Mutex<Option<Recorder>>,
+    /// Whether it runs and was begun while the pipeline ran.
+    pub(super) runs: AtomicBool,
+    /// The error that ended one early which was begun while the pipeline ran.
+    pub(super) broken: Mutex<Option<Error>>,
+    /// Times of detections, markers and notes, us, around which it gets pictures, since it last did.
+    pub(super) picture_times: Mutex<Vec<i64>>,
+}
+
 /// State shared by all threads.
 pub(super) struct Shared {
     pub(super) options: LiveOptions,
@@ -51,17 +63,10 @@ pub(super) struct Shared {
     pub(super) receiver: Receiver,
     pub(super) readout_queue: ReadoutQueue,
     pub(super) published: Mutex<Published>,
-    pub(super) recorder: Mutex<Option<Recorder>>,
-    /// The error that ended a recording that began while the pipeline ran.
-    pub(super) broken: Mutex<Option<Error>>,
+    pub(super) recording: RecordingSlot,
     /// Requests to the decoding thread, which handles them between two batches.
     pub(super) requests: Mutex<Vec<Request>>,
     pub(super) requested: AtomicBool,
-    /// Times of detections, markers and notes since the last picture was recorded, us; the pictures around them are
-    /// recorded.
-    pub(super) picture_times: Mutex<Vec<i64>>,
-    /// Whether a recording that began while the pipeline ran is running.
-    pub(super) records: AtomicBool,
     /// Further queues that get each detection; a slow one misses some.
     pub(super) subscribers: Mutex<Vec<channel::Sender<OutputDetection>>>,
     /// The destinations of detections.
@@ -103,7 +108,7 @@ impl Shared {
 
     /// Selects the pictures around these times, us, for the recording.
     pub(super) fn picture_around(&self, times: impl IntoIterator<Item = i64>) {
-        lock(&self.picture_times).extend(times);
+        lock(&self.recording.picture_times).extend(times);
     }
 
     /// Notes that everything that arrived was processed.
@@ -136,7 +141,7 @@ impl Shared {
             capture: self.receiver.counts(),
             bridged: self.receiver.bridged(),
             decode_latency: published.decode_latency.quantiles(),
-            said_latency: published.said_latency.quantiles(),
+            output_latency: published.output_latency.quantiles(),
             sent: self.sending.iter().map(|line| line.counts()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),
             ..published.counters.clone()
@@ -146,7 +151,7 @@ impl Shared {
     /// Writes a note, with the current time or without one.
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
         let board_us = self.published().counters.board_us.filter(|_| timed);
-        match &*lock(&self.recorder) {
+        match &*lock(&self.recording.recorder) {
             Some(recorder) => {
                 self.picture_around(board_us);
                 recorder.note(board_us, text)
@@ -165,8 +170,8 @@ impl Shared {
 
 impl Host for Shared {
     fn part(&self, name: &str) -> Result<Track> {
-        match &*lock(&self.recorder) {
-            Some(recorder) => recorder.writer(name),
+        match &*lock(&self.recording.recorder) {
+            Some(recorder) => recorder.track_of(name),
             None => Err(taxel_core::problem!("source {name}: nothing is recorded").into()),
         }
     }

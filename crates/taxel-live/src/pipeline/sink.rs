@@ -42,11 +42,11 @@ pub trait Sink: Send {
     /// # Errors
     ///
     /// If the detection cannot be output; the pipeline then ends.
-    fn take(&mut self, detection: &OutputDetection) -> std::io::Result<()>;
+    fn output(&mut self, detection: &OutputDetection) -> std::io::Result<()>;
 }
 
 impl<F: FnMut(&OutputDetection) -> std::io::Result<()> + Send> Sink for F {
-    fn take(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
+    fn output(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
         self(detection)
     }
 }
@@ -56,7 +56,7 @@ impl<F: FnMut(&OutputDetection) -> std::io::Result<()> + Send> Sink for F {
 pub struct Lines<W>(pub W);
 
 impl<W: std::io::Write + Send> Sink for Lines<W> {
-    fn take(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
+    fn output(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
         self.0.write_all(&detection.line()?)?;
         self.0.flush()
     }

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
-use super::sending::serial;
+use super::sending::{BAUD, serial};
 use crate::locked::lock;
 use crate::recording::{Header, Stream, fields, now_ns};
 use crate::{Error, Result, address};
@@ -28,9 +28,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// Longest line, bytes; a longer one is not a line of numbers.
 const LONGEST: usize = 1 << 16;
-
-/// Default speed of a serial line, baud.
-const BAUD: u32 = 115_200;
 
 /// A further source of a recording.
 #[derive(Debug, Clone, PartialEq)]

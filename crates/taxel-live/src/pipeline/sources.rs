@@ -25,7 +25,7 @@ pub(super) struct Numbers {
     part: Part,
     /// Whether lines are recorded from the first one on; otherwise only while a recording runs.
     always: bool,
-    track: Mutex<Kept>,
+    track: Mutex<NumbersTrack>,
     stream: Stream,
     lines: AtomicU64,
     strange: AtomicU64,
@@ -35,7 +35,7 @@ pub(super) struct Numbers {
 
 /// The part of a recording into which lines are written, if any.
 #[derive(Default)]
-struct Kept {
+struct NumbersTrack {
     track: Option<Track>,
     /// Number of lines, and of lines that could not be parsed, before this part.
     before: (u64, u64),
@@ -57,22 +57,22 @@ impl Numbers {
 
     /// Records a line of numbers.
     pub(super) fn sample(&self, arrived_ns: i64, values: &[f64]) -> Result<()> {
-        if !self.stream.takes(values) {
+        if !self.stream.fits(values) {
             let columns = self.stream.columns.join(", ");
             let (name, n) = (&self.part.name, values.len());
             return Err(problem!("source {name}: {n} values; its columns are {columns}").into());
         }
-        self.keep(|track, number| track.sample(arrived_ns, number, values))
+        self.record(|track, number| track.sample(arrived_ns, number, values))
     }
 
     /// Counts a line, and records it if a recording runs. Each line belongs to one recording.
-    fn keep(&self, keep: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
-        let mut kept = lock(&self.track);
-        if self.always && kept.track.is_none() {
-            kept.track = Some(self.part.open()?);
+    fn record(&self, write: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
+        let mut current = lock(&self.track);
+        if self.always && current.track.is_none() {
+            current.track = Some(self.part.open()?);
         }
         let number = self.lines.fetch_add(1, Ordering::Relaxed);
-        kept.track.as_ref().map_or(Ok(()), |track| keep(track, number))
+        current.track.as_ref().map_or(Ok(()), |track| write(track, number))
     }
 
     /// Records a line of text.
@@ -81,7 +81,7 @@ impl Numbers {
             Some(values) => self.sample(arrived_ns, &values),
             // A repeated line of column names contains no numbers.
             None if fields(line).eq(self.stream.columns.iter().map(String::as_str)) || line.trim().is_empty() => Ok(()),
-            None => self.keep(|track, number| {
+            None => self.record(|track, number| {
                 self.strange.fetch_add(1, Ordering::Relaxed);
                 track.strange_line(arrived_ns, number, line)
             }),
@@ -90,11 +90,12 @@ impl Numbers {
 
     /// Records into this part of a recording from now on, or not at all; ends the previous part with its counts, and
     /// returns them.
-    pub(super) fn keep_in(&self, track: Option<Track>) -> SourceCounts {
-        let mut kept = lock(&self.track);
+    pub(super) fn record_into(&self, track: Option<Track>) -> SourceCounts {
+        let mut current = lock(&self.track);
         let now = (self.lines.load(Ordering::Relaxed), self.strange.load(Ordering::Relaxed));
-        let Kept { track: ended, before } = std::mem::replace(&mut *kept, Kept { track, before: now });
-        drop(kept);
+        let NumbersTrack { track: ended, before } =
+            std::mem::replace(&mut *current, NumbersTrack { track, before: now });
+        drop(current);
         let (lines, strange) = (now.0 - before.0, now.1 - before.1);
         if let Some(track) = ended {
             let decoder = BTreeMap::from([("lines_that_could_not_be_read".to_owned(), strange)]);
@@ -109,10 +110,10 @@ impl Numbers {
         SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone() }
     }
 
-    /// Ends the source: no more lines are recorded, and its part of the recording ends with its counts.
+    /// Records no more lines: ends its part of the recording with its counts.
     pub(super) fn end(&self) {
         self.ends.store(true, Ordering::Release);
-        self.keep_in(None);
+        self.record_into(None);
     }
 
     /// Reads lines until the end, in a separate thread; a failed line is opened again. `begun` is a reader that was
@@ -137,8 +138,8 @@ impl Numbers {
                 let at_ns = reader.came_ns;
                 while let Some(line) = reader.line() {
                     let cut = std::mem::take(&mut first) && numbers.stream.parse(&line).is_none();
-                    let kept = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
-                    if let Err(error) = kept {
+                    let recorded = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
+                    if let Err(error) = recorded {
                         if !numbers.ends.load(Ordering::Acquire)
                             && let Some(host) = numbers.part.host.upgrade()
                         {

@@ -12,10 +12,10 @@ use taxel_core::problem;
 use super::decode::DecodeStage;
 use super::observers::Observers;
 use super::read_out::ReadOutStage;
-use super::reader::Reader;
 use super::receive::ReceiveStage;
 use super::record::RecordStage;
 use super::recorder::Recorder;
+use super::running_readout::RunningReadout;
 use super::shared::{Ended, Request, Shared};
 use crate::Result;
 use crate::capture::Batch;
@@ -33,7 +33,7 @@ pub(super) enum Next {
     /// Detections wait for output ([`Stages::found`]).
     Output,
     /// The readout must move to its own thread.
-    Separate(Box<Reader>),
+    Separate(Box<RunningReadout>),
     /// No more data will arrive.
     Over,
 }
@@ -49,19 +49,19 @@ pub(super) struct Stages {
 }
 
 impl Stages {
-    pub(super) fn new(shared: &Arc<Shared>, reader: Option<Reader>) -> Self {
+    pub(super) fn new(shared: &Arc<Shared>, readout: Option<RunningReadout>) -> Self {
         Self {
             shared: Arc::clone(shared),
             receive: ReceiveStage::new(Arc::clone(shared)),
             decode: DecodeStage::new(&shared.options),
             record: RecordStage::new(Arc::clone(shared)),
-            read_out: ReadOutStage::new(reader),
+            read_out: ReadOutStage::new(readout),
             observers: Observers::new(Arc::clone(shared)),
             begun: false,
         }
     }
 
-    /// Detections that no thread has output yet.
+    /// Detections that do not wait for output yet.
     pub(super) fn found(&mut self) -> &mut Vec<Detection> {
         self.read_out.found()
     }
@@ -84,8 +84,8 @@ impl Stages {
             }
         }
         loop {
-            if let Some(reader) = self.read_out.take_separated() {
-                return Ok(Next::Separate(reader));
+            if let Some(readout) = self.read_out.take_separated() {
+                return Ok(Next::Separate(readout));
             }
             if !self.found().is_empty() {
                 return Ok(Next::Output);
@@ -194,10 +194,10 @@ impl Stages {
         let requests = std::mem::take(&mut *lock(&self.shared.requests));
         for request in requests {
             match request {
-                Request::Record(next, give) => drop(give.send(self.switch_recording(next))),
-                Request::View(give) => self.observers.add_viewer(&give, self.decode.held()),
-                Request::Copy(give) => self.observers.add_copier(&give),
-                Request::Zero(taxels, give) => drop(give.send(self.zero(&taxels))),
+                Request::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
+                Request::View(answer) => self.observers.add_viewer(&answer, self.decode.held()),
+                Request::Copy(answer) => self.observers.add_copier(&answer),
+                Request::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
                 Request::Registers(registers) => {
                     self.decode.set_frame_us(registers.frame_us());
                     self.expect_version(registers.wire_version)?;
@@ -224,7 +224,7 @@ impl Stages {
         Ok(())
     }
 
-    /// Sets the rest of these taxels to their current values; if one cannot be zeroed, none is.
+    /// Makes the values that these taxels hold their rest from now on: where one cannot be zeroed none is.
     fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let array = &self.shared.options.array;
         let published = self.shared.published();

@@ -11,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::output::DetectionOutput;
-use super::reader::Reader;
+use super::running_readout::RunningReadout;
 use super::shared::Shared;
 use super::stages::{Next, Stages};
 use crate::locked::lock;
@@ -30,7 +30,7 @@ struct Turn {
     /// `None` while a thread, the leader, owns the stages.
     stages: Option<Box<Stages>>,
     /// A readout that must move to its own thread.
-    reader: Option<Reader>,
+    readout: Option<RunningReadout>,
     over: bool,
     /// Number of threads that have not ended.
     left: usize,
@@ -38,7 +38,7 @@ struct Turn {
 
 impl Threads {
     pub(super) fn new(stages: Stages, output: DetectionOutput, threads: usize) -> Self {
-        let turn = Turn { stages: Some(Box::new(stages)), reader: None, over: false, left: threads };
+        let turn = Turn { stages: Some(Box::new(stages)), readout: None, over: false, left: threads };
         Self { turn: Mutex::new(turn), changed: Condvar::new(), output }
     }
 
@@ -46,15 +46,15 @@ impl Threads {
     pub(super) fn run(&self, shared: &Arc<Shared>) {
         let _leaving = Leaving { threads: self, shared };
         loop {
-            let nothing = |turn: &mut Turn| turn.stages.is_none() && turn.reader.is_none() && !turn.over;
+            let nothing = |turn: &mut Turn| turn.stages.is_none() && turn.readout.is_none() && !turn.over;
             let waited = self.changed.wait_timeout_while(lock(&self.turn), TAKE_OVER, nothing);
             let (mut turn, waited) = waited.unwrap_or_else(PoisonError::into_inner);
             if waited.timed_out() {
                 continue;
             }
-            if let Some(reader) = turn.reader.take() {
+            if let Some(readout) = turn.readout.take() {
                 drop(turn);
-                reader.run(shared, &self.output);
+                readout.run(shared, &self.output);
                 return;
             }
             let Some(stages) = turn.stages.take() else { return };
@@ -72,8 +72,8 @@ impl Threads {
                 Next::Output if !alone => continue,
                 // The follower is not woken for this, because the callback would have to wait for the wake-up.
                 Next::Output => lock(&self.turn).stages = Some(stages),
-                Next::Separate(reader) => {
-                    lock(&self.turn).reader = Some(*reader);
+                Next::Separate(readout) => {
+                    lock(&self.turn).readout = Some(*readout);
                     self.changed.notify_one();
                     continue;
                 }

@@ -123,7 +123,7 @@ pub(super) fn viewer_queue(
 }
 
 impl ViewerQueue {
-    /// Adds the next events, whose values are already applied to `held`.
+    /// Copies the next events, whose values are among those that the taxels hold.
     pub(super) fn push(&mut self, events: &Events, held: &Held) {
         let room = MOST - self.piece.changes.len().min(MOST);
         let copied = events.len().min(room);

@@ -53,7 +53,7 @@ pub struct Place {
 impl Place {
     /// The same state without the reusable buffer.
     #[must_use]
-    pub fn kept(&self) -> Self {
+    pub fn without_memory(&self) -> Self {
         Self { bytes: vec![], topics: self.topics.clone(), ..*self }
     }
 }
@@ -270,7 +270,7 @@ impl Reader {
     pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, u64)> {
         let mut all = Remarks::default();
         let bad = self.messages(stop, |message| {
-            all.take(&message);
+            all.add(&message);
             Ok(())
         })?;
         Ok((all, bad))
@@ -307,7 +307,7 @@ impl Reader {
         let mut sampling = Sampling::new(stream);
         self.messages(stop, |message| {
             if message.topic == Topic::Samples {
-                sampling.take(message.at_ns, message.number, message.data);
+                sampling.push(message.at_ns, message.number, message.data);
             }
             Ok(())
         })?;
@@ -323,7 +323,7 @@ impl Reader {
         let header = self.header();
         let array = header.array.clone();
         let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.difference);
-        let mut sender = wire::Receiver::new(decoder, 1);
+        let mut sender = wire::SenderDecoder::new(decoder, 1);
         let mut decoded = Decoded::empty(Events::empty(array));
         #[allow(clippy::cast_possible_truncation)]
         let frame_us = header.registers.map_or(0, |registers| registers.frame_us() as i64);

@@ -19,7 +19,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::base64::base64;
-use super::picture::Pictures;
+use super::grey_picture::GreyScale;
 use super::{BoardChange, Compression, Counts, Header, OutputFile, Stream, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
@@ -54,7 +54,7 @@ pub struct Track {
     stream: Option<Stream>,
     /// Number of columns of the array.
     columns: usize,
-    pictures: Mutex<Pictures>,
+    grey_scale: Mutex<GreyScale>,
 }
 
 impl std::ops::Deref for Writer {
@@ -87,7 +87,7 @@ impl Writer {
             source: 0,
             stream: header.stream.clone(),
             columns: header.array.columns.into(),
-            pictures: Mutex::new(Pictures::new(header.array.len())),
+            grey_scale: Mutex::new(GreyScale::new(header.array.len())),
         };
         Self { track, header: header.clone() }
     }
@@ -130,7 +130,7 @@ impl Writer {
             source: k + 1,
             stream: self.header.sources[k].stream.clone(),
             columns: self.header.sources[k].array.columns.into(),
-            pictures: Mutex::new(Pictures::new(self.header.sources[k].array.len())),
+            grey_scale: Mutex::new(GreyScale::new(self.header.sources[k].array.len())),
         })
     }
 
@@ -173,7 +173,7 @@ impl Track {
     ///
     /// `Core(Problem)` if the source is not a stream, or has other columns; otherwise as [`Track::datagram`].
     pub fn sample(&self, arrived_ns: i64, number: u64, values: &[f64]) -> Result<()> {
-        let Some(stream) = self.stream.as_ref().filter(|stream| stream.takes(values)) else {
+        let Some(stream) = self.stream.as_ref().filter(|stream| stream.fits(values)) else {
             let n = self.stream.as_ref().map_or(0, |stream| stream.columns.len());
             return Err(problem!("{} values: the source has {n} columns", values.len()).into());
         };
@@ -213,11 +213,11 @@ impl Track {
         self.queue.push(self.source, Topic::Datagrams, (arrived_ns, number), bytes, most)
     }
 
-    /// Writes many datagrams: `offsets` are their starts in `bytes`, followed by the end of the last one.
+    /// Writes many datagrams: each begins in `bytes` at its entry of `offsets`, whose last one is where all end.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` if columns differ in length or offsets are out of range; otherwise as [`Track::datagram`].
+    /// `Core(Problem)` where columns differ in length or name bytes that are not there; else as [`Track::datagram`].
     pub fn datagrams(&self, arrived_ns: &[i64], number: &[u64], offsets: &[i64], bytes: &[u8]) -> Result<()> {
         if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
             let n = arrived_ns.len();
@@ -271,7 +271,7 @@ impl Track {
         let text = format!("zeroed row {y}, column {x}: rest {before_text} to {rest:.1} ticks");
         let mut note = log(at_ns, Some(t), &text);
         note["zeroed"] = json!({ "x": x, "y": y, "rest": rest, "before": before });
-        self.pictures().zero(usize::from(y) * self.columns + usize::from(x), rest);
+        self.grey_scale().zero(usize::from(y) * self.columns + usize::from(x), rest);
         self.push_json(Topic::Notes, at_ns, &note)
     }
 
@@ -308,11 +308,11 @@ impl Track {
     /// Subtracts a tare's rest from the pictures from now on; without a tare, the lowest value of each taxel so far is
     /// subtracted.
     pub fn tare(&self, tare: &Tare) {
-        self.pictures().tare(tare);
+        self.grey_scale().tare(tare);
     }
 
-    fn pictures(&self) -> MutexGuard<'_, Pictures> {
-        lock(&self.pictures)
+    fn grey_scale(&self) -> MutexGuard<'_, GreyScale> {
+        lock(&self.grey_scale)
     }
 
     /// Writes a picture of the taxels' values for viewers: 8 bits above rest, scaled so that the largest value of the
@@ -327,7 +327,7 @@ impl Track {
             let n = ticks.len();
             return Err(problem!("picture of {n} taxels, {columns} a row: must be whole rows").into());
         }
-        let grey = self.pictures().take(t_us, ticks);
+        let grey = self.grey_scale().draw(t_us, ticks);
         let picture = json!({
             "timestamp": time(at_ns), "frame_id": "taxel", "width": columns, "height": ticks.len() / columns,
             "encoding": "mono8", "step": columns, "data": base64(&grey.bytes), "t_us": t_us,

@@ -106,11 +106,11 @@ impl OutputFile {
         Err(Error::file(&self.path)(IoError::new(ErrorKind::NotFound, text)))
     }
 
-    /// Removes the file if it is new; an earlier file stays.
+    /// Removes the file where it is new: nothing is to stay in it. An earlier one stays.
     ///
     /// # Errors
     ///
-    /// `File` if the system refuses.
+    /// `File` where the system refuses.
     pub fn discard(self) -> Result<()> {
         if self.new && self.is_in_place()? {
             std::fs::remove_file(&self.path).map_err(Error::file(&self.path))?;

@@ -77,7 +77,7 @@ impl Stream {
 
     /// Whether the number of values equals that of columns.
     #[must_use]
-    pub fn takes(&self, values: &[f64]) -> bool {
+    pub fn fits(&self, values: &[f64]) -> bool {
         values.len() == self.columns.len()
     }
 
@@ -86,7 +86,7 @@ impl Stream {
     #[must_use]
     pub fn parse(&self, line: &str) -> Option<Vec<f64>> {
         let values = fields(line).map(|field| field.parse().ok()).collect::<Option<Vec<f64>>>()?;
-        self.takes(&values).then_some(values)
+        self.fits(&values).then_some(values)
     }
 
     /// A line in the form in which it is recorded.
@@ -139,7 +139,7 @@ impl<'a> Sampling<'a> {
         Self { stream, samples: Samples::default(), whole: true, added: 0.0, last: None }
     }
 
-    pub(super) fn take(&mut self, at_ns: i64, number: u64, data: &[u8]) {
+    pub(super) fn push(&mut self, at_ns: i64, number: u64, data: &[u8]) {
         let Some((stamp, values)) = self.parse(data) else {
             self.samples.bad += 1;
             return;
@@ -208,7 +208,7 @@ mod tests {
         let mut sampling = Sampling::new(stream);
         for (k, &(stamp, at_ns)) in stamps.iter().enumerate() {
             let message = stream.message(&[stamp, k as f64]).to_string();
-            sampling.take(at_ns, k as u64, message.as_bytes());
+            sampling.push(at_ns, k as u64, message.as_bytes());
         }
         let samples = sampling.finish();
         assert_eq!(samples.bad, 0);
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn seconds_with_a_fraction_have_no_turns_and_a_small_step_back_is_kept() {
+    fn seconds_with_a_fraction_have_no_turns_and_a_small_step_back_stays() {
         let stream = stream(&["t_s", "a"]);
         let at = |ms: i64| 1_700_000_000_000_000_000 + ms * 1_000_000;
         let (t, resets) = times(&stream, &[(1.5, at(0)), (1.75, at(250)), (1.625, at(260)), (3601.5, at(3_600_000))]);

@@ -47,12 +47,12 @@ impl Topic {
 
     /// The channels of a source: those of a board, or those of a stream of numbers.
     pub(super) fn of_source(stream: bool) -> impl Iterator<Item = Self> {
-        let kept = move |topic: &Self| match topic {
+        let belongs = move |topic: &Self| match topic {
             Self::Samples => stream,
             Self::Counts => true,
             _ => !stream,
         };
-        Self::ALL.into_iter().filter(kept)
+        Self::ALL.into_iter().filter(belongs)
     }
 
     /// The channel's name in a file.

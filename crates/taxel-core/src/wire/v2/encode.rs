@@ -5,20 +5,14 @@
 
 use super::packer::{add, first_line, put, steps};
 use super::{
-    BASE_BITS, DATAGRAM_BYTES, HEADER_BYTES, Header, Kind, LATEST_OFFSET, Layout, START, STOP, TRAILER_BYTES, before,
+    BASE_BITS, BODY_BYTES, DATAGRAM_BYTES, Header, Kind, LATEST_OFFSET, Layout, NEVER, START, STOP, before,
     checked_stride,
 };
 use crate::events::EventsView;
 use crate::{Result, problem};
 
-/// Largest body, bytes.
-const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
-
 /// The first sequence number: 0 would mean that the board was reset, and that every taxel's value is 0.
 const FIRST_SEQUENCE: u32 = 1;
-
-/// Earlier than any time.
-const NEVER: i64 = i64::MIN;
 
 /// Events as datagrams.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

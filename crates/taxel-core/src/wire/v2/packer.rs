@@ -1,13 +1,10 @@
 //! Encodes events as datagrams of version 2, as the board sends them.
 
 use super::{
-    DATAGRAM_BYTES, DIFFERENCES, DROPPED, FRAME_SYNC, HEADER_BYTES, Header, Kind, LAST_LINE, LATEST_OFFSET, Layout,
-    START, STOP, Status, TRAILER_BYTES, before, checked_stride,
+    BODY_BYTES, DATAGRAM_BYTES, DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, LAST_LINE, LATEST_OFFSET, Layout,
+    START, STOP, Status, before, checked_stride,
 };
 use crate::{Array, Result, problem};
-
-/// Largest body, bytes.
-const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
 
 /// For how long after an event the end of every frame is promised, us.
 const RESTLESS_US: u64 = 100_000;

@@ -45,7 +45,7 @@ pub struct Remarks {
 
 impl Remarks {
     /// Adds a message; datagrams and pictures are only counted.
-    pub fn take(&mut self, message: &Message<'_>) {
+    pub fn add(&mut self, message: &Message<'_>) {
         match message.topic {
             Topic::Datagrams => {
                 self.datagrams += 1;
@@ -114,9 +114,9 @@ fn held(data: &[u8]) -> Option<Vec<u16>> {
 }
 
 /// Passes the taxels' values before the recording's first datagram to a decoder.
-pub fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
+pub fn begin_with(decoder: &mut wire::SenderDecoder, data: &[u8]) {
     if let Some(held) = held(data) {
-        receiver.begin_with(held.iter().map(|ticks| (*ticks != UNKNOWN).then_some(*ticks)));
+        decoder.begin_with(held.iter().map(|ticks| (*ticks != UNKNOWN).then_some(*ticks)));
     }
 }
 

@@ -128,7 +128,7 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Opcode and length of the record at `at`, if they are valid, and the unpacked size that it states.
+    /// Opcode and length of the record at `at`, where they make sense, and the size that it states to unpack to.
     fn sound(&self, at: u64) -> Result<Option<(u8, u64, u64)>> {
         let head = self.bytes(at, 80)?;
         let (Some(&opcode), Some(length)) = (head.first(), number(&head, 1)) else { return Ok(None) };

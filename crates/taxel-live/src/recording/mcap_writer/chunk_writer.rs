@@ -28,7 +28,7 @@ pub(super) struct ChunkWriter {
     mcap: mcap::Writer<NoSeek<RecordFile>>,
     header: Header,
     /// The messages being written; the buffer is then swapped with the queue's.
-    pub(super) taken: Queue,
+    pub(super) batch: Queue,
 }
 
 impl ChunkWriter {
@@ -53,7 +53,7 @@ impl ChunkWriter {
             .disable_seeking(true)
             .chunk_size(Some(2 * CHUNK_BYTES as u64));
         let mcap = options.create(NoSeek::new(RecordFile::new(file, at_disk)))?;
-        let mut writer = Self { mcap, header: header.clone(), taken: Queue::default() };
+        let mut writer = Self { mcap, header: header.clone(), batch: Queue::default() };
         let opening = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
         writer.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: opening.clone() })?;
         for (k, source) in std::iter::once(header).chain(&header.sources).enumerate() {
@@ -75,14 +75,14 @@ impl ChunkWriter {
     /// Packs messages into chunks and passes each to the operating system, after which a kill no longer loses it.
     pub(super) fn write(&mut self) -> std::result::Result<(), McapError> {
         let (mut at, mut chunk) = (0, 0);
-        for message in &self.taken.messages {
+        for message in &self.batch.messages {
             let header = MessageHeader {
                 channel_id: message.channel,
                 sequence: message.number,
                 log_time: message.at_ns,
                 publish_time: message.at_ns,
             };
-            self.mcap.write_to_known_channel(&header, &self.taken.bytes[at..at + message.bytes])?;
+            self.mcap.write_to_known_channel(&header, &self.batch.bytes[at..at + message.bytes])?;
             at += message.bytes;
             chunk += MESSAGE_BYTES + message.bytes;
             if chunk >= CHUNK_BYTES {
@@ -90,7 +90,7 @@ impl ChunkWriter {
                 chunk = 0;
             }
         }
-        self.taken.clear();
+        self.batch.clear();
         if chunk > 0 { self.mcap.flush() } else { Ok(()) }
     }
 

@@ -65,7 +65,7 @@ pub(super) struct Pending {
     pub(super) ends: BTreeMap<String, Counts>,
     /// How the recording ends; set once. The inner `None` is an end without finishing.
     end: Option<Option<Counts>>,
-    /// The error of a failed write; no message is accepted after it.
+    /// Why writing failed; nothing is queued after it.
     failure: Option<WriteFailure>,
 }
 
@@ -224,8 +224,7 @@ impl WriteQueue {
         }
     }
 
-    /// Takes all messages from the queue and writes them. The writer stays locked during both steps, which preserves
-    /// the order.
+    /// Writes all that waits, in order: the writer is locked from before the one to after the other.
     fn drain(&self) -> Result<()> {
         let mut slot = lock(&self.writer);
         let Some(writer) = slot.as_mut() else {
@@ -233,7 +232,7 @@ impl WriteQueue {
             // added any more.
             return self.lock().failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(&self.path)));
         };
-        std::mem::swap(&mut self.lock().queue, &mut writer.taken);
+        std::mem::swap(&mut self.lock().queue, &mut writer.batch);
         self.room.notify_all();
         match writer.write() {
             Ok(()) => Ok(()),

@@ -1,7 +1,7 @@
 //! Each taxel's value, and the time since which it is valid, as far as they are known.
 
 use crate::Array;
-use crate::wire::v2::stride;
+use crate::wire::v2::{NEVER, stride};
 
 /// Stored by position on the wire (line << stride | row, with the array's own stride), so that the entries of one line
 /// are contiguous.
@@ -19,9 +19,6 @@ pub(super) struct Held {
     /// Value of a taxel without any event so far: 0 if the session was received from its start.
     pub(super) unheard: Option<u16>,
 }
-
-/// Earlier than any time.
-pub(super) const NEVER: i64 = i64::MIN;
 
 /// Time of a value that is known from elsewhere: earlier than anything received.
 const BEFORE: i64 = NEVER + 1;

@@ -5,20 +5,22 @@ use std::collections::BTreeSet;
 use taxel_core::held::HeldOverTime;
 use taxel_core::{EventsView, Result};
 
+use super::PICTURE_EVERY;
+
 /// Interval between pictures while there are events, us.
-const EVERY_US: i64 = 100_000;
+const EVERY_US: i64 = PICTURE_EVERY.as_micros() as i64;
 
 /// Interval between pictures around a time of interest (a detection, a note, a marker), us.
 const NEAR_US: i64 = 10_000;
 
 /// The sequence of pictures, in order of time.
 #[derive(Debug)]
-pub struct Pictures {
+pub struct EventPictures {
     times: std::vec::IntoIter<i64>,
     held: HeldOverTime<u16>,
 }
 
-impl Pictures {
+impl EventPictures {
     /// The pictures of events: at each multiple of 100 ms if an event occurred in the 100 ms up to it, and at the
     /// multiples of 10 ms before and after each of the times `around`, within the range of events. None if no event has
     /// an intensity.

@@ -33,7 +33,7 @@ pub struct DatagramInfo {
 /// refused and counted, until [`Self::expect`] is called, or until only whole words of version 1 have arrived for a
 /// second. After a change of version, time continues by the host's clock.
 #[derive(Debug, Clone)]
-pub struct Receiver {
+pub struct SenderDecoder {
     array: Array,
     version: u8,
     one: Decoder,
@@ -48,8 +48,8 @@ pub struct Receiver {
     changes: u64,
 }
 
-impl Receiver {
-    /// A receiver for a sender that uses `version` at first; `one` decodes version 1 and defines the array.
+impl SenderDecoder {
+    /// A decoder of a sender that uses `version` at first; `one` decodes what is of version 1, and has the array.
     #[must_use]
     pub fn new(one: Decoder, version: u8) -> Self {
         let array = one.array().clone();
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn arrivals_out_of_all_reason_carry_no_clock_away() {
-        let mut receiver = Receiver::new(Decoder::new(Array::thesis()), 2);
+        let mut decoder = SenderDecoder::new(Decoder::new(Array::thesis()), 2);
         let mut events = Events::empty(Array::thesis());
         let mut before = 0;
         for (session, arrived) in [0, i64::MAX, i64::MIN, i64::MAX, 0, i64::MAX].into_iter().enumerate() {
@@ -239,7 +239,7 @@ mod tests {
             };
             let mut datagram = vec![];
             header.write(&[], &mut datagram);
-            let until = receiver.push(&datagram, Some(arrived), &mut events).until.unwrap();
+            let until = decoder.push(&datagram, Some(arrived), &mut events).until.unwrap();
             assert!((before..=before + 400 * 86_400_000_000).contains(&until), "{until} us after {before} us");
             before = until;
         }
@@ -249,14 +249,14 @@ mod tests {
     fn a_sender_that_changes_its_version_is_heard_and_time_goes_on() {
         let array = Array::thesis();
         let mut board = Board::new(Registers::default(), &array).unwrap();
-        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let mut decoder = SenderDecoder::new(Decoder::new(array.clone()), 1);
         let mut events = Events::empty(array);
         let (mut now, mut changes) = (5_000_000, vec![]);
         for version in [1, 2, 1] {
             speak(&mut board, version);
             for _ in 0..6000 {
                 play(&mut board, 1, |datagram| {
-                    let info = receiver.push(datagram, Some(now), &mut events);
+                    let info = decoder.push(datagram, Some(now), &mut events);
                     if info.changed {
                         changes.push((info.version, now));
                     }
@@ -278,7 +278,7 @@ mod tests {
         assert_eq!(changes.iter().map(|c| c.0).collect::<Vec<_>>(), [2, 1]);
         let begun = 5_000_000 + 12_000 * 192;
         assert!((1_000_000..1_001_000).contains(&(changes[1].1 - begun)), "a second later: {}", changes[1].1 - begun);
-        assert!(receiver.refused() > 0);
+        assert!(decoder.refused() > 0);
         let (t, expected) = (*events.t.last().unwrap(), 18_000 * 192);
         assert!((t - expected).abs() < 2000, "{t} for {expected}");
     }
@@ -287,30 +287,30 @@ mod tests {
     fn what_the_host_asked_for_is_believed_at_once() {
         let array = Array::thesis();
         let mut board = Board::new(Registers { wire_version: 2, ..Registers::default() }, &array).unwrap();
-        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let mut decoder = SenderDecoder::new(Decoder::new(array.clone()), 1);
         let mut events = Events::empty(array);
         play(&mut board, 3, |datagram| {
-            receiver.push(datagram, Some(0), &mut events);
+            decoder.push(datagram, Some(0), &mut events);
         });
-        assert_eq!((receiver.version(), receiver.changes()), (2, 1));
+        assert_eq!((decoder.version(), decoder.changes()), (2, 1));
         speak(&mut board, 1);
-        receiver.expect(1, &mut events);
+        decoder.expect(1, &mut events);
         let before = events.len();
         play(&mut board, 2, |datagram| {
-            receiver.push(datagram, Some(400), &mut events);
+            decoder.push(datagram, Some(400), &mut events);
         });
-        assert_eq!((receiver.version(), receiver.refused()), (1, 0));
+        assert_eq!((decoder.version(), decoder.refused()), (1, 0));
         assert_eq!(events.len(), before + 2 * 4096);
     }
 
     #[test]
     fn a_damaged_datagram_changes_no_version() {
         let array = Array::thesis();
-        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let mut decoder = SenderDecoder::new(Decoder::new(array.clone()), 1);
         let mut events = Events::empty(array);
         let mut damaged = vec![v2::MAGIC, 0x21];
         damaged.resize(40, 7);
-        receiver.push(&damaged, Some(0), &mut events);
-        assert_eq!((receiver.version(), receiver.counts().skipped), (1, 40));
+        decoder.push(&damaged, Some(0), &mut events);
+        assert_eq!((decoder.version(), decoder.counts().skipped), (1, 40));
     }
 }

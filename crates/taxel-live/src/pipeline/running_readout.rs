@@ -7,24 +7,24 @@ use taxel_core::encode::{Tare, Zeroing};
 use super::ahead::Ahead;
 use super::options::LiveOptions;
 use super::output::DetectionOutput;
-use super::readout_queue::{Quiet, Taken};
+use super::readout_queue::{BatchEnd, Quiet};
 use super::rest::Rest;
 use super::shared::Shared;
 
-/// The receiver of the events.
-pub enum Listener {
+/// What is to read the events out.
+pub enum ReadoutSetup {
     /// Nothing: datagrams are received and recorded only.
     None,
     /// A readout.
     Reading(Box<ReadoutStream>),
-    /// A readout that first takes a tare: for this duration from the first event on (us of the board's clock), or until
-    /// the board marks a start.
+    /// A readout that first measures a tare: from the first event on for so long (us of the board's clock), or until the
+    /// board marks a start.
     Taring(i64, Box<Readout>),
 }
 
-impl Listener {
-    /// The listener of a readout, if there is one: it first takes a tare of `tare_us` if that is given, otherwise it
-    /// starts at once, with `tare` if its encoder needs one.
+impl ReadoutSetup {
+    /// The setup of a readout, where there is one: it measures a fresh tare of `tare_us` where that is given, else it reads at
+    /// once, with `tare` where its encoder needs one.
     ///
     /// # Errors
     ///
@@ -43,9 +43,9 @@ impl Listener {
     }
 }
 
-pub(super) struct Reader {
+pub(super) struct RunningReadout {
     mode: Mode,
-    /// Detections that no thread has output yet.
+    /// Detections that do not wait for output yet.
     pub(super) found: Vec<Detection>,
     events: Events,
     zeroings: Vec<Zeroing>,
@@ -59,20 +59,20 @@ enum Mode {
     Idle,
 }
 
-impl Reader {
-    pub(super) fn new(listener: Listener, options: &LiveOptions) -> Self {
+impl RunningReadout {
+    pub(super) fn new(readout: ReadoutSetup, options: &LiveOptions) -> Self {
         let events = Events::empty(options.array.clone());
-        let mode = match listener {
-            Listener::None => Mode::Idle,
-            Listener::Reading(stream) => Mode::Reading(Ahead::new(stream)),
-            Listener::Taring(stretch_us, readout) => {
+        let mode = match readout {
+            ReadoutSetup::None => Mode::Idle,
+            ReadoutSetup::Reading(stream) => Mode::Reading(Ahead::new(stream)),
+            ReadoutSetup::Taring(stretch_us, readout) => {
                 Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array)))
             }
         };
         Self { mode, found: vec![], events, zeroings: vec![], frames: options.frames() }
     }
 
-    /// Publishes whether a tare is being taken, and the current rest, before the first events.
+    /// Publishes whether it measures a tare, and the rest that it reads with, before the first events.
     pub(super) fn begin(&self, shared: &Shared) {
         shared.published().counters.taring = matches!(self.mode, Mode::Taring(_));
         self.publish_rest(shared);
@@ -89,57 +89,57 @@ impl Reader {
             if last {
                 break;
             }
-            let taken = shared.readout_queue.take(&mut self.events, &mut self.zeroings);
-            self.process(shared, taken);
-            last = taken.last;
+            let end = shared.readout_queue.pop(&mut self.events, &mut self.zeroings);
+            self.process(shared, end);
+            last = end.last;
         }
     }
 
-    /// Runs in the decoding thread: processes its events, and leaves it the buffer of the previous ones.
-    pub(super) fn take(&mut self, shared: &Shared, events: &mut Events, taken: Taken) {
+    /// In the thread that decodes: reads its events out, and leaves the memory of the last ones there.
+    pub(super) fn push(&mut self, shared: &Shared, events: &mut Events, end: BatchEnd) {
         std::mem::swap(&mut self.events, events);
-        self.process(shared, taken);
+        self.process(shared, end);
         self.events.clear();
     }
 
     /// Advances time without events.
-    pub(super) fn wait(&mut self, shared: &Shared, taken: Taken) {
+    pub(super) fn advance(&mut self, shared: &Shared, end: BatchEnd) {
         self.events.clear();
-        self.process(shared, taken);
+        self.process(shared, end);
     }
 
-    /// Applies zeroings, each of which has its own time.
+    /// Adds zeroings, each of which has its own time.
     pub(super) fn zero(&mut self, zeroings: &[Zeroing]) {
         self.zeroings.extend_from_slice(zeroings);
     }
 
-    fn process(&mut self, shared: &Shared, taken: Taken) {
-        if let Err(error) = self.try_process(shared, taken) {
+    fn process(&mut self, shared: &Shared, end: BatchEnd) {
+        if let Err(error) = self.try_process(shared, end) {
             shared.fail(error);
             self.mode = Mode::Idle;
         }
     }
 
-    fn try_process(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
+    fn try_process(&mut self, shared: &Shared, end: BatchEnd) -> crate::Result<()> {
         match &mut self.mode {
             Mode::Reading(readout) => {
                 self.zeroings.drain(..).try_for_each(|zeroing| readout.zero(&zeroing))?;
                 readout.push(self.events.view(), &mut self.found)?;
-                match taken.quiet {
+                match end.quiet {
                     Some(Quiet::Promised(t)) => readout.advance(t, &mut self.found)?,
-                    Some(Quiet::Believed(t)) if taken.last => readout.advance(t, &mut self.found)?,
+                    Some(Quiet::Believed(t)) if end.last => readout.advance(t, &mut self.found)?,
                     Some(Quiet::Believed(t)) => readout.quiet(t, &mut self.found)?,
                     None => {}
                 }
             }
             Mode::Taring(rest) => {
-                if let Some((stop, inside)) = rest.push(&self.events, taken.quiet.map(Quiet::until))? {
+                if let Some((stop, inside)) = rest.push(&self.events, end.quiet.map(Quiet::until))? {
                     self.begin_reading(shared, stop, inside)?;
                 }
             }
             Mode::Idle => self.zeroings.clear(),
         }
-        if !self.events.is_empty() || taken.last {
+        if !self.events.is_empty() || end.last {
             let counters = &mut shared.published().counters;
             counters.read_out += self.events.len() as u64;
             if let Mode::Reading(readout) = &self.mode {
