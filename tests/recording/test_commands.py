@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import run
 
 import taxel
 
 from .making import record, some_events
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "taxel", *map(str, arguments)], check=False, capture_output=True, text=True
-    )
 
 
 @pytest.fixture(scope="module")
