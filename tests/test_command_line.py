@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import call
 
 import taxel
-from taxel.cli import main
 from taxel.live import send
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -23,13 +23,6 @@ FOREIGN = (
     r"invalid type|unable to parse|invalid value|expected|`|Traceback|_core|overwrite=|NoneType|Input should be|"
     r"taxel\.[A-Z]"
 )
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        main([str(a) for a in arguments])
-    said = capsys.readouterr()
-    return int(ended.value.code or 0), said.out, said.err
 
 
 @pytest.fixture

@@ -9,29 +9,14 @@ import ast
 import json
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
-from typing import Any
+
+from registers_source import OPERATOR, Table, parsed, read
 
 HEAD = "Made from registers.toml by tools/registers.py (`make registers`): edit that."
 OPPOSITE = {ast.LtE: ">", ast.Lt: ">=", ast.GtE: "<", ast.Gt: "<=", ast.Eq: "!=", ast.NotEq: "=="}
-OPERATOR = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
 #: What a rule may name beside the fields, and its unit.
 OF_THE_ARRAY = {"steps": "number", "driven_lines": "number", "sense_lines": "number"}
-
-Table = dict[str, Any]
-
-
-def read(path: Path) -> Table:
-    """Return the source with every value filled in."""
-    source = tomllib.loads(path.read_text())
-    for field in source["field"]:
-        field.setdefault("offset", 0)
-        field.setdefault("least", field["offset"])
-        field.setdefault("greatest", 2 ** field["bits"] - 1 + field["offset"])
-    for rule in source["rule"]:
-        rule.setdefault("warns", False)
-    return source
 
 
 def rust_type(field: Table) -> str:
@@ -68,11 +53,6 @@ def broken(node: ast.expr, *, inner: bool = False, equal: str = "==") -> str:
             sign = {"==": equal, "!=": equal.replace("==", "!=")}.get(sign, sign) if equal != "==" else sign
             return f"{value(left)} {sign} {value(right)}"
     raise ValueError(f"registers.toml: {ast.unparse(node)} is no comparison")
-
-
-def parsed(text: str) -> ast.expr:
-    """Read one expression."""
-    return ast.parse(text, mode="eval").body
 
 
 def names(text: str) -> set[str]:

@@ -5,19 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import call
 from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
 from taxel import _core
 from taxel.cli import main
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    """Run the command line; give exit code, what it printed, what it complained of."""
-    with pytest.raises(SystemExit) as ended:
-        main([str(a) for a in arguments])
-    said = capsys.readouterr()
-    return int(ended.value.code or 0), said.out, said.err
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refused
 from test_commands import call
 
 import taxel
@@ -195,10 +196,9 @@ TWO = np.ones(2)
 )
 def test_a_graph_that_is_no_readout_is_one_error_with_its_node(tmp_path: Path, changed: dict, said: str) -> None:
     nir.write(tmp_path / "a.nir", graph_of(**changed))
-    with pytest.raises(taxel.FormatError, match=said) as caught:
+    with refused(said, taxel.FormatError) as caught:
         taxel.Readout.from_nir(tmp_path / "a.nir", encoder=ENCODER)
     assert "a.nir" in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_graph_without_an_encoder_asks_for_one(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel.detect import Example, Readout, Recipe, TrainedNeuron, run, score, train
@@ -282,9 +283,8 @@ def test_neurons_trained_otherwise_are_refused() -> None:
 )
 def test_nonsense_in_a_readout_is_one_clear_error(change: dict[str, object], said: str) -> None:
     sound = {"encoder": ContactArea(levels=(2, 4, 8)), "neurons": {"a": (taxel.Neuron(), [1.0] * 6)}, "array": ARRAY}
-    with pytest.raises(taxel.ProblemError, match=said) as error:
+    with refused(said):
         Readout(**{**sound, **change})
-    assert "\n" not in str(error.value)
 
 
 def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_path) -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
-import taxel
 from taxel import Array, Events, Frames, Tare
 from taxel.encode import ContactArea
 
@@ -91,6 +91,5 @@ def test_a_lone_taxel_and_one_never_heard_of_are_no_contact():
     ],
 )
 def test_nonsense_gets_one_clear_line(call, said):
-    with pytest.raises(taxel.ProblemError, match=said) as error:
+    with refused(said):
         call()
-    assert "\n" not in str(error.value)

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Events, Frames, _core
@@ -411,9 +412,8 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
     ],
 )
 def test_nonsense_gets_one_clear_line(call, said):
-    with pytest.raises(taxel.ProblemError, match=said) as error:
+    with refused(said):
         call()
-    assert "\n" not in str(error.value)
 
 
 @each_encoder

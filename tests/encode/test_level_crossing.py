@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
-import taxel
 from taxel.encode import LevelCrossing, RunningRange
 
 from . import oracles
@@ -125,6 +125,5 @@ def test_renewals_go_on_over_a_gap_longer_than_the_window():
     ],
 )
 def test_nonsense_gets_one_clear_line(call, said):
-    with pytest.raises(taxel.ProblemError, match=said) as error:
+    with refused(said):
         call()
-    assert "\n" not in str(error.value)

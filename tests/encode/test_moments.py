@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Frames, Tare
@@ -172,9 +173,8 @@ def test_it_begins_settled():
     ],
 )
 def test_nonsense_gets_one_clear_line(wrong, said):
-    with pytest.raises(taxel.ProblemError, match=said) as error:
+    with refused(said):
         Moments(**wrong)
-    assert "\n" not in str(error.value)
 
 
 def test_without_a_tare_nothing_is_encoded():

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import free_port
 
 import taxel
 from taxel import Array, Events, Neuron, Readout, wire
@@ -18,7 +19,7 @@ from taxel.live import Live, send
 from taxel.simulate import Board, Scene, emulate
 from taxel.wire import Registers
 
-from .boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, touch
+from .boards import LOOPBACK, SMALL, command, listening, play, presses, touch
 
 
 def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path: Path) -> None:

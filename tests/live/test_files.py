@@ -7,11 +7,12 @@ import time
 from pathlib import Path
 
 import pytest
+from loopback import free_port
 
 import taxel
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, recording, wait_for, wait_until
+from .boards import LOOPBACK, SMALL, command, listening, play, presses, recording, wait_for, wait_until
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is always full")

@@ -7,18 +7,19 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import free_port, until
 
 import taxel
 from taxel import Events, wire
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL, free_port
+from .boards import LOOPBACK, SMALL
 
 #: The value that each taxel receives once, before all else.
 REST = 40 + np.arange(16)
@@ -62,13 +63,6 @@ def board(port: int) -> Iterator[list[int]]:
     finally:
         over.set()
         thread.join()
-
-
-def until(what: Callable[[], bool]) -> None:
-    end = time.monotonic() + 30
-    while not what():
-        assert time.monotonic() < end
-        time.sleep(0.002)
 
 
 def steps(recording: taxel.Recording) -> list[int]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 from taxel import Neuron, ProblemError, SpikeTrains
 
@@ -116,9 +117,8 @@ TRAINS = SpikeTrains.from_lists([[1.0], [2.0]], stop=10.0)
 )
 def test_weights_that_make_no_sense_are_one_error(weights: object, said: str) -> None:
     for time in ("grid", "continuous"):
-        with pytest.raises(ProblemError, match=said) as caught:
+        with refused(said):
             Neuron(time=time).run_many(weights, TRAINS)
-        assert "\n" not in str(caught.value)
 
 
 def test_other_arguments_that_make_no_sense_are_one_error() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Calibration, FormatError, Frames, Load, ProblemError
@@ -230,9 +231,8 @@ def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):
     with pytest.raises(ProblemError, match="the calibration is of another array"):
         other.apply(frames(1.0))
     recording = made_beside(tmp_path, other)
-    with pytest.raises(ProblemError, match=r"press.calibration.json: .* another array") as error:
+    with refused(r"press.calibration.json: .* another array"):
         recording.calibrated()
-    assert "\n" not in str(error.value)
 
 
 def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
@@ -273,9 +273,8 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
     ],
 )
 def test_what_makes_no_sense_is_said(call, said):
-    with pytest.raises(ProblemError, match=said) as error:
+    with refused(said):
         call()
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("entry", ["unit", "of", "curve", "array", "gain", "rest", "date", "floor", "loads", "taxel"])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Detections, Events, Frames, SpikeTrains, Tare
@@ -152,9 +153,8 @@ def test_a_quantity_is_converted_or_refused_everywhere(place: tuple[Any, Any], u
         Mute(),
         nested(us, lambda _: Mute()),
     ):
-        with pytest.raises(ProblemError, match="a quantity that converts to it") as caught:
+        with refused("a quantity that converts to it"):
             call(wrong)
-        assert "\n" not in str(caught.value)
     if isinstance(us, list) and len(us) > 1:
         with pytest.raises(ProblemError, match="mixes quantities and numbers without a unit"):
             call([us[0], us[1] / 1e6 * S, *us[2:]])
@@ -174,9 +174,8 @@ def test_a_quantity_is_converted_or_refused_everywhere(place: tuple[Any, Any], u
     ],
 )
 def test_where_no_unit_is_meant_a_quantity_is_refused(call: Any) -> None:
-    with pytest.raises(ProblemError, match=r"must be a (plain number|number of ms)") as caught:
+    with refused(r"must be a (plain number|number of ms)"):
         call(3.0 * V)
-    assert "\n" not in str(caught.value)
 
 
 def test_what_has_no_dimension_is_a_plain_number() -> None:

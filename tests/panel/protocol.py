@@ -12,7 +12,8 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from panel.browser import free_port, running
+from loopback import free_port
+from panel.browser import running
 
 websockets = pytest.importorskip("websockets", reason="the test extra brings websockets")
 

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loopback import free_port
 from tests.detect.test_readout import recipe, tare, touches
-from tests.panel.browser import PATIENCE, chromium, free_port, running
+from tests.panel.browser import PATIENCE, chromium, running
 
 import taxel
 import taxel.device

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.panel.browser import Process, free_port, running
+from loopback import free_port
+from tests.panel.browser import Process, running
 from tests.panel.protocol import Client
 
 import taxel

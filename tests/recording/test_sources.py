@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 import tty
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loopback import until
 
 import taxel
 from taxel import _core
@@ -38,13 +38,6 @@ def play(events: taxel.Events, address: tuple[str, int]) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         for t in events.t:
             link.sendto(taxel.wire.encode(events[events.t == t]), address)
-
-
-def until(what: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not what():
-        assert time.monotonic() < end, "never came"
-        time.sleep(0.005)
 
 
 def lines(live: Live, name: str) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refused
 
 from taxel import FormatError, ProblemError
 from taxel.report import installed_sources
@@ -266,9 +267,8 @@ def test_75_paths_serve_the_300_conditions():
     ],
 )
 def test_nonsense_is_one_clear_error(make, said):
-    with pytest.raises(ProblemError, match=said) as error:
+    with refused(said):
         make()
-    assert "\n" not in str(error.value)
 
 
 def test_no_folder_is_made_unasked(tmp_path):
