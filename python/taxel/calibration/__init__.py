@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown, whole
+from taxel._base.arguments import first_line, flag, instance, mapping, number, numbers, several, shown, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
@@ -191,8 +191,8 @@ class Calibration:
         ...     Frames([[[0.0]]], [0], unit="N")).values.round(1)
         array([[[4.5]]], dtype=float32)
         """
-        given = {} if sensor is None else mapping("sensor", sensor)
-        curve = Law(ramp, checked_text("unit", unit, UNITS), **given)
+        constants = {} if sensor is None else mapping("sensor", sensor)
+        curve = Law(ramp, checked_text("unit", unit, UNITS), **constants)
         how = {"gain": gain, "rest": rest, "floor": floor, "date": date, "note": note}
         return cls._made(array, curve, unit, "ticks", how)
 
@@ -296,10 +296,10 @@ class Calibration:
         array([10.], dtype=float32)
         """
         checked_text("unit", unit, UNITS)
-        given = [instance("loads", load, Load) for load in several("loads", loads)]
-        if not given:
+        measured = [instance("loads", load, Load) for load in several("loads", loads)]
+        if not measured:
             raise ProblemError("loads is empty: lay at least one known load on the array")
-        array, of = instance("frames", given[0].frames, Frames).array, given[0].frames.unit
+        array, of = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
         curve: Curve = Power(1.0)
         if start is not None:
             instance("start", start, Calibration)
@@ -308,8 +308,8 @@ class Calibration:
                 raise ProblemError(f"start turns {start.of} into {start.unit}: must turn {of} into {unit}")
             curve, rest = start._curve, start.rest if rest is None else rest
         whole_fit = cls._made(array, curve, unit, of, {"rest": rest, "floor": floor, "date": date, "note": note})
-        laid = [_Laid.of(load, k, whole_fit) for k, load in enumerate(given, start=1)]
-        differ = len({load.load for load in given}) > 1
+        laid = [_Laid.of(load, k, whole_fit) for k, load in enumerate(measured, start=1)]
+        differ = len({load.load for load in measured}) > 1
         if exponent is not None:
             whole_fit._curve = curve.bent(above_0("exponent", exponent))
         elif differ and not isinstance(curve, Table):
@@ -321,7 +321,7 @@ class Calibration:
         unknown = 1 + (differ and exponent is None and not isinstance(curve, Table))
         unknown += int(np.count_nonzero(gains[_there(array)] != gain)) if each else 0
         whole_fit.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
-        whole_fit.loads = tuple((load.load, load.unit, value) for load, value in zip(given, made, strict=True))
+        whole_fit.loads = tuple((load.load, load.unit, value) for load, value in zip(measured, made, strict=True))
         return whole_fit
 
     def apply(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
@@ -369,14 +369,14 @@ class Calibration:
         values = self._curve.readings(np.maximum(frames.values, 0.0) / self.gain, held)
         return Frames(_32_bits(values), frames.t, unit=self.of, array=frames.array)
 
-    def _rest(self, given: Tare | ArrayLike | None) -> Values:
-        if isinstance(given, Tare):
-            _same(self.array, given.array, "the tare")
-            given = given.rest
-        elif given is not None and np.isnan(numbers("rest", given, np.float64)).any():
+    def _rest(self, rest: Tare | ArrayLike | None) -> Values:
+        if isinstance(rest, Tare):
+            _same(self.array, rest.array, "the tare")
+            rest = rest.rest
+        elif rest is not None and np.isnan(numbers("rest", rest, np.float64)).any():
             raise ProblemError("rest holds NaN: must be finite; give a Tare where the rest of a taxel is not known")
-        if given is not None:
-            return _by_taxel("rest", given, self.array)
+        if rest is not None:
+            return _by_taxel("rest", rest, self.array)
         if self.rest is not None:
             return self.rest
         return np.full(self.array.shape, self._curve.rest() if isinstance(self._curve, Law) else 0.0)
@@ -396,13 +396,13 @@ class Calibration:
         if isinstance(curve, Table) and curve.x.ndim == 3:
             curve = Table(curve.x[:, top:bottom, left:right], curve.y)
         gain = self.gain[top:bottom, left:right]
-        said = {name: getattr(self, name) for name in ("floor", "date", "residual", "loads", "note")}
-        return self._made(small, curve, self.unit, self.of, {**said, "gain": gain, "rest": rest})
+        unchanged = {name: getattr(self, name) for name in ("floor", "date", "residual", "loads", "note")}
+        return self._made(small, curve, self.unit, self.of, {**unchanged, "gain": gain, "rest": rest})
 
     def to_json(self) -> str:
         """Return the calibration as JSON that people can read."""
         even = bool((self.gain == self.gain[0, 0]).all())
-        said: dict[str, Any] = {
+        document: dict[str, Any] = {
             "taxel": "calibration",
             "unit": self.unit,
             "of": self.of,
@@ -410,7 +410,7 @@ class Calibration:
             "residual": self.residual,
             "loads": [{"load": load, "unit": unit, "made": made} for load, unit, made in self.loads],
             "note": self.note,
-            "curve": self._curve.said(),
+            "curve": self._curve.to_dict(),
             "floor": self.floor,
             "array": self.array._geometry(),
             "gain": float(self.gain[0, 0]) if even else self.gain.tolist(),
@@ -418,7 +418,7 @@ class Calibration:
             if self.rest is None
             else [[None if np.isnan(r) else r for r in row] for row in self.rest.tolist()],
         }
-        lines = (f" {json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in said.items())
+        lines = (f" {json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in document.items())
         return "{\n" + ",\n".join(lines) + "\n}\n"
 
     @classmethod
@@ -437,33 +437,32 @@ class Calibration:
             raise ProblemError(f"calibration is {shown(text)}: must be JSON text")
         entry = "the whole"
         try:
-            said = json.loads(text)
-            if not isinstance(said, dict) or said.get("taxel") != "calibration":
+            document = json.loads(text)
+            if not isinstance(document, dict) or document.get("taxel") != "calibration":
                 raise ProblemError('must be an object with "taxel": "calibration"')
             entry = "array"
-            array = Array._from_geometry(mapping(entry, said[entry]))
+            array = Array._from_geometry(mapping(entry, document[entry]))
             entry = "curve"
-            unit = checked_text("unit", said["unit"], UNITS)
-            curve = curve_of(mapping(entry, said[entry]), unit)
+            unit = checked_text("unit", document["unit"], UNITS)
+            curve = curve_of(mapping(entry, document[entry]), unit)
             entry = "loads"
             loads = [
-                (number("load", x["load"]), str(x["unit"]), number("made", x["made"])) for x in said.get(entry, ())
+                (number("load", x["load"]), str(x["unit"]), number("made", x["made"])) for x in document.get(entry, ())
             ]
             entry = "rest"
-            rest = said.get(entry)
+            rest = document.get(entry)
             if rest is not None:
                 rest = [[math.nan if r is None else r for r in row] for row in rest]
             entry = "values"
             names = ("gain", "floor", "date", "residual", "note")
-            how = {name: said[name] for name in names if name in said} | {"rest": rest, "loads": loads}
-            return cls._made(array, curve, unit, said["of"], how)
+            how = {name: document[name] for name in names if name in document} | {"rest": rest, "loads": loads}
+            return cls._made(array, curve, unit, document["of"], how)
         except RecursionError:
             raise FormatError("the calibration is nested too deeply; must be as Calibration.save writes it") from None
         except KeyError as error:
             raise FormatError(f"{entry}: {error.args[0]} is missing; must be as Calibration.save writes it") from None
         except (ValueError, TypeError, AttributeError, IndexError, OverflowError, ProblemError) as error:
-            line = str(error).split("\n", maxsplit=1)[0][:200]
-            raise FormatError(f"{entry}: {line}; must be as Calibration.save writes it") from None
+            raise FormatError(f"{entry}: {first_line(error)}; must be as Calibration.save writes it") from None
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the calibration to a JSON file, whole or not at all.
@@ -530,7 +529,7 @@ class Calibration:
 
     def described(self) -> str:
         """Return what it is in a line: the curve, its day, its residual."""
-        (kind, values), count = next(iter(self._curve.said().items())), len(self.loads)
+        (kind, values), count = next(iter(self._curve.to_dict().items())), len(self.loads)
         curve = {
             "power": f"power {values.get('exponent', 0):.3g}",
             "table": f"table of {len(values.get('values', ()))}",
@@ -635,8 +634,8 @@ def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]
     miss = np.array([np.inf, *map(missed, grid), np.inf])
     valleys = np.flatnonzero((miss[1:-1] <= miss[:-2]) & (miss[1:-1] < miss[2:]))
     around = [(grid[max(0, k - 1)], grid[min(len(grid) - 1, k + 1)]) for k in map(int, valleys)]
-    found = [minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 1e-9}) for bounds in around]
-    best, *others = sorted((float(one.fun), math.exp(float(one.x))) for one in found)
+    minima = [minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 1e-9}) for bounds in around]
+    best, *others = sorted((float(one.fun), math.exp(float(one.x))) for one in minima)
     alike = [exponent for squares, exponent in others if squares <= max(4.0 * best[0], _ALIKE**2)]
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
@@ -671,18 +670,18 @@ def _there(array: Array) -> NDArray[np.bool_]:
     return np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists)
 
 
-def _same(own: Array, other: Array, what: str, unit: str | None = None, wanted: str | None = None) -> None:
+def _same(own: Array, other: Array, what: str, unit: str | None = None, expected: str | None = None) -> None:
     """Refuse what is of another array, or in another unit."""
     if own != other:
         raise ProblemError(f"{what}: of {other!r}; the calibration is of another array, {own!r}")
-    if unit != wanted:
-        raise ProblemError(f"{what}: in {unit}; the calibration takes {wanted}")
+    if unit != expected:
+        raise ProblemError(f"{what}: in {unit}; the calibration takes {expected}")
 
 
-def _by_taxel(name: str, given: Any, array: Array) -> Values:
-    values = numbers(name, given, np.float64)
-    if isinstance(given, bool):
-        raise ProblemError(f"{name} is {given}: must be a number, or {array.shape}")
+def _by_taxel(name: str, value: Any, array: Array) -> Values:
+    values = numbers(name, value, np.float64)
+    if isinstance(value, bool):
+        raise ProblemError(f"{name} is {value}: must be a number, or {array.shape}")
     if values.shape not in ((), array.shape):
         raise ProblemError(f"{name} has shape {values.shape}: must be a number, or {array.shape}")
     if np.isinf(values).any():
@@ -692,11 +691,11 @@ def _by_taxel(name: str, given: Any, array: Array) -> Values:
     return every
 
 
-def _iso(given: object) -> str:
-    if given is None:
+def _iso(value: object) -> str:
+    if value is None:
         return day.today().isoformat()
-    said = checked_text("date", given)
+    written = checked_text("date", value)
     try:
-        return day.fromisoformat(said).isoformat()
+        return day.fromisoformat(written).isoformat()
     except ValueError:
-        raise ProblemError(f"date is {shown(said)}: must be a day as 2026-11-21") from None
+        raise ProblemError(f"date is {shown(written)}: must be a day as 2026-11-21") from None

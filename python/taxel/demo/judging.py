@@ -101,7 +101,7 @@ class Judged(NamedTuple):
         }
 
 
-def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
+def judge(detections: Detections, contacts: Sequence[Contact]) -> Judged:
     """Match detections with touches in order: impacts within 10 ms, presses and all others within 50.
 
     Parameters
@@ -120,7 +120,7 @@ def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
     within: dict[str, int] = {}
     for label, begin in (("contact", True), ("lift", False)):
         true = np.array([c.start_us if begin else c.stop_us for c in contacts], np.float64)
-        mine = found[label]
+        mine = detections[label]
         # Scored on whole us; errors are taken from the truth itself.
         result = score(mine, {label: np.rint(true).astype(np.int64)}, {label: windows})
         mine_at, touch = result.pairs[:, 0], result.pairs[:, 1]

@@ -28,7 +28,16 @@ from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["ANSWERED_MS", "QUESTIONS", "Drops", "Question", "board_of_drops", "named", "shipped_drops", "write_drops"]
+__all__ = [
+    "ANSWERED_MS",
+    "QUESTIONS",
+    "Drops",
+    "Question",
+    "board_of_drops",
+    "estimates",
+    "shipped_drops",
+    "write_drops",
+]
 
 #: How long after the contact an answer is asked for, ms.
 ANSWERED_MS = (1, 2, 5, 10)
@@ -113,7 +122,7 @@ def look(events: Events, tare: Tare, begin_us: float) -> NDArray[np.int64]:
     """Return what the host's picture holds at each time of `LOOKED_MS` after the first rise, shape (times, 4)."""
     assert events.intensity is not None  # the board sends them
     index = events.array.index(events.x, events.y)
-    rest, found = tare.rest.ravel(), np.zeros((len(LOOKED_MS), _NUMBERS), np.int64)
+    rest, features = tare.rest.ravel(), np.zeros((len(LOOKED_MS), _NUMBERS), np.int64)
     x = np.arange(len(rest)) % events.array.columns
     first = middle = None
     begin = int(np.searchsorted(events.t, begin_us - FRAME_US))
@@ -128,8 +137,8 @@ def look(events: Events, tare: Tare, begin_us: float) -> NDArray[np.int64]:
             first = middle if first is None else first
         moved = 0.0 if first is None or middle is None else middle - first
         above = above[loaded]
-        found[k] = len(above), round(float(above.sum())), round(float(above.max(initial=0.0))), round(_MOVED * moved)
-    return found
+        features[k] = len(above), round(float(above.sum())), round(float(above.max(initial=0.0))), round(_MOVED * moved)
+    return features
 
 
 def _truth(scene: Scene) -> tuple[float, float, float]:
@@ -194,7 +203,7 @@ def shipped_drops() -> Drops:
     return Drops(table[:, 0], table[:, 1], table[:, 2], pictures)
 
 
-def named(evaluation: Evaluation, scenes: Sequence[Scene]) -> dict[str, Any]:
+def estimates(evaluation: Evaluation, scenes: Sequence[Scene]) -> dict[str, Any]:
     """Estimate which ball fell first in each scene, from how high on which slant, by time since the first event.
 
     Parameters
@@ -240,8 +249,8 @@ def named(evaluation: Evaluation, scenes: Sequence[Scene]) -> dict[str, Any]:
 
 def _chance(known: Drops) -> dict[str, float]:
     """Return how often the answer that the set has most of would be right, by question."""
-    found = {}
+    shares = {}
     for name, question in QUESTIONS.items():
         right = [question.of(value) for value in getattr(known, question.column)]
-        found[name] = float(np.bincount(right).max() / len(right))
-    return found
+        shares[name] = float(np.bincount(right).max() / len(right))
+    return shares

@@ -33,7 +33,7 @@ _LISTEN_ON_S = 0.3
 class Screen(Protocol):
     """What is drawn while it runs."""
 
-    def draw(self, counters: dict[str, Any], picture: Any, said: list[Detection]) -> None:
+    def draw(self, counters: dict[str, Any], picture: Any, detections: list[Detection]) -> None:
         """Draw what came up to now."""
 
 
@@ -77,7 +77,7 @@ def play_live(
     contacts, force = truth(acts)
     shown = screen(contacts, len(force) * FRAME_US * 1e-6)
     recording = folder / "recording.mcap"
-    said: list[Detection] = []
+    detections: list[Detection] = []
     # The tare ends where the board marks its start, well before a second is over.
     with Live(0, host="127.0.0.1", readout=readout, tare=1.0, record=recording) as live:
         command = [sys.executable, "-m", "taxel", "emulate", "--json", "--port", str(live.address[1])]
@@ -89,12 +89,12 @@ def play_live(
             while ended is None or time.monotonic() < ended + _LISTEN_ON_S:
                 one = live.next(0.05)
                 if one is not None:
-                    said.append(one)
+                    detections.append(one)
                 if ended is None and board.poll() is not None:
                     ended = time.monotonic()
                 if time.monotonic() > drawn + _DRAW_EVERY_S:
                     drawn = time.monotonic()
-                    shown.draw(live.counters, live.picture, said)
+                    shown.draw(live.counters, live.picture, detections)
             printed, complaint = board.communicate()
         finally:
             if board.poll() is None:
@@ -103,16 +103,16 @@ def play_live(
         if board.returncode != 0:
             raise DeviceError(f"the board's process ended with code {board.returncode}: {complaint.strip()[-300:]}")
         while (one := live.next(0.0)) is not None:
-            said.append(one)
+            detections.append(one)
         tare = live.tare
         summary = live.stop()
     emulator = json.loads(printed)
-    found = heard(said)
+    reported = heard(detections)
     events = taxel.open(recording).events
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
-    evaluation = evaluate_events(events, acts, readout, found)
+    evaluation = evaluate_events(events, acts, readout, reported)
     again = again[again.t >= evaluation.start_us]
-    mine = evaluation.found
+    mine = evaluation.detections
     agrees = len(again) == len(mine) and bool(
         (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
     )

@@ -83,7 +83,9 @@ def show(
         evaluation = _evaluate(console, f"playing {scenes} scenes without the clock", script(seed, scenes), used, seed)
     else:
         with Drawing(console=console, refresh_per_second=10, transient=True) as drawing:
-            playing = play_live(used, folder, seed=seed, scenes=scenes, screen=lambda *given: Screen(drawing, *given))
+            playing = play_live(
+                used, folder, seed=seed, scenes=scenes, screen=lambda *arguments: Screen(drawing, *arguments)
+            )
         evaluation = playing.evaluation
         counters = {
             "counters": playing.counters,
@@ -157,12 +159,12 @@ def _print_table(console: Console, evaluation: Evaluation, quiet: Evaluation) ->
     noise_s = (quiet.stop_us - quiet.start_us) * 1e-6
     within = sum(evaluation.judged.false_within.values())
     off = f" ({within} within a press, more than 50 ms off)" if within else ""
-    console.print(f"false detections: {false} in the scenes{off}, {len(quiet.found)} in {noise_s:.0f} s of noise")
+    console.print(f"false detections: {false} in the scenes{off}, {len(quiet.detections)} in {noise_s:.0f} s of noise")
 
 
-def _print_answers(console: Console, found: dict[str, Any]) -> None:
+def _print_answers(console: Console, estimates: dict[str, Any]) -> None:
     """Print how often ball, height and slant were named rightly, by time."""
-    count = len(found["drops"])
-    for name, right in found["right"].items():
-        by_time = ", ".join(f"{k} after {ms} ms" for k, ms in zip(right, found["answered_ms"], strict=True))
-        console.print(f"{name} named rightly, of {count} drops: {by_time} (by chance {found['chance'][name]:.0%})")
+    count = len(estimates["drops"])
+    for name, right in estimates["right"].items():
+        by_time = ", ".join(f"{k} after {ms} ms" for k, ms in zip(right, estimates["answered_ms"], strict=True))
+        console.print(f"{name} named rightly, of {count} drops: {by_time} (by chance {estimates['chance'][name]:.0%})")

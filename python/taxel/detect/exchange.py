@@ -82,21 +82,21 @@ def write_nir(readout: Parts, path: str | os.PathLike[str], *, spike_ms: float |
 def lost(readout: Parts) -> list[str]:
     """Return what NIR's nodes cannot say of a readout, one line each."""
     neurons = [one.neuron for one in readout.neurons.values()]
-    said = [
+    lines = [
         "the encoder: the graph's inputs are its spike trains",
         "labels and trained delays: outputs come in the order of the labels",
     ]
     if any(neuron.refractory > 0 for neuron in neurons):
-        said.append("the refractory time: a NIR neuron may fire again at once")
+        lines.append("the refractory time: a NIR neuron may fire again at once")
     if any(neuron.theta_plus > 0 for neuron in neurons):
-        said.append("the rise of the threshold by a spike")
-    said.append(
+        lines.append("the rise of the threshold by a spike")
+    lines.append(
         f'after_spike="{readout.after_spike}": a NIR neuron falls to 0 and keeps its current; first spikes agree, later'
         " ones need not"
     )
     if readout.time == "continuous":
-        said.append("continuous time: each simulator has a step of its own, and fires as late as that")
-    return said
+        lines.append("continuous time: each simulator has a step of its own, and fires as late as that")
+    return lines
 
 
 def read_nir(
@@ -255,12 +255,12 @@ def _parts(
     trained = {}
     for k, (label, template, row) in enumerate(zip(labels, templates, weights, strict=True)):
         rest = neuron or (template.neuron if template is not None else Neuron())
-        said, factor = _kernel(cells, k, spike_s)
-        said["theta_0"] = _threshold(cells, k)
+        constants, factor = _kernel(cells, k, spike_s)
+        constants["theta_0"] = _threshold(cells, k)
         if own is not None and neuron is None:
             # The nodes' threshold holds the factor already.
-            said["theta_plus"] = rest.theta_plus * own.run_threshold
-        one = Neuron(**{**rest.get_params(), **said})
+            constants["theta_plus"] = rest.theta_plus * own.run_threshold
+        one = Neuron(**{**rest.get_params(), **constants})
         trained[label] = TrainedNeuron(one, 1000.0 * row * factor, 0.0 if template is None else template.delay_ms)
     array = None if own is None else own.array
     return Parts(encoder, trained, array, delays_ms)
@@ -272,26 +272,26 @@ def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], 
     def value(name: str) -> float:
         return float(getattr(cells, name)[k])
 
-    said: dict[str, Any]
+    constants: dict[str, Any]
     if type(cells).__name__ == "LIF":
         # Such a potential only jumps, so taxel compares it on a grid.
-        tau, said = value("tau"), {"kernel": "exponential", "tau_s": None, "time": "grid"}
+        tau, constants = value("tau"), {"kernel": "exponential", "tau_s": None, "time": "grid"}
     else:
         tau, tau_syn = value("tau_mem"), value("tau_syn")
         if not (np.isfinite(tau_syn) and 0 < tau_syn <= tau):
             raise FormatError(
                 f"neurons[{k}]: tau_syn is {tau_syn} s: taxel's kernels need 0 < tau_syn <= tau_mem = {tau}"
             )
-        said = {"kernel": "double_exponential", "tau_s": 1000.0 * tau_syn}
+        constants = {"kernel": "double_exponential", "tau_s": 1000.0 * tau_syn}
         if abs(tau_syn - tau) <= 1e-9 * tau:
-            said = {"kernel": "alpha", "tau_s": None}
+            constants = {"kernel": "alpha", "tau_s": None}
     if not (np.isfinite(tau) and tau > 0):
         raise FormatError(f"neurons[{k}]: time constant {tau} s: must be above 0")
-    said["tau"] = 1000.0 * tau
-    _, ours, gain = _gains(Neuron(**said), spike_s)
+    constants["tau"] = 1000.0 * tau
+    _, ours, gain = _gains(Neuron(**constants), spike_s)
     # `gain` holds for our own r and w_in; theirs may be shared out otherwise.
     scale = value("r") / ours["r"] * (value("w_in") / ours["w_in"] if "w_in" in ours else 1.0)
-    return said, scale / gain
+    return constants, scale / gain
 
 
 def _threshold(cells: Any, k: int) -> float:
@@ -311,10 +311,10 @@ def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
     kinds = {name: type(node).__name__ for name, node in nodes.items()}
 
     def only(kind: str) -> str:
-        named = [name for name, k in kinds.items() if k == kind]
-        if len(named) != 1:
-            raise FormatError(f"{len(named)} nodes of kind {kind}: a readout has one")
-        return named[0]
+        matches = [name for name, k in kinds.items() if k == kind]
+        if len(matches) != 1:
+            raise FormatError(f"{len(matches)} nodes of kind {kind}: a readout has one")
+        return matches[0]
 
     def alone(name: str) -> str | None:
         return into[name][0] if len(into.get(name, [])) == 1 else None

@@ -545,8 +545,8 @@ def run(
         return _run_spikes(readout, source)
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
-        said = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
-        return Detections._from_parts(said)
+        columns = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
+        return Detections._from_parts(columns)
     if not isinstance(source, Frames):
         raise ProblemError(
             f"source is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
@@ -559,14 +559,14 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     trains = trains.split_by_sign() if trains.signed else trains
     trains = trains.delayed(readout.delays_ms)
     trains = SpikeTrains(trains.times, trains.offsets, trains.start, trains.stop + SILENCE_MS)
-    found = Detections([], [], [])
+    detections = Detections([], [], [])
     for label, one in readout.neurons.items():
         spikes, slopes = one.neuron._run(one.weights, trains, readout.run_threshold)
         t, known = (
             np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - (readout.encoder.latency_ms + one.delay_ms), spikes)
         )
-        found += Detections([label] * len(spikes), t, known, slopes)
-    return found[np.argsort(found.known, kind="stable")]
+        detections += Detections([label] * len(spikes), t, known, slopes)
+    return detections[np.argsort(detections.known, kind="stable")]
 
 
 def _tare(tare: Tare | None) -> str | None:

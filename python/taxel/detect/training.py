@@ -288,15 +288,15 @@ def train(
 def encoded(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> list[Example]:
     """Return (checked) examples with the spike trains of the recipe's encoder as their sources."""
     array_of(examples)
-    found = []
+    results = []
     for k, example in enumerate(examples):
         trains = example.source
         if not isinstance(trains, SpikeTrains):
             report(f"encoding {k + 1} of {len(examples)}")
             encoder = recipe.encoder if example.tare is None else recipe.encoder.with_tare(example.tare)
             trains = encoder.encode(trains)
-        found.append(example._replace(source=trains.split_by_sign() if trains.signed else trains))
-    return found
+        results.append(example._replace(source=trains.split_by_sign() if trains.signed else trains))
+    return results
 
 
 def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | None) -> Readout:
@@ -308,21 +308,21 @@ def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | Non
 def fit(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> dict[str, ConeR]:
     """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
     learners = {}
-    for label in _wanted(examples, recipe):
+    for label in _labels_to_learn(examples, recipe):
         learners[label] = Fitting(examples, recipe, label, report).fit(recipe)
     return learners
 
 
-def _wanted(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
-    wanted = recipe._labels(examples)
-    if not wanted:
+def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
+    labels = recipe._labels(examples)
+    if not labels:
         raise ProblemError("no label in any example: there is nothing to learn")
-    for label in {label for example in examples for label in example.labels} - set(wanted):
+    for label in {label for example in examples for label in example.labels} - set(labels):
         raise ProblemError(
-            f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, wanted))}; "
+            f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, labels))}; "
             f"give it [neurons.{label}], or leave it out of the labels"
         )
-    return wanted
+    return labels
 
 
 class Fitting:
@@ -396,10 +396,10 @@ def _remarks(
     missed = cone.unreachable_
     if missed:
         places = [f"{targets[p][k] - shift_ms:.10g} ms" + f" of example {p}" * (len(targets) > 1) for p, k in missed]
-        named = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
+        listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
         yield (
             f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too few input spikes come before "
-            f"them ({named}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
+            f"them ({listed}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
             "recipe's points (taxel train --search) may reach them"
         )
     # The learner names unreachable targets, if any, first.

@@ -55,10 +55,10 @@ def labelled(y: ArrayLike, trials: int) -> tuple[NDArray[np.generic], NDArray[np
     ------
     ProblemError : another number of labels than trials, or one class
     """
-    named = words("y", y)
-    if len(named) != trials:
-        raise ProblemError(f"y has {len(named)} entries: must be {trials}, one a trial")
-    classes, row = np.unique(named, return_inverse=True)
+    labels = words("y", y)
+    if len(labels) != trials:
+        raise ProblemError(f"y has {len(labels)} entries: must be {trials}, one a trial")
+    classes, row = np.unique(labels, return_inverse=True)
     if len(classes) < 2:
         raise ProblemError(f"y names {len(classes)} class: must be two at least")
     return classes, row

@@ -44,10 +44,10 @@ def numbered(classes: NDArray[np.generic], column: NDArray[np.generic]) -> NDArr
 
 def belonging(groups: ArrayLike, trials: int) -> NDArray[np.int64]:
     """Return the number of each trial's group."""
-    named = words("groups", groups)
-    if len(named) != trials:
-        raise ProblemError(f"groups has {len(named)} entries: must be {trials}, one a trial")
-    return numbered(distinct(named), named)
+    names = words("groups", groups)
+    if len(names) != trials:
+        raise ProblemError(f"groups has {len(names)} entries: must be {trials}, one a trial")
+    return numbered(distinct(names), names)
 
 
 def one_label_a_group(row: NDArray[np.int64], groups: NDArray[np.int64]) -> bool:

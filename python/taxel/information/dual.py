@@ -71,9 +71,9 @@ def left_out(regressions: list[Regression], out: NDArray[np.int64]) -> NDArray[n
     sums = np.diag(counts) - np.stack([one.sums for one in regressions]) + np.swapaxes(left, 1, 2) @ off
     turn, offset = _discriminant(sums - counts[:, None] * share, np.broadcast_to(counts, (len(off), len(counts))))
     # Rounding knows the trial's own label, and would name trials in which nothing varies: ties are to be ties.
-    told = np.round(which[out] - off - share, _DIGITS)
+    predicted = np.round(which[out] - off - share, _DIGITS)
     with np.errstate(divide="ignore"):
-        scores = told @ turn + (offset + np.log(share))[:, None, :]
+        scores = predicted @ turn + (offset + np.log(share))[:, None, :]
     return np.asarray(np.round(scores, _DIGITS).argmax(-1))
 
 
@@ -101,16 +101,16 @@ def solved_without_ridge(
     within = square - mean @ (which.T @ square)
     within -= (within @ mean) @ which.T
     values, vectors = np.linalg.eigh((within + within.T) / 2)
-    kept = values > _CUT * max(values[-1], np.finfo(float).tiny)
-    if not kept.any():
+    varying = values > _CUT * max(values[-1], np.finfo(float).tiny)
+    if not varying.any():
         raise ProblemError("gram: nothing varies within classes")
-    vectors = vectors[:, kept]
+    vectors = vectors[:, varying]
     across = square @ (mean - 1 / trials)
     across -= mean @ (which.T @ across)
-    weights = (vectors / values[kept] ** 2) @ (vectors.T @ across) * trials
+    weights = (vectors / values[varying] ** 2) @ (vectors.T @ across) * trials
     weights -= mean @ (which.T @ weights)
     reach = square @ weights
-    return weights, -np.diag((mean + 1 / trials).T @ reach) / 2, int(kept.sum())
+    return weights, -np.diag((mean + 1 / trials).T @ reach) / 2, int(varying.sum())
 
 
 def _discriminant(

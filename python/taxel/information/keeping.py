@@ -104,5 +104,5 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
         return Verdict("keeps", margin, error)
     if margin < -reach * error:
         return Verdict("loses", margin, error)
-    wanted = (reach * error / margin) ** 2 * len(a) if margin else np.inf
-    return Verdict("open", margin, error, int(np.ceil(wanted)) if wanted < 1e6 else None)
+    needed = (reach * error / margin) ** 2 * len(a) if margin else np.inf
+    return Verdict("open", margin, error, int(np.ceil(needed)) if needed < 1e6 else None)

@@ -113,12 +113,12 @@ class LDA(Classifier):
 
     def _from_moments(self, moments: ClassMoments, shift: NDArray[np.float64] | None = None) -> Self:
         """Learn from sums over trials from which `shift` was taken off; `classes_` is the caller's to set."""
-        found = solved(moments, _ridge(self.ridge), self.priors, shift)
-        self.coef_, self.intercept_, self.rank_ = found[:3]
-        if found.rank < found.weighed:
+        solution = solved(moments, _ridge(self.ridge), self.priors, shift)
+        self.coef_, self.intercept_, self.rank_ = solution[:3]
+        if solution.rank < solution.weighed:
             warnings.warn(
-                f"LDA: features tell each other within classes, so {found.rank} of {found.weighed} directions are "
-                "weighed",
+                f"LDA: features tell each other within classes, so {solution.rank} of {solution.weighed} directions "
+                "are weighed",
                 UserWarning,
                 stacklevel=3,
             )
@@ -149,10 +149,10 @@ class LDA(Classifier):
         table = feature_table(x)
         if table.shape[1] != weights.shape[1]:
             raise ProblemError(f"x has {table.shape[1]} features: it was fitted to {weights.shape[1]}")
-        found = np.empty((len(table), len(weights)))
+        scores = np.empty((len(table), len(weights)))
         for block, mine in blocks(table, None, np.float64, None):
-            found[mine] = block @ weights.T + self.intercept_
-        return found
+            scores[mine] = block @ weights.T + self.intercept_
+        return scores
 
     def predict(self, x: ArrayLike) -> NDArray[Any]:
         """Return the class of the largest discriminant, trial by trial.

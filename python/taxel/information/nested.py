@@ -101,7 +101,7 @@ def nested_predictions(
         ways: _Ways = _Neighbours(squares, row, len(classes), nearest)
     else:
         ways = _Discriminants(squares, sizes, row, len(classes), levels)
-    said, chosen, missing = np.empty(trials, np.int64), {}, []
+    predicted, chosen, missing = np.empty(trials, np.int64), {}, []
     for name in range(int(fold.max()) + 1):
         test, train = np.flatnonzero(fold == name), np.flatnonzero(fold != name)
         absent = np.setdiff1d(np.arange(len(classes)), row[train])
@@ -110,11 +110,11 @@ def nested_predictions(
         if ways.count > 1:
             for part in _inside(row[train], None if belongs is None else belongs[train], inner, seed):
                 held = train[part]
-                right += (ways.named(test, held)[:, len(test) :] == row[held]).sum(1)
+                right += (ways.predict(test, held)[:, len(test) :] == row[held]).sum(1)
         best = int(right.argmax())
-        said[test] = ways.named(test, np.empty(0, np.int64), best)[0]
+        predicted[test] = ways.predict(test, np.empty(0, np.int64), best)[0]
         chosen[name] = ways.way(best)
-    return Nested(classes[said], fold, chosen, tuple(missing))
+    return Nested(classes[predicted], fold, chosen, tuple(missing))
 
 
 def training_curve(
@@ -148,7 +148,7 @@ def training_curve(
     """
     squares, features = _matrices(grams, features)
     classes, row = labelled(y, len(squares[0]))
-    random, found = np.random.default_rng(whole("seed", seed, 0)), []
+    random, curve = np.random.default_rng(whole("seed", seed, 0)), []
     used = sorted(set(instance("nested", nested, Nested).chosen.values()))
     if len(nested.folds) != len(row) or any(matrix >= len(squares) for matrix, _ in used):
         raise ProblemError("nested is of other trials or matrices")
@@ -157,14 +157,14 @@ def training_curve(
         for matrix, ridge in used
     }
     for size in several("sizes", sizes):
-        said = np.empty(len(row), np.int64)
+        predicted = np.empty(len(row), np.int64)
         for name, way in nested.chosen.items():
             test, train = np.flatnonzero(nested.folds == name), np.flatnonzero(nested.folds != name)
             mixed = random.permutation(train)
-            kept = np.concatenate([mixed[row[mixed] == k][: whole("sizes", size, 1)] for k in range(len(classes))])
-            said[test] = ways[way].named(test, np.setdiff1d(train, kept))[0, : len(test)]
-        found.append(classes[said])
-    return found
+            sample = np.concatenate([mixed[row[mixed] == k][: whole("sizes", size, 1)] for k in range(len(classes))])
+            predicted[test] = ways[way].predict(test, np.setdiff1d(train, sample))[0, : len(test)]
+        curve.append(classes[predicted])
+    return curve
 
 
 def _matrices(grams: object, features: object) -> tuple[list[NDArray[np.float64]], list[int]]:
@@ -195,7 +195,7 @@ class _Ways:
 
     count: int
 
-    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
         """Return by way what `test` and `held` are named when both are left out; shape (ways, trials)."""
         raise NotImplementedError
 
@@ -227,7 +227,7 @@ class _Discriminants(_Ways):
     def way(self, number: int) -> tuple[int, float]:
         return number // len(self.ridges), float(self.ridges[number % len(self.ridges)])
 
-    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
         ways = self.regressions if only is None else [self.regressions[only]]
         return left_out(ways, np.concatenate([test, held]))
 
@@ -243,14 +243,14 @@ class _Neighbours(_Ways):
     def way(self, number: int) -> tuple[int, float]:
         return number // len(self.nearest), float(self.nearest[number % len(self.nearest)])
 
-    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
         out = np.concatenate([test, held])
-        kept = np.ones(len(self.row), bool)
-        kept[out] = False
+        training = np.ones(len(self.row), bool)
+        training[out] = False
         ways = range(self.count) if only is None else [only]
-        found = np.empty((len(ways), len(out)), np.int64)
+        predicted = np.empty((len(ways), len(out)), np.int64)
         for k, number in enumerate(ways):
             order = self.order[number // len(self.nearest)][out]
-            near = order[kept[order]].reshape(len(out), -1)[:, : self.nearest[number % len(self.nearest)]]
-            found[k] = majority(self.row[near], self.classes)
-        return found
+            near = order[training[order]].reshape(len(out), -1)[:, : self.nearest[number % len(self.nearest)]]
+            predicted[k] = majority(self.row[near], self.classes)
+        return predicted

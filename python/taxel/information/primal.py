@@ -224,8 +224,8 @@ def _where_classes_vary(
     """
     where = np.flatnonzero(weighed)
     square = np.asfortranarray(square[np.ix_(where, where)])
-    found = _by_pivots(square, right[where])
-    values, rank = _by_eigenvectors(square, right[where]) if found is None else found
+    solution = _by_pivots(square, right[where])
+    values, rank = _by_eigenvectors(square, right[where]) if solution is None else solution
     solved = np.zeros_like(right)
     solved[where] = values
     return solved, rank
@@ -244,19 +244,19 @@ def _by_pivots(square: NDArray[np.float64], right: NDArray[np.float64]) -> tuple
         return None
     order = pivots - 1
     upper = np.asfortranarray(factor[:rank, :rank])
-    told = -blas.dtrsm(1.0, upper, np.asfortranarray(factor[rank:, :rank].T), lower=1, trans_a=1)
-    gram, fault = lapack.dpotrf(np.eye(told.shape[1]) + told.T @ told, lower=1)
+    dependence = -blas.dtrsm(1.0, upper, np.asfortranarray(factor[rank:, :rank].T), lower=1, trans_a=1)
+    gram, fault = lapack.dpotrf(np.eye(dependence.shape[1]) + dependence.T @ dependence, lower=1)
     if fault != 0:
         return None
 
-    def without_told(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        along = lapack.dpotrs(gram, told.T @ values[:rank] + values[rank:], lower=1)[0]
-        return np.concatenate((values[:rank] - told @ along, values[rank:] - along))
+    def without_dependence(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        along = lapack.dpotrs(gram, dependence.T @ values[:rank] + values[rank:], lower=1)[0]
+        return np.concatenate((values[:rank] - dependence @ along, values[rank:] - along))
 
     basic = np.zeros_like(right)
-    basic[:rank] = lapack.dpotrs(upper, without_told(right[order])[:rank], lower=1)[0]
+    basic[:rank] = lapack.dpotrs(upper, without_dependence(right[order])[:rank], lower=1)[0]
     solved = np.empty_like(right)
-    solved[order] = without_told(basic)
+    solved[order] = without_dependence(basic)
     return solved, int(rank)
 
 
@@ -265,9 +265,9 @@ def _by_eigenvectors(square: NDArray[np.float64], right: NDArray[np.float64]) ->
     from scipy.linalg import eigh  # noqa: PLC0415  loads slowly
 
     values, vectors = eigh(square, lower=True)
-    kept = values > _SINGULAR * values[-1]
-    vectors = vectors[:, kept]
-    return vectors @ ((vectors.T @ right) / values[kept, None]), int(kept.sum())
+    varying = values > _SINGULAR * values[-1]
+    vectors = vectors[:, varying]
+    return vectors @ ((vectors.T @ right) / values[varying, None]), int(varying.sum())
 
 
 def is_exact(table: NDArray[Any]) -> bool:

@@ -119,23 +119,23 @@ class Question:
         window = self.window_us
         if periods_ms is None:
             least = max(self.finest, window / 500)
-            found = [p for p in _series(least, window / 5) if p >= least]
-            self.periods = checked_periods([*([self.finest] if self.finest >= least else []), *found], self.finest)
+            coarser = [p for p in _series(least, window / 5) if p >= least]
+            self.periods = checked_periods([*([self.finest] if self.finest >= least else []), *coarser], self.finest)
             self.periods = self.periods[:7]
         else:
-            given = [to_us(number("periods_ms", p)) for p in several("periods_ms", periods_ms)]
-            if any(not 0 < p <= window or abs(p - round(p)) > 1e-6 for p in given):
+            chosen = [to_us(number("periods_ms", p)) for p in several("periods_ms", periods_ms)]
+            if any(not 0 < p <= window or abs(p - round(p)) > 1e-6 for p in chosen):
                 raise ProblemError(f"periods_ms is {shown(periods_ms)}: must be whole us, up to {to_ms(window):g} ms")
-            self.periods = checked_periods([round(p) for p in given], self.finest)
+            self.periods = checked_periods([round(p) for p in chosen], self.finest)
         if windows_ms is None:
             self.windows = [*[float(w) for w in _series(max(window / 40, self.finest), window * 0.99)], window]
         else:
-            wanted = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
-            if any(not self.finest <= w <= window for w in wanted):
+            chosen_windows = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
+            if any(not self.finest <= w <= window for w in chosen_windows):
                 raise ProblemError(
                     f"windows_ms is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
                 )
-            self.windows = sorted({*wanted, window})
+            self.windows = sorted({*chosen_windows, window})
         self.taxels_at = self.periods[0]
         if taxels_at_ms is not None:
             at = to_us(number("taxels_at_ms", taxels_at_ms))
@@ -154,7 +154,7 @@ class Question:
         if pools is not None and any(n > max(rows, columns) for n in sides):
             raise ProblemError(f"pools is {shown(pools)}: the array is {rows} x {columns}")
         self.pools = [n for n in sides if n <= max(rows, columns)]
-        self.columns = self._asked_like_labels()
+        self.columns = self._parameter_columns()
         settings = len(self.random_taxels) + len(self.pools)
         self.steps = self.draws * (len(self.periods) * (2 + len(self.columns)) + settings) + shuffles + classifiers + 8
 
@@ -198,11 +198,11 @@ class Question:
         taus = [tau for tau in taus if tau == 0 or to_us(tau) > spikes.period_us / 2]
         return [list(one) for one in zip(*(event_grams(spikes, windows, tau) for tau in taus), strict=True)]
 
-    def _asked_like_labels(self) -> dict[str, NDArray[np.generic]]:
+    def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
         """Return the columns that can be asked for like labels; the others are named in the notes."""
         from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
 
-        found = {}
+        columns = {}
         for name in self.trials[0].parameters:
             column = np.array([one.parameters.get(name, "") for one in self.trials])
             if (column == self.labels).all():
@@ -216,8 +216,8 @@ class Question:
             except ProblemError as error:
                 self.notes.append(f"parameter {name} is left out: {error}")
                 continue
-            found[name] = column
-        return found
+            columns[name] = column
+        return columns
 
 
 def floor_of(trials: Sequence[LabelledTrial]) -> float:
@@ -236,5 +236,5 @@ def floor_of(trials: Sequence[LabelledTrial]) -> float:
 
 def _series(least: float, most: float) -> list[int]:
     """Return whole us in steps of 1, 2, 5 within limits."""
-    found = [step * 10**power for power in range(10) for step in _STEPS]
-    return [one for one in found if least <= one <= most]
+    steps = [step * 10**power for power in range(10) for step in _STEPS]
+    return [one for one in steps if least <= one <= most]

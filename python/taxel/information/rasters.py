@@ -70,8 +70,8 @@ def frame_grams(values: NDArray[np.float32], spikes: Spikes, windows_us: Sequenc
 
 def features(spikes: Spikes, window_us: float) -> int:
     """Return how many pairs of taxel and bin hold an event in any trial, one at least."""
-    kept = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
-    return max(1, len(np.unique(spikes.taxel[kept] * (int(spikes.bin.max(initial=0)) + 1) + spikes.bin[kept])))
+    inside = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
+    return max(1, len(np.unique(spikes.taxel[inside] * (int(spikes.bin.max(initial=0)) + 1) + spikes.bin[inside])))
 
 
 class _Sums:

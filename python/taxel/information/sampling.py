@@ -106,15 +106,15 @@ class Spikes:
 
     def counts(self, window_us: float) -> NDArray[np.int64]:
         """Return each trial's events within a window after the contact."""
-        kept = self.bin < self.bins_to(window_us)[self.trial]
-        return np.bincount(self.trial[kept], minlength=self.trials)
+        inside = self.bin < self.bins_to(window_us)[self.trial]
+        return np.bincount(self.trial[inside], minlength=self.trials)
 
     def of(self, taxels: NDArray[np.int64]) -> Spikes:
         """Return the events of some taxels alone, aligned on the first of theirs."""
         place = np.full(self.taxels, -1)
         place[taxels] = np.arange(len(taxels))
-        kept = np.flatnonzero(place[self.taxel] >= 0)
-        trial, bins = self.trial[kept], self.bin[kept]
+        chosen = np.flatnonzero(place[self.taxel] >= 0)
+        trial, bins = self.trial[chosen], self.bin[chosen]
         begin = np.full(self.trials, np.iinfo(np.int64).max)
         np.minimum.at(begin, trial, bins)
         silent = begin == np.iinfo(np.int64).max
@@ -123,9 +123,9 @@ class Spikes:
             self.period_us,
             len(taxels),
             trial,
-            place[self.taxel[kept]],
+            place[self.taxel[chosen]],
             bins - begin[trial],
-            self.value[kept],
+            self.value[chosen],
             first,
             self.length_us,
         )
@@ -145,7 +145,7 @@ def contacts(
 
     It is looked for until the trial's end, or for the length of a window; in events at their own times.
     """
-    found = np.full(len(trials), np.nan)
+    onsets = np.full(len(trials), np.nan)
     for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
         stop = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
         t, step = trial.source.t, max(period_us, STEP_US)
@@ -155,8 +155,8 @@ def contacts(
             grid = np.arange(trial.start_us - step, int(stop), step)
         bins, _, _ = _encoded(encoder, values, grid, step)
         if len(bins):
-            found[k] = grid[bins.min()]
-    return found
+            onsets[k] = grid[bins.min()]
+    return onsets
 
 
 def spikes_of(
@@ -246,13 +246,13 @@ def pictures_of(
     float32, shape (bins, trials, taxels that ever send an event)
     """
     active = np.unique(spikes.taxel)
-    found = np.zeros((bins, len(trials), len(active)), np.float32)
+    changes = np.zeros((bins, len(trials), len(active)), np.float32)
     for k, values in enumerate(held):
         if np.isfinite(spikes.first_us[k]):
             zero = int(contact_us[k] + spikes.first_us[k])
-            seen = values.at(zero + spikes.period_us * np.arange(-1, bins))[:, active]
-            found[:, k] = seen[1:] - seen[0]
-    return found
+            pictures = values.at(zero + spikes.period_us * np.arange(-1, bins))[:, active]
+            changes[:, k] = pictures[1:] - pictures[0]
+    return changes
 
 
 def _encoded(
@@ -296,11 +296,11 @@ def _pooling(held: HeldValues, pool: int) -> tuple[NDArray[np.int64], int, NDArr
 
 def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:
     """Return the periods, ascending; refuse one that is finer than the recording."""
-    found = sorted(set(periods_us))
-    if not found:
+    periods = sorted(set(periods_us))
+    if not periods:
         raise ProblemError("periods is []: must name one at least")
-    if found[0] < finest:
+    if periods[0] < finest:
         raise ProblemError(
-            f"period {to_ms(found[0]):g} ms is finer than the recordings, which show {to_ms(finest):g} ms at best"
+            f"period {to_ms(periods[0]):g} ms is finer than the recordings, which show {to_ms(finest):g} ms at best"
         )
-    return found
+    return periods

@@ -141,24 +141,26 @@ def after(step: str, of: Contents, lines: Callable[[], Iterable[str]] | None = N
         A value (or `once`) for each field that the table calls changed, and for no other.
     """
     fates = FATES[step]
-    wanted = {name for name, fate in fates.items() if fate == CHANGED} - {"lost"}
-    if changed.keys() != wanted:
-        raise TypeError(f"{step}: changes {sorted(changed)}; the table of fates says {sorted(wanted)}")
+    expected = {name for name, fate in fates.items() if fate == CHANGED} - {"lost"}
+    if changed.keys() != expected:
+        raise TypeError(f"{step}: changes {sorted(changed)}; the table of fates says {sorted(expected)}")
     gone = [name for name, fate in fates.items() if fate == LOST]
     changed |= {name: _DEFAULTS[name]() for name in gone}
     if fates["lost"] == CHANGED:
-        changed["lost"] = once(lambda: _together(of.lost, _said(step, of, gone), () if lines is None else lines()))
+        changed["lost"] = once(
+            lambda: _together(of.lost, _lost_lines(step, of, gone), () if lines is None else lines())
+        )
     return of.but(**changed)
 
 
-def _said(step: str, of: Contents, gone: Iterable[str]) -> list[str]:
-    said = []
+def _lost_lines(step: str, of: Contents, gone: Iterable[str]) -> list[str]:
+    lines = []
     for name in gone:
         line = LINES[name]
         if line is not None and of.holds(name):
             lost = line(of, step)
-            said += [lost] if isinstance(lost, str) else lost
-    return said
+            lines += [lost] if isinstance(lost, str) else lost
+    return lines
 
 
 def _together(*every: Iterable[str]) -> tuple[str, ...]:

@@ -109,7 +109,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
     fields["held"] = _beside_held(parts, array, lefts) if beside else _held(parts, tables, shifts, lost)
     verdicts = [verdict_of(part) for part in parts]
     alike = len(set(verdicts)) == 1
-    said = verdicts[0] if alike else "; ".join(f"{p.name}: {v}" for p, v in zip(parts, verdicts, strict=True))
+    verdict = verdicts[0] if alike else "; ".join(f"{p.name}: {v}" for p, v in zip(parts, verdicts, strict=True))
     together = after(
         "merge",
         parts[0].but(lost=tuple(dict.fromkeys(line for part in parts for line in part.lost))),
@@ -124,7 +124,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         frames=frames,
         notes=_notes(parts, tables, shifts),
         detections=_detections(parts, shifts),
-        verdict=None if all(part.verdict is None for part in parts) else said,
+        verdict=None if all(part.verdict is None for part in parts) else verdict,
         truncated=any(part.truncated for part in parts),
         **fields,
     )
@@ -200,12 +200,12 @@ def _notes(parts: Sequence[Contents], tables: Sequence[Events | Frames], shifts:
 
 def _detections(parts: Sequence[Contents], shifts: Sequence[int]) -> Detections:
     """Return all detections by the time at which they were known."""
-    found: list[Any] = []
+    rows: list[Any] = []
     for part, shift in zip(parts, shifts, strict=True):
         d = part.detections
-        found += list(zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True))
-    found.sort(key=lambda row: int(row[2]))
-    label, t, known, slope, repaired = ([row[k] for row in found] for k in range(5))
+        rows += list(zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True))
+    rows.sort(key=lambda row: int(row[2]))
+    label, t, known, slope, repaired = ([row[k] for row in rows] for k in range(5))
     return Detections._of(label, t, known, slope, repaired=repaired)
 
 

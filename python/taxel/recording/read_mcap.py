@@ -114,8 +114,8 @@ class _Source:
 
     def driven(self) -> Array:
         """Return the array that the registers drive."""
-        said = self.header.get("driven")
-        return self.array if said is None else array_of(said)
+        geometry = self.header.get("driven")
+        return self.array if geometry is None else array_of(geometry)
 
     def registers(self) -> Registers | None:
         """Return the registers at the beginning, or the first that were set."""
@@ -143,14 +143,14 @@ class _Source:
 
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
         """Return what came and was lost of a board, by cause."""
-        said = self.ending.get("finished", {}).get("counts") or self.remarks()["counts"] or {}
+        counts = self.ending.get("finished", {}).get("counts") or self.remarks()["counts"] or {}
         _, decoder, _, _, number, *_ = decoded
         missing = int(number[-1]) - int(number[0]) + 1 - len(number) if len(number) else 0
         return {
             "datagrams": self.remarks()["datagrams"],
             "bytes": self.remarks()["datagram_bytes"],
             "missing_numbers": max(0, missing),
-            **{name: said.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
+            **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
             "decoder": json.loads(decoder),
             **self.rebuilt(),
         }
@@ -158,9 +158,9 @@ class _Source:
     def counts_of_stream(self, read: tuple[Any, ...]) -> dict[str, Any]:
         """Return what came and was lost of a stream, by cause."""
         _, _, t, _, bad, resets = read
-        said = self.ending.get("finished", {}).get("counts") or {}
-        seen = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
-        return {**seen, "received": said.get("received"), **self.rebuilt()}
+        counts = self.ending.get("finished", {}).get("counts") or {}
+        damage = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
+        return {**damage, "received": counts.get("received"), **self.rebuilt()}
 
     def verdict(self) -> str:
         """Return in one line what was lost where."""
@@ -175,8 +175,8 @@ class _Source:
         if rebuilt["torn_bytes"]:
             bad.append(f"{rebuilt['torn_bytes']} torn bytes at the end")
         if "finished" in self.ending:
-            said = str(self.ending["finished"]["verdict"])
-            return f"LOST in the file: {', '.join(bad)}; while recording: {said}" if bad else said
+            recorded = str(self.ending["finished"]["verdict"])
+            return f"LOST in the file: {', '.join(bad)}; while recording: {recorded}" if bad else recorded
         why = "not finished: what came last is missing"
         if "stopped" in self.ending:
             why = f"stopped by an error ({self.ending['stopped']}): what came last is missing"

@@ -280,8 +280,8 @@ class Scene:
 
     def __repr__(self) -> str:
         bodies = self.parameters.get("bodies", [])
-        said = [f"{_only(body, 'shape')} {_only(body, 'motion')}" for body in bodies]
-        return f"Scene({', '.join(said)})"
+        kinds = [f"{_only(body, 'shape')} {_only(body, 'motion')}" for body in bodies]
+        return f"Scene({', '.join(kinds)})"
 
 
 #: What a body may be given beside what it has.
@@ -290,8 +290,8 @@ _BODY = ("mass_g", "material", "stiffness_n_mm", "friction", "rolling_friction",
 
 def _only(body: object, part: str) -> str:
     """Return the one name in a part of a body."""
-    named = body.get(part) if isinstance(body, Mapping) else None
-    return "/".join(map(str, named)) if isinstance(named, Mapping) else "?"
+    kinds = body.get(part) if isinstance(body, Mapping) else None
+    return "/".join(map(str, kinds)) if isinstance(kinds, Mapping) else "?"
 
 
 def _replaced(

@@ -16,7 +16,7 @@ from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit
 from taxel.wire import Registers
-from taxel.wire.given import given_bytes
+from taxel.wire.buffer import buffer_bytes
 
 __all__ = ["NOT_RETURNED", "Board", "Version2", "fitting", "reading"]
 
@@ -220,7 +220,7 @@ class Board:
         >>> len(Board().command(bytes.fromhex("e000000000"))) > 0
         True
         """
-        return self._core.command(given_bytes(data))
+        return self._core.command(buffer_bytes(data))
 
     def record(self, start: bool) -> None:
         """Start or stop a recording: a marker goes out where that changes anything.

@@ -15,7 +15,7 @@ from taxel import _core
 from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, column, floats, nth, number, several, shown, window
 from taxel._base.arguments import path as checked_path
-from taxel._base.columns import Columns, frozen, kept
+from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
 from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
@@ -67,9 +67,9 @@ class SpikeTrains(Columns):
         stop: float,
         values: ArrayLike | None = None,
     ) -> None:
-        self.times: NDArray[np.float64] = kept("times", times, np.float64, "ms")
-        self.offsets: NDArray[np.int64] = kept("offsets", offsets, np.int64)
-        self.values: NDArray[np.float32] | None = None if values is None else kept("values", values, np.float32)
+        self.times: NDArray[np.float64] = own_column("times", times, np.float64, "ms")
+        self.offsets: NDArray[np.int64] = own_column("offsets", offsets, np.int64)
+        self.values: NDArray[np.float32] | None = None if values is None else own_column("values", values, np.float32)
         _finite_values(self.values)
         self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())

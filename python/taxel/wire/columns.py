@@ -92,7 +92,7 @@ class Columns:
         return columns
 
     @classmethod
-    def _asked_for(cls, columns: Columns | None, rows: int) -> tuple[Columns, bool]:
+    def _or_fresh(cls, columns: Columns | None, rows: int) -> tuple[Columns, bool]:
         """Return the caller's columns, or fresh ones for so many rows; and whether they are fresh."""
         return (cls._fresh(rows), True) if columns is None else (instance("columns", columns, cls), False)
 
@@ -109,7 +109,7 @@ class Columns:
         t, x, y, p = self.t[:rows], self.x[:rows], self.y[:rows], self.p[:rows]
         return Events._unchecked(t, x, y, p, array, ticks, present, repaired, tuple(markers))
 
-    def _given(
+    def _owning(
         self,
         array: Array,
         rows: int,

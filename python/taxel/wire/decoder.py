@@ -13,9 +13,9 @@ from taxel._base.arguments import column, flag, instance, text, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
+from taxel.wire.buffer import buffer_bytes
 from taxel.wire.columns import Columns
 from taxel.wire.counts import Counts, Received, Status
-from taxel.wire.given import given_bytes
 
 __all__ = ["Decoder", "decode"]
 
@@ -77,8 +77,8 @@ def decode(
     Events(4096 events, 0 to 0 us, 64 x 64 taxels, 4096 intensities)
     """
     decoder = Decoder(version, array=array, pairing=pairing, differences=differences)
-    stream = given_bytes(data)
-    room, own = Columns._asked_for(columns, _core.wire_rows(decoder.version, len(stream)))
+    stream = buffer_bytes(data)
+    room, own = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
     if decoder.version == 2:
         if lengths is not None:
             raise ProblemError("lengths: each datagram of version 2 has its own before it; leave them out")
@@ -87,7 +87,7 @@ def decode(
         filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())
     else:
         filled = decoder._core.fill(stream, None, room._parts(), pairing == "direct")
-    events = (room._given if own else room._first)(decoder.array, *filled)
+    events = (room._owning if own else room._first)(decoder.array, *filled)
     if pairing == "taxel":
         markers, events = events.markers, decoder.finish()
         events.markers = markers
@@ -187,9 +187,9 @@ class Decoder:
         >>> Decoder().push(bytes.fromhex("c000050304 e000280304"))
         Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
         """
-        stream = given_bytes(data)
+        stream = buffer_bytes(data)
         columns = Columns._fresh(_core.wire_rows(self.version, len(stream)))
-        return columns._given(self.array, *self._fill(columns, stream, arrived))
+        return columns._owning(self.array, *self._fill(columns, stream, arrived))
 
     def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
         """Decode into memory that is used again; return the events as views of it.
@@ -219,7 +219,7 @@ class Decoder:
         array([40], dtype=uint16)
         """
         room = instance("columns", columns, Columns)
-        return room._first(self.array, *self._fill(room, given_bytes(data), arrived))
+        return room._first(self.array, *self._fill(room, buffer_bytes(data), arrived))
 
     def _fill(
         self, columns: Columns, data: NDArray[np.uint8], arrived: int | None

@@ -73,8 +73,8 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
             )
         place = Path(__file__).parent / f"{recipe}.toml"
     try:
-        said = place.read_text(encoding="utf-8-sig")
-        values = json.loads(said) if place.suffix.lower() == ".json" else tomllib.loads(said)
+        content = place.read_text(encoding="utf-8-sig")
+        values = json.loads(content) if place.suffix.lower() == ".json" else tomllib.loads(content)
     except (UnicodeDecodeError, json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
         kind = "JSON" if place.suffix.lower() == ".json" else "TOML"
         raise FormatError(f"{place}: not {kind}: {error}") from None
