@@ -12,6 +12,7 @@ from taxel import _core
 from taxel._base.arguments import column, fields, instance, nth, rows, shown, window
 from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -442,12 +443,12 @@ class Events(Columns):
 
     def __repr__(self) -> str:
         time = f"{int(self.t.min())} to {int(self.t.max())} us" if len(self) else "no time"
-        intensities = "no intensities" if self.present is None else f"{int(self.present.sum())} intensities"
+        count = None if self.present is None else int(self.present.sum())
+        intensities = "no intensities" if count is None else counted(count, "intensity", "intensities")
         marks = "" if self.repaired is None else f", {int(self.repaired.sum())} repaired"
-        marks += f", {len(self.markers)} markers" if self.markers else ""
-        return (
-            f"Events({len(self)} events, {time}, {self.array.rows} x {self.array.columns} taxels, {intensities}{marks})"
-        )
+        marks += f", {counted(len(self.markers), 'marker')}" if self.markers else ""
+        size = f"{self.array.rows} x {self.array.columns} taxels"
+        return f"Events({counted(len(self), 'event')}, {time}, {size}, {intensities}{marks})"
 
 
 def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...]:

@@ -17,6 +17,7 @@ from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown
 from taxel._base.files import whole_file
 from taxel._base.header_table import HeaderTable, text_of
+from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
@@ -168,7 +169,8 @@ class Labels:
         return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
 
     def __repr__(self) -> str:
-        return f"Labels({len(self.rows)} events of {', '.join(self.recordings) or 'one recording'}, {self.path})"
+        recordings = ", ".join(self.recordings) or "one recording"
+        return f"Labels({counted(len(self.rows), 'event')} of {recordings}, {self.path})"
 
 
 def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> int:

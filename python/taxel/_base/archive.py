@@ -12,8 +12,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import first_line
 from taxel._base.limits import DESCRIPTION, UNPACKED, unpacked
+from taxel._base.messages import first_line
 from taxel._core import FormatError
 
 __all__ = ["read_arrays", "stored_names"]

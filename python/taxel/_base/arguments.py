@@ -21,7 +21,6 @@ __all__ = [
     "column",
     "fields",
     "finite",
-    "first_line",
     "flag",
     "floats",
     "instance",
@@ -60,12 +59,6 @@ def shown(value: object) -> str:
         return f"a {type(value).__name__} that cannot be shown"
     words = words.encode("ascii", "backslashreplace").decode() if _lone_surrogate(words) else words
     return words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."
-
-
-def first_line(error: BaseException) -> str:
-    """Return the first line of another library's error, at most 200 characters; its kind where it has no text."""
-    line = str(error).split("\n", maxsplit=1)[0] or type(error).__name__
-    return line if len(line) <= 200 else f"{line[:197]}..."
 
 
 def _beginning(value: object, depth: int = 3) -> object:

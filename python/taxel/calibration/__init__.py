@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import first_line, flag, instance, mapping, number, numbers, several, shown, whole
+from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown, whole
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
+from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration._curves import N_PER_KPA_MM2, Curve, Law, Power, Table, Values, above_0, curve_of
@@ -29,14 +30,14 @@ __all__ = ["Calibration", "Load"]
 
 #: What a calibration may be in: force on a taxel, or pressure at it.
 UNITS = ("N", "kPa")
-#: Between which an exponent is sought: conductance of a fabric and counts of common sheets lie well within.
+#: Range in which an exponent is searched: conductance of a fabric and counts of common sheets lie well within.
 _EXPONENTS = (0.2, 5.0)
-#: Loads missed by less than this share are met, whichever exponent does it better.
+#: Exponents that miss the loads by less than this share (root mean square) count as equally good.
 _ALIKE = 1e-3
 
 
 class Load(NamedTuple):
-    """A known load, and what the sensor read while it lay there.
+    """A known load, and the sensor's readings under it.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ class Calibration:
 
     @classmethod
     def _made(cls, array: Array, curve: Curve, unit: str, of: str, how: Mapping[str, Any]) -> Calibration:
-        """Build one of its parts, checked."""
+        """Build a calibration from its parts, and check them."""
         made = cls.__new__(cls)
         made.array, made._curve = instance("array", array, Array), curve
         made.unit, made.of = checked_text("unit", unit, UNITS), checked_text("of", of)
@@ -157,7 +158,7 @@ class Calibration:
         date: str | None = None,
         note: str = "",
     ) -> Calibration:
-        """Take the law of the fabric, its amplifier and its ramp: ticks to N or kPa.
+        """Use the law of the fabric, its amplifier and its ramp: ticks to N or kPa.
 
         Parameters
         ----------
@@ -211,7 +212,7 @@ class Calibration:
         date: str | None = None,
         note: str = "",
     ) -> Calibration:
-        """Take known points, straight lines between them: of one taxel for all, or of each.
+        """Interpolate linearly between known points: of one taxel for all, or of each.
 
         Parameters
         ----------
@@ -535,7 +536,7 @@ class Calibration:
             "table": f"table of {len(values.get('values', ()))}",
         }
         parts = [curve.get(kind, "law of the fabric")]
-        parts += [f"fit to {count} load{'s' * (count > 1)}"] * bool(count)
+        parts += [f"fit to {counted(count, 'load')}"] * bool(count)
         parts += [] if self.residual is None else [f"residual {100 * self.residual:.1f} %"]
         return ", ".join([f"{self.of} to {self.unit}", *parts, self.date])
 
@@ -552,7 +553,7 @@ class Calibration:
 
 
 class _Laid(NamedTuple):
-    """A load as equations: which taxels, weighed how, make how much; mean readings above the floor."""
+    """The equations of a load: its taxels, their weights and the value; from mean readings above the floor."""
 
     load: float
     weight: float
@@ -595,18 +596,18 @@ class _Laid(NamedTuple):
         return cls(value, weight, readings, rest, loaded, alone)
 
     def by_taxel(self, calibration: Calibration, curve: Curve | None = None) -> Values:
-        """Return what each chosen taxel makes, in the load's own unit; 0 elsewhere."""
+        """Return the value of each chosen taxel, in the load's own unit; 0 elsewhere."""
         curve = calibration._curve if curve is None else curve
         values = self.weight * calibration.gain * curve.values(self.readings, self.rest)
         return np.where(self.chosen, values, 0.0)
 
     def made(self, calibration: Calibration, curve: Curve | None = None) -> float:
-        """Return what all chosen taxels make: their sum of a force, their mean of a pressure."""
+        """Return the value of all chosen taxels: the sum of forces, the mean of pressures."""
         every = self.by_taxel(calibration, curve)[self.chosen]
         return float(every.mean() if self.alone else every.sum())
 
     def errors(self, calibration: Calibration) -> Values:
-        """Return by which share of the load each equation is missed."""
+        """Return the error of each equation, as a share of the load."""
         if self.alone:
             return np.asarray(self.by_taxel(calibration)[self.chosen] / self.load - 1.0)
         return np.array([self.made(calibration) / self.load - 1.0])
@@ -620,7 +621,7 @@ def _least(made: Sequence[float], loads: Sequence[float]) -> tuple[float, float]
 
 
 def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]) -> float:
-    """Return the exponent whose best gain misses the loads by least."""
+    """Return the exponent whose best gain has the least squares of relative error."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415  loads slowly
 
     loads = [one.load for one in laid]
@@ -629,7 +630,7 @@ def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]
         bent = curve.bent(math.exp(log))
         return _least([one.made(calibration, bent) for one in laid], loads)[1]
 
-    # From a grid first: the squares need not have a single valley.
+    # A grid comes first, as the squares may have several minima.
     grid = np.linspace(math.log(_EXPONENTS[0]), math.log(_EXPONENTS[1]), 33)
     miss = np.array([np.inf, *map(missed, grid), np.inf])
     valleys = np.flatnonzero((miss[1:-1] <= miss[:-2]) & (miss[1:-1] < miss[2:]))
@@ -662,7 +663,7 @@ def _gains(calibration: Calibration, laid: Sequence[_Laid], each: bool) -> tuple
 
 
 def _32_bits(values: Values) -> NDArray[np.float32]:
-    """Return values as pictures hold them; what does not fit is the largest that does."""
+    """Return values as float32, as pictures hold them; larger ones become the largest float32."""
     return np.minimum(values, np.finfo(np.float32).max).astype(np.float32)
 
 

@@ -34,7 +34,7 @@ class Curve(Protocol):
         ...
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what a file holds of it."""
+        """Return the curve as plain values, as files hold it."""
         ...
 
     def bent(self, exponent: float) -> Curve:
@@ -43,7 +43,7 @@ class Curve(Protocol):
 
 
 class Power:
-    """The reading above rest to a power; of a gain, the value where it is 1."""
+    """A power of the reading above rest; the gain is the value where that reading is 1."""
 
     def __init__(self, exponent: object) -> None:
         self.exponent = above_0("exponent", exponent)
@@ -62,7 +62,7 @@ class Power:
 
 
 class Table:
-    """Straight lines through known points, of one taxel for all or of each; beyond the last point what stands there."""
+    """Straight lines through known points, of one taxel for all or of each; the last value holds beyond its point."""
 
     def __init__(self, readings: Any, values: Any) -> None:
         self.x, self.y = numbers("readings", readings, np.float64), floats("values", values)

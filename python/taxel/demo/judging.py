@@ -38,7 +38,7 @@ GOALS = {"contact": 1.0, "lift": 1.5}
 
 
 class Row(NamedTuple):
-    """How the touches of one class were found, by one label."""
+    """Touches of one class, and how the detections of one label match them."""
 
     name: str
     label: str
@@ -52,7 +52,7 @@ class Row(NamedTuple):
 
     @property
     def found(self) -> int:
-        """How many were found."""
+        """How many touches were detected."""
         return len(self.errors_ms)
 
     def to_dict(self) -> dict[str, Any]:
@@ -136,7 +136,7 @@ def judge(detections: Detections, contacts: Sequence[Contact]) -> Judged:
 
 
 def plain_rule(area: SpikeTrains, frame_us: float) -> Detections:
-    """Say contact when two taxels are loaded, lift when fewer are: no neuron.
+    """Detect contact where two taxels are loaded, and lift where fewer are: the plain rule, without a neuron.
 
     Parameters
     ----------

@@ -39,17 +39,17 @@ __all__ = [
     "write_drops",
 ]
 
-#: How long after the contact an answer is asked for, ms.
+#: Times after the contact for which an answer is computed, ms.
 ANSWERED_MS = (1, 2, 5, 10)
-#: When the picture is looked at for it, ms: an answer rests on those up to its time.
+#: Times of the pictures, ms: an answer depends on those up to its own time.
 LOOKED_MS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 #: What a loaded taxel reads above rest, ticks: the board's noise floor and half a tick.
 _ABOVE = 3.5
 #: Boards of the shipped set, and drops on each; their seeds are the demo's training's own, far behind the readout's.
 _BOARDS, _DROPS, _FIRST_SEED = 30, 20, TRAINING_SEED + 500_000
-#: How long a ball is looked at after its fall, ms; then a hand lifts it so fast, mm/s.
+#: How long a ball is recorded after its fall, ms, and how fast a hand then lifts it, mm/s.
 _AFTER_FALL_MS, _LIFT_MM_S = 30.0, 500.0
-#: Of the discriminants: pictures that follow each other say nearly the same.
+#: Ridge of the discriminants: consecutive pictures are nearly equal.
 _RIDGE = 0.01
 
 
@@ -77,7 +77,7 @@ QUESTIONS = {
 }
 #: Of a picture: loaded taxels, their sum, the largest, and how far along the rows their middle has moved.
 _NUMBERS = 4
-#: That is kept in hundredths of a taxel.
+#: The move is stored in hundredths of a taxel.
 _MOVED = 100
 
 

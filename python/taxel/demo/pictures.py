@@ -24,7 +24,7 @@ __all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates
 #: How many taxels of a side a map shows.
 _CROP = 28
 
-#: Truth, contact, lift, quiet.
+#: Colours of truth, contact, lift, and what is less important.
 _TRUE, _COLOURS, _QUIET = "#e8b04b", {"contact": "#b5423c", "lift": "#2f6690"}, "#8a8a8a"
 
 
@@ -160,7 +160,7 @@ def _bits(value: float) -> str:
 
 
 def delays_by_class(judged: Judged, plain: Judged) -> Figure:
-    """Draw when it was known, touch by touch, by class; neuron above, plain rule below."""
+    """Draw the delay of each touch's detection by class; neuron above, plain rule below."""
     figure, axes = _figure(1, 2, (9.5, 3.6), sharey=True)
     names = [row.name for row in judged.rows if row.label == "contact" and row.touches]
     jitter = np.random.default_rng(1)
@@ -194,7 +194,7 @@ def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
             # A bar of no width would have the axis end where it stands, and clip the others.
             if value == 0.0:
                 continue
-            # Below 0, as where the base loses the ball before it leaves: thin, and over what starts there.
+            # A part below 0 (the base loses the ball before it leaves) is drawn thin, over the part that starts there.
             shape = {"height": 0.7} if value >= 0 else {"height": 0.25, "zorder": 3}
             axis.barh(place, value, left=left, color=colours[name], label=None if name in labelled else name, **shape)
             labelled.add(name)

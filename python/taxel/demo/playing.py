@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import taxel
+from taxel._base.messages import counted
 from taxel._core import DeviceError
 from taxel.demo.evaluation import Evaluation, evaluate_events
 from taxel.demo.script import script
@@ -26,20 +27,20 @@ __all__ = ["Playing", "Screen", "play_live"]
 #: How often the screen is drawn anew, s.
 _DRAW_EVERY_S = 0.1
 
-#: How long the host listens on after the board's process has ended, s.
+#: How long the host goes on receiving after the board's process has ended, s.
 _LISTEN_ON_S = 0.3
 
 
 class Screen(Protocol):
-    """What is drawn while it runs."""
+    """The display while the demo runs."""
 
     def draw(self, counters: dict[str, Any], picture: Any, detections: list[Detection]) -> None:
-        """Draw what came up to now."""
+        """Draw counters, picture and detections so far."""
 
 
 @dataclass(frozen=True)
 class Playing:
-    """A play in real time, and what was counted."""
+    """A run in real time, and its counters."""
 
     evaluation: Evaluation
     counters: dict[str, Any]
@@ -119,8 +120,8 @@ def play_live(
     verdicts = [emulator["verdict"], summary.verdict]
     if summary.counters["late"]:
         verdicts.append(
-            f"{summary.counters['late']} events came after the readout's time had moved on, 5 frames behind the host's "
-            "clock: this machine was too busy, and detections of them came late, moved or were missed; the recording "
-            "has every event, and --no-clock simulates without the clock"
+            f"{counted(summary.counters['late'], 'event')} came after the readout's time had moved on, 5 frames behind "
+            "the host's clock: this machine was too busy, and detections of them came late, moved or were missed; the "
+            "recording has every event, and --no-clock simulates without the clock"
         )
     return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)

@@ -318,7 +318,7 @@ def _quantiles(values: list[float]) -> dict[str, float] | None:
 
 
 def _machine() -> dict[str, Any]:
-    """Return what a figure of time hangs on."""
+    """Return the machine and the versions on which measured times depend."""
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():

@@ -42,7 +42,7 @@ class Screen:
         self._rate = 0.0
 
     def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], detections: list[Detection]) -> None:
-        """Draw what came up to now."""
+        """Draw counters, picture and detections so far."""
         now = (counters["board_us"] or 0) * 1e-6
         then, events = self._before
         if now > then:
@@ -114,6 +114,6 @@ def _blocks(picture: NDArray[np.uint16]) -> Text:
 
 
 def _colour(share: float) -> str:
-    """Return night over red and yellow to white."""
+    """Return the colours of a picture: from dark blue through red and yellow to white."""
     red, green, blue = (int(255 * min(1.0, max(0.0, 2.6 * share - k))) for k in (0.0, 0.8, 1.6))
     return f"#{max(red, 18):02x}{max(green, 16):02x}{max(blue, 26):02x}"

@@ -1,4 +1,4 @@
-"""What the demo plays."""
+"""The acts that the demo plays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taxel.simulate import Act, Scene, Silence
 
 __all__ = ["SLANTS_DEG", "TRAINING_SEED", "Draw", "drawn", "endless", "fall_ms", "left_to_rest", "script"]
 
-#: Which scene a seed and an index stand for.
+#: Function that draws the scene of a seed and an index.
 Draw = Callable[[int, int], Scene]
 
 #: Silence between the tare and the first scene, ms.

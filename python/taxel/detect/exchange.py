@@ -8,7 +8,7 @@ where an input spike adds ``w_in / tau_syn`` to the current times the spike's ar
 - double exponential: ``CubaLIF`` with ``tau_syn = tau_s``;
 - exponential: ``LIF``.
 
-What NIR has no words for stands in the graph's metadata, so that taxel reads back the very same readout.
+What NIR cannot express stands in the graph's metadata, so that taxel reads back the very same readout.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def write_nir(readout: Parts, path: str | os.PathLike[str], *, spike_ms: float |
 
 
 def lost(readout: Parts) -> list[str]:
-    """Return what NIR's nodes cannot say of a readout, one line each."""
+    """Return what NIR's nodes cannot hold of a readout, one line each."""
     neurons = [one.neuron for one in readout.neurons.values()]
     lines = [
         "the encoder: the graph's inputs are its spike trains",
@@ -108,7 +108,7 @@ def read_nir(
     neuron: Neuron | None,
     spike_ms: float | None,
 ) -> R:
-    """Read a readout from a file; what the nodes say wins over the metadata.
+    """Read a readout from a file; its nodes take precedence over the metadata.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def read_nir(
     open(place, "rb").close()  # a missing file is Python's own error
     try:
         graph = nir.read(place)
-    except Exception as error:  # whatever h5py and nir say of a foreign or broken file
+    except Exception as error:  # h5py and nir raise errors of many kinds for a foreign or broken file
         raise FormatError(f"{place}: no NIR graph that can be read: {shown(str(error))}") from None
     held = graph.metadata.get(READOUT)
     try:
@@ -165,7 +165,7 @@ def _gains(neuron: Neuron, spike_s: float | None) -> tuple[str, dict[str, float]
     """
     tau = neuron.tau / 1000.0
     area = 1.0 if spike_s is None else spike_s
-    # A simulator that steps adds 1 a step: it wants r = tau/step, and reads best what leaves inputs unscaled.
+    # A simulator with a fixed step adds 1 a step: with r = tau/step its inputs stay unscaled.
     r = tau if spike_s is None else tau / spike_s
     if neuron.kernel == "exponential":
         return "LIF", {"tau": tau, "r": r}, tau / (area * r)
@@ -242,7 +242,7 @@ def _parts(
     neuron: Neuron | None,
     spike_ms: float | None,
 ) -> Parts:
-    """Return a readout's parts from nodes; what they do not say comes from the caller, the metadata, or by default."""
+    """Return a readout's parts from nodes; the rest comes from the caller, the metadata, or by default."""
     encoder = encoder or (own.encoder if own is not None else None)
     if encoder is None:
         raise ProblemError("NIR holds no encoder: say which with encoder=")
@@ -289,7 +289,7 @@ def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], 
         raise FormatError(f"neurons[{k}]: time constant {tau} s: must be above 0")
     constants["tau"] = 1000.0 * tau
     _, ours, gain = _gains(Neuron(**constants), spike_s)
-    # `gain` holds for our own r and w_in; theirs may be shared out otherwise.
+    # `gain` is for taxel's own r and w_in; a graph may split their product otherwise.
     scale = value("r") / ours["r"] * (value("w_in") / ours["w_in"] if "w_in" in ours else 1.0)
     return constants, scale / gain
 

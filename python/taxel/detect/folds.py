@@ -97,7 +97,7 @@ class Trained(NamedTuple):
 
 @dataclass(frozen=True)
 class Judged:
-    """How readouts did on data that they were not trained on.
+    """Scores of readouts on data that they were not trained on.
 
     Attributes
     ----------
@@ -277,7 +277,7 @@ def _marks(
     frame_us: float | None,
     report: Callable[[str], object],
 ) -> list[tuple[int, float]]:
-    """Return what each of several recipes for one label comes to over all folds: its `Score.rank`."""
+    """Return the `Score.rank` over all folds of each of several recipes for one label."""
     array = array_of(examples)
     detections: list[dict[int, list[Detections]]] = [{} for _ in plans]
     for n, fold in enumerate(folds):
@@ -296,7 +296,7 @@ def _marks(
 
 
 def _quiet() -> Any:
-    """Return a context without warnings of readouts that are not kept: their scores show what they miss."""
+    """Return a context without warnings of readouts that are only scored: their scores show what they miss."""
     return warnings.catch_warnings(action="ignore", category=UserWarning)
 
 

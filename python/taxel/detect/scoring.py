@@ -19,7 +19,7 @@ from taxel.spikes import to_us
 
 __all__ = ["Score", "Spread", "score", "score_together"]
 
-#: No detection of one recording may meet an event of another when all are scored together, us.
+#: So far apart, us, no detection of one recording pairs with an event of another when all are scored together.
 _APART_US = 10**12
 
 
@@ -106,12 +106,12 @@ class Score:
 
     @property
     def found(self) -> int:
-        """How many reference events were found."""
+        """How many reference events were detected."""
         return len(self.pairs)
 
     @property
     def missed(self) -> int:
-        """How many reference events nothing was said of."""
+        """How many reference events have no detection."""
         return len(self.missed_events)
 
     @property
@@ -238,7 +238,7 @@ def score(
 def score_together(
     detections: Sequence[Detections], truths: Sequence[Mapping[str, NDArray[np.int64]]], window_ms: float
 ) -> Score:
-    """Score what was said of several recordings as one, with the events of each by the same labels (us)."""
+    """Score the detections in several recordings as one, with the events of each by the same labels (us)."""
     later = range(0, len(detections) * _APART_US, _APART_US)
     moved = [
         Detections._of(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(detections, later, strict=True)

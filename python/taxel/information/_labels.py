@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import shown
 from taxel._core import ProblemError
 
-#: So many labels are sorted or looked up by one NumPy call, which does not answer Ctrl-C: of texts some 30 ms.
+#: Labels that one call of NumPy sorts or looks up (30 ms for texts): Ctrl-C is answered between calls.
 _AT_ONCE = 1 << 17
 
 __all__ = ["belonging", "distinct", "numbered", "one_label_a_group", "words"]

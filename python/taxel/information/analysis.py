@@ -30,13 +30,13 @@ from taxel.spikes import to_ms
 
 __all__ = ["CLASSIFIERS", "answer"]
 
-#: Beside the discriminants of every answer, at the reference setting.
+#: Classifiers that `answer` can also run at the reference setting, beside the discriminants of every setting.
 CLASSIFIERS = ("neighbours", "cone_r", "tempotron")
 #: Numbers of neighbours that are tried.
 NEIGHBOURS = (1, 3, 5, 9, 15)
-#: From so many trials on their matrices are worth more than one thread.
+#: Number of trials from which several threads are used for their matrices.
 _WORTH_THREADS = 1000
-#: Pictures are held against events where they fit in so many values.
+#: Pictures are compared with events only where they have at most so many values.
 _MOST_VALUES = 2**28
 
 
@@ -57,7 +57,7 @@ def answer(
     seed: int = 0,
     progress: Callable[[str, int, int], object] | None = None,
 ) -> Answer:
-    """Ask labelled trials how many bits their events hold about the labels, by period, time, taxels and cost.
+    """Estimate how many bits the events of labelled trials hold about the labels, by period, time, taxels and cost.
 
     Parameters
     ----------
@@ -73,9 +73,9 @@ def answer(
     taxels : sequence of int, optional
         Numbers of taxels that are drawn at random among those that ever send an event; 10, 30, 100, 300 where left out.
     pools : sequence of int, optional
-        Taxels of so many by so many taken for one; 2, 4 and 7 where left out.
+        Sides of the squares of taxels that are averaged into one; 2, 4 and 7 where left out.
     taxels_at_ms : float, ms, optional
-        The period at which taxels are taken away or pooled, one of those asked for; the finest where it is left out.
+        The period at which taxels are left out or pooled, one of `periods_ms`; the finest where it is left out.
     draws : int, 1 or more
         Of sampling phases and of random taxels; answers are their means.
     folds : int, 2 or more
@@ -104,16 +104,16 @@ def answer(
     also = [text("classifiers", one, CLASSIFIERS) for one in several("classifiers", classifiers)]
     answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed), progress)
     answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms, len(also), int(shuffles))
-    # Threads that wait for each other over small matrices cost more than they bring, and very much on a busy machine.
+    # On small matrices several threads are slower than one, and far slower where other processes compute as well.
     with threadpool_limits(1 if len(listed) < _WORTH_THREADS else None):
         return answering.answer(also, int(shuffles))
 
 
 class _Answering(Question):
-    """Answers a question setting by setting."""
+    """Computes the answer to a question, setting by setting."""
 
     def answer(self, classifiers: list[str], shuffles: int) -> Answer:
-        """Answer all."""
+        """Return the answer for all settings."""
         values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
         responses_at: dict[tuple[int, float], list[Any]] = {}
         about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
@@ -197,7 +197,7 @@ class _Answering(Question):
         return frame_grams(values, spikes, [self.window_us]), [bins * active]
 
     def _by_taxels(self, full: Point, values: bool) -> tuple[Point, ...]:
-        """Answer by number of taxels."""
+        """Return the points with fewer or larger taxels."""
         period = self.taxels_at
         window = self.window_us
         points = []
@@ -279,5 +279,5 @@ def _point(
 
 
 def _with_nothing(point: Point) -> Point:
-    """Return a setting that is held against one whose bits are not told from nothing."""
+    """Return a point with the verdict "nothing": the full setting's bits are not above those of shuffled labels."""
     return point if point.verdict is None else replace(point, verdict=replace(point.verdict, says="nothing"))

@@ -1,4 +1,4 @@
-"""What is answered of a user's own sensor: bits by setting, what they cost, and what else would tell as much."""
+"""The answer about a user's own sensor: bits by setting, their cost, and controls."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from taxel.information.wire_rate import WIRE
 
 __all__ = ["Answer", "Control", "Point", "is_above_chance"]
 
-#: A control that tells this share of the answer comes near it.
+#: A control with at least this share of the answer's bits is reported as a warning.
 _NEAR = 0.8
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Hold what one setting tells.
+    """Hold the bits of one setting, and their cost.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Point:
 
     @property
     def millibits_per_event(self) -> float:
-        """Bits over events: highest where least is known, so no figure of merit."""
+        """Bits divided by events, in thousandths: highest where least is known, so no figure of merit."""
         return 1000.0 * self.found.bits / self.events if self.events else 0.0
 
     def to_dict(self) -> dict[str, Any]:
@@ -79,7 +79,7 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """Hold how many bits something else than the touch's pattern gives.
+    """Hold the bits of a control: of something else than the touch's pattern.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Control:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Hold everything that was asked of the trials.
+    """Hold the results of `taxel.information.answer`.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Answer:
         How many; 0 where none are named.
     encoder : str
     full : Point
-        The finest period, all taxels, the whole window: what the others are held against.
+        The finest period, all taxels, the whole window: the reference of all others.
     points : tuple of Point
         By period and window, all taxels.
     taxels : tuple of Point
@@ -161,7 +161,7 @@ class Answer:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before the full setting's bits are believed: nothing told, wrong answers, a control as good."""
+        """Reasons to doubt the full setting's bits: shuffled labels, wrong answers or a control give about as much."""
         estimate = self.full.found
         lines = []
         if estimate.bits <= self.zero.level:
@@ -225,12 +225,12 @@ class Answer:
 
 
 def _guessing(estimate: Estimate) -> tuple[float, float]:
-    """Return the share that guessing names rightly, and the least that chance would let it (three deviations)."""
+    """Return the share of trials that guessing classifies correctly, and that less three standard deviations."""
     trials = estimate.counts[0].sum(1)
     guessed = float(((trials / trials.sum()) ** 2).sum())
     return guessed, guessed - 3.0 * float(np.sqrt(guessed * (1 - guessed) / trials.sum()))
 
 
 def is_above_chance(estimate: Estimate, zero: ZeroTest) -> bool:
-    """Whether bits are more than shuffled labels give, and not those of answers that are wrong as a rule."""
+    """Whether the bits exceed those of shuffled labels, and trials are not classified worse than by guessing."""
     return estimate.bits > zero.level and estimate.right >= _guessing(estimate)[1]

@@ -26,7 +26,7 @@ __all__ = [
     "relevant_responses",
 ]
 
-#: So many cells one NumPy call works on: Ctrl-C is answered between calls.
+#: Cells that one call of NumPy works on: Ctrl-C is answered between calls.
 _AT_ONCE = 1 << 20
 
 
@@ -181,7 +181,7 @@ def _relevant(rows: NDArray[np.int64]) -> NDArray[np.int64]:
         if not len(rising):
             break
         n, r = trials[rising, None], seen[rising, None]
-        # `extra` responses that never came share gamma between them.
+        # The `extra` responses that did not occur share the probability gamma.
         gamma = extra * -np.expm1(np.log(n / (n + r)) / n)
         came = np.where(rows[rising] > 0, (1 - gamma) / (n + r) * (rows[rising] + 1), 0.0)
         expected = _once(came, n).sum(-1) + extra * _once(gamma / extra, n)[:, 0]
@@ -229,7 +229,7 @@ def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: int = 0) -> float:
     """Return the mutual information in bits, extrapolated from half and a quarter of the trials to endlessly many.
 
-    A second opinion beside `panzeri_treves`: that both agree is no proof (they err alike where trials are few).
+    A second estimate beside `panzeri_treves`. Their agreement is no proof: both err alike where trials are few.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
             tables = (np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends))
             values += [plug_in(one.reshape(table.shape)) for one in tables]
         means.append(float(np.mean(values)))
-    # Through (1, whole), (2, half), (4, quarter) in units of 1/N: the value at 0.
+    # The value at 0 of the parabola through (1, whole), (2, half) and (4, quarter), in units of 1/N.
     at_zero = (8 * means[0] - 6 * means[1] + means[2]) / 3
     return float(np.clip(at_zero, 0.0, label_entropy(table)))
 

@@ -99,7 +99,7 @@ class Code(ABC):
         return self._values(trains, onset)
 
     def _first(self, trains: SpikeTrains, onset: float) -> NDArray[np.float64]:
-        """Return each train's first spike at or after the onset, ms, as finely as can be told; infinite where none."""
+        """Return the latency of each train's first spike at or after the onset, ms; infinite where there is none."""
         first = np.full(len(trains), np.inf)
         times, train = trains.to_numpy()
         later = times >= onset
@@ -107,10 +107,10 @@ class Code(ABC):
         return first
 
     def _rounded(self, latency: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return latencies as finely as they can be told."""
+        """Return latencies rounded down to whole steps of the resolution."""
         if not self.resolution_ms:
             return latency
-        # A time that is a whole number of steps but for rounding stays there.
+        # 1e-9 keeps a time in its step that is a whole number of steps but for its rounding error.
         return np.asarray(self.resolution_ms * np.floor(latency / self.resolution_ms + 1e-9))
 
     @abstractmethod
@@ -122,7 +122,7 @@ class Code(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class RateCode(Code):
-    """Say a value by how many spikes come within the window.
+    """Encode a value by the number of spikes within the window.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class RateCode(Code):
 
     def _times(self, values: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         counts = np.rint(values * self.most_hz * 1e-3 * self.window_ms).astype(np.int64)
-        # In the middle of their share of the window: none at its edges.
+        # Each spike lies in the middle of its share of the window, so none lies at the window's edges.
         return [(np.arange(n) + 0.5) * self.window_ms / max(1, n) for n in counts]
 
     def _values(self, trains: SpikeTrains, onset: float) -> NDArray[np.float64]:
@@ -255,7 +255,9 @@ class RankOrder(RelativeLatency):
         values = np.zeros(len(first))
         order = np.sort(since[fired])
         before = np.searchsorted(order, since[fired]), np.searchsorted(order, since[fired], side="right")
-        values[fired] = 1.0 - (sum(before) - 1.0) / 2.0 / len(first)  # those at the same time share their ranks
+        values[fired] = 1.0 - (sum(before) - 1.0) / 2.0 / len(
+            first
+        )  # spikes at the same time share the mean of their ranks
         return values
 
 
@@ -269,9 +271,9 @@ def compare_codes(
     folds: int = 10,
     seed: int = 0,
 ) -> dict[str, Estimate]:
-    """Estimate how many bits about labels each code hands on from the same spikes.
+    """Estimate how many bits about labels each code carries from the same spikes.
 
-    Linear discriminants name each trial by what the code reads of it, trained on the other folds; the bits are those of
+    Linear discriminants classify each trial by its decoded values, trained on the other folds; the bits are those of
     the confusion matrix (`estimate`).
 
     Parameters

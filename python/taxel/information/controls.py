@@ -1,4 +1,4 @@
-"""Controls beside an answer: what else than the pattern of events may tell the labels."""
+"""Controls: how many bits about the labels come from something else than the pattern of events."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["controls"]
 
 
 def controls(question: Question) -> tuple[Control, ...]:
-    """Return what the stretch before the contact, the length, the count of events and the first picture tell."""
+    """Return the bits of the stretch before the contact, the length, the count of events and the first picture."""
     question.tell("controls")
     finest, window = question.periods[0], question.window_us
     spikes = question.spikes(finest, 0)
@@ -59,8 +59,8 @@ def _scalar(question: Question, value: NDArray[np.float64]) -> Estimate | None:
 
 
 def _before(question: Question) -> Control:
-    """Ask the stretch before the contact: what it tells was there before the touch."""
-    assert question.encoder is not None  # set where it was left out
+    """Return the bits of the stretch before the contact, which the touch cannot have caused."""
+    assert question.encoder is not None  # the question has set the default
     begin = np.array([float(one.source.t.min()) for one in question.trials])
     for source in {id(one.source) for one in question.trials}:
         mine = [k for k, one in enumerate(question.trials) if id(one.source) == source]

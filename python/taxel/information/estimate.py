@@ -1,4 +1,4 @@
-"""How many bits the answers hold, how sure that is, and whether it is more than nothing."""
+"""The bits that answers hold about labels, with an interval, and a test against zero."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from taxel.information.bits import (
 
 __all__ = ["Estimate", "ZeroTest", "estimate", "zero_test"]
 
-#: So many trials a label and relevant response keep the corrected value within .05 bit (simulated, 3 to 10 labels).
+#: Trials a label and relevant response that keep the corrected value within .05 bit (simulated, 3 to 10 labels).
 TRIALS_A_RESPONSE = 7
-#: Cells that are held at a time while trials are redrawn.
+#: Cells in memory at a time while trials are redrawn.
 _CELLS = 1 << 21
 #: Units that are redrawn, or trials that are counted, by one call of NumPy.
 _DRAWN = 1 << 19
@@ -98,7 +98,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class ZeroTest:
-    """Hold what labels shuffled before training still seem to give.
+    """Hold the bits that are estimated where labels are shuffled before training.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ def estimate(
     tenth = int(np.ceil(384.0 * np.var(local)))
     prior, wrong = n[n > 0] / len(truth), int((row != counts.sum(0).argmax(0)[column]).any(0).sum())
     if wrong <= len(prior):
-        # Too few errors to tell by redraws where others would lie.
+        # With so few errors, redraws do not show where others would lie.
         low = min(low, most - bits - _left_open(prior, wrong, len(truth), share))
         times = np.geomspace(1, 100, 400)
         needed = (len(truth) * m for m in times if _left_open(prior, m * wrong, m * len(truth), 0.95) <= _FIFTH)
@@ -224,7 +224,7 @@ def zero_test(
     shuffles: int = 20,
     seed: int = 0,
 ) -> ZeroTest:
-    """Shuffle the labels before training, and see how many bits still seem to be there.
+    """Test against zero: shuffle the labels before training, and estimate the bits again.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def zero_test(
         Trains anew on these labels and returns the responses, shape (trials,).
     labels : labels, shape (trials,)
     found : float, bits
-        What the labels as they are gave.
+        The estimate with the true labels.
     groups : labels, shape (trials,), optional
         Where each group has one label, whole groups change theirs; else labels are shuffled within each group.
     shuffles : int, 1 or more
@@ -315,7 +315,7 @@ def _interval(
 
     units = np.arange(len(row)) if belongs is None else belongs
     owner = np.unique(units, return_index=True)[1]
-    # Where a unit has one label the number of each label is by design, and stays.
+    # Where each unit has one label, the number of units a label is part of the design, and redraws keep it.
     strata = row[owner] if belongs is None or one_label_a_group(row, belongs) else np.zeros(len(owner), np.int64)
     members = [np.flatnonzero(strata == s) for s in np.unique(strata)]
     estimates = []

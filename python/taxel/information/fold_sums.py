@@ -18,8 +18,8 @@ from taxel.information.primal import ClassMoments, blocks, feature_table, is_exa
 
 __all__ = ["FoldSums", "fold_predictions"]
 
-#: Features from which on threads are worth it: NumPy and SciPy bring a pool each, and while one is at work the other's
-#: threads wait busily. At 1000 features two threads take twice as long as one.
+#: Number of features from which several threads are used: NumPy and SciPy have a pool each, and while one computes the
+#: threads of the other spin. At 1000 features two threads take twice as long as one.
 _WORTH_THREADS = 2500
 
 

@@ -1,4 +1,4 @@
-"""Each trial named by training on the other folds, with smoothing and ridge chosen inside them."""
+"""Nested cross-validation: the other folds predict each trial, with smoothing and ridge chosen inside them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RIDGES = (10.0, 1.0, 0.1)
 
 @dataclass(frozen=True, eq=False)
 class Nested:
-    """Hold what each trial was named while it was in no training set.
+    """Hold the prediction of each trial, by training sets without it.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Nested:
     chosen : dict from fold to (int, float)
         Which matrix and which ridge (or how many neighbours) that fold's training trials chose among themselves.
     missing : tuple of (fold, class)
-        Training sets without a class: they can never name it.
+        Training sets without a class, which they cannot predict.
     """
 
     responses: NDArray[np.generic]
@@ -55,7 +55,7 @@ def nested_predictions(
     neighbours: Sequence[int] = (),
     seed: int = 0,
 ) -> Nested:
-    """Name each trial by linear discriminants of the other folds, chosen among matrices and ridges inside these.
+    """Predict each trial by linear discriminants of the other folds, chosen among matrices and ridges inside these.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def training_curve(
     *,
     seed: int = 0,
 ) -> list[NDArray[np.generic]]:
-    """Name all trials once more, trained on so many trials a label only.
+    """Predict all trials again, by training on only so many trials a label.
 
     Parameters
     ----------
@@ -191,12 +191,12 @@ def _inside(
 
 
 class _Ways:
-    """Name trials that are left out, in every way that is to be chosen among."""
+    """The classifiers to choose among ("ways"): their predictions of trials that are left out."""
 
     count: int
 
     def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
-        """Return by way what `test` and `held` are named when both are left out; shape (ways, trials)."""
+        """Return the predictions of `test` and `held` when both are left out, by way; shape (ways, trials)."""
         raise NotImplementedError
 
     def way(self, number: int) -> tuple[int, float]:
@@ -219,7 +219,7 @@ class _Discriminants(_Ways):
         self.regressions = []
         for square, size in zip(squares, features, strict=True):
             spread = float(np.trace(square) - square.mean(0).sum())
-            # Where all trials are alike only rounding is left, and must not be taken for what varies.
+            # Where all trials are alike only rounding errors remain, which are no variance.
             unit = max(spread / size, 1e-9 * float(np.trace(square)) / len(row), 1e-300)
             self.regressions += [Regression(square, which, ridge * unit) for ridge in ridges]
         self.count = len(self.regressions)

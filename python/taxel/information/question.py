@@ -1,4 +1,4 @@
-"""What is asked of labelled trials: their labels, contacts and windows, and the settings that are compared."""
+"""The settings that an analysis compares, and the labels, contacts and windows of its trials."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import number, several, shown, whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.frames import Frames
@@ -38,7 +39,7 @@ _STEPS = (1, 2, 5)
 
 @dataclass(eq=False)
 class Question:
-    """Labelled trials, and the settings at which they are asked for their information."""
+    """Labelled trials, and the settings at which their information is estimated."""
 
     trials: list[LabelledTrial]
     encoder: Encoder | None
@@ -102,7 +103,7 @@ class Question:
         if np.isfinite(reach) and (lengths < self.window_us).any():
             short = int((lengths < self.window_us).sum())
             self.notes.append(
-                f"{short} trials end before {to_ms(self.window_us):g} ms: what comes late may tell their length"
+                f"{counted(short, 'trial')} shorter than {to_ms(self.window_us):g} ms: late events may tell the length"
             )
 
     def set_out(
@@ -159,14 +160,14 @@ class Question:
         self.steps = self.draws * (len(self.periods) * (2 + len(self.columns)) + settings) + shuffles + classifiers + 8
 
     def tell(self, what: str, steps: int = 1) -> None:
-        """Report what is done next, so many steps on."""
+        """Report the next piece of work, and count the steps that are done."""
         self.done += steps
         if self.progress is not None:
             self.progress(what, min(self.done, self.steps), self.steps)
 
     def spikes(self, period: int, draw: int, pool: int = 1) -> Spikes:
         """Return the spikes of all trials at a period (us), in one draw of the sampling phases."""
-        assert self.encoder is not None  # set where it was left out
+        assert self.encoder is not None  # the constructor has set the default
         return spikes_of(
             self.trials,
             self.held,
@@ -181,7 +182,7 @@ class Question:
     def nested(
         self, grams: list[NDArray[np.float64]], sizes: list[int], y: Any = None, draw: int = 0, **ways: Any
     ) -> Nested:
-        """Return what the trials are named in nested folds; `y` are other labels than the question's."""
+        """Return the predictions for all trials in nested folds; `y` replaces the question's labels."""
         labels = self.labels if y is None else y
         return nested_predictions(
             grams, sizes, labels, groups=self.groups, count=self.folds, seed=self.seed + draw, **ways
@@ -199,7 +200,7 @@ class Question:
         return [list(one) for one in zip(*(event_grams(spikes, windows, tau) for tau in taus), strict=True)]
 
     def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
-        """Return the columns that can be asked for like labels; the others are named in the notes."""
+        """Return the columns of parameters that can stand in for the labels; the notes name the others."""
         from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
 
         columns = {}
@@ -221,7 +222,7 @@ class Question:
 
 
 def floor_of(trials: Sequence[LabelledTrial]) -> float:
-    """Return the change that counts where nobody says: 3 ticks, a step, else a 40th of the largest value."""
+    """Return the default floor (the largest change without an event): 3 ticks, a step, else a 40th of the maximum."""
     first = trials[0].source
     if not isinstance(first, Frames):
         return 3.0 if first.intensity is not None else 0.5

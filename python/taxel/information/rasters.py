@@ -78,12 +78,12 @@ class _Sums:
     """Sum up the inner products of all trials, bin by bin, to several windows at once."""
 
     def __init__(self, spikes: Spikes, windows_us: Sequence[float]) -> None:
-        # A silent trial adds nothing wherever it ends, so it ends last.
+        # A silent trial adds nothing, so its end may be the last of all.
         silent = ~np.isfinite(spikes.first_us)
         ends = [spikes.bins_to(window) for window in windows_us]
         self._ends = [np.where(silent, end.max(initial=0), end) for end in ends]
         self._common = np.zeros((spikes.trials, spikes.trials))
-        # A window goes on from the common sum until a trial has left it, then by itself.
+        # Windows share one sum until the first trial ends within one of them; that window then has a sum of its own.
         self._own: list[NDArray[np.float64] | None] = [None] * len(ends)
         self._bin = 0
         #: How many bins there are to the last window.

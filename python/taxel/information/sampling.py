@@ -1,4 +1,4 @@
-"""What a sensor that samples more slowly would have seen: held values at its own times, and the events among them."""
+"""Slower sampling of recorded trials: held values at other times, and the events between them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from taxel.spikes import to_ms, to_us
 
 __all__ = ["STEP_US", "HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "pictures_of", "spikes_of"]
 
-#: No touch's beginning is looked for more finely on a grid, us.
+#: The finest grid on which a touch's beginning is searched, us.
 STEP_US = 100
 
 
@@ -64,7 +64,7 @@ class HeldValues:
 
 @dataclass(frozen=True, eq=False)
 class Spikes:
-    """Hold the events of all trials as one period and one draw of its phase sees them.
+    """Hold the events of all trials, sampled at one period and one draw of its phases.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ def contacts(
 ) -> NDArray[np.float64]:
     """Return when each touch begins, us: the first event at or after its start at the finest period; NaN without one.
 
-    It is looked for until the trial's end, or for the length of a window; in events at their own times.
+    The search ends at the trial's end, or after the length of a window; events are searched at their own times.
     """
     onsets = np.full(len(trials), np.nan)
     for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
@@ -170,7 +170,7 @@ def spikes_of(
     random: np.random.Generator,
     pool: int = 1,
 ) -> Spikes:
-    """Sample all trials at one period, each at a phase that is drawn, and encode what is seen.
+    """Sample all trials at one period, each at a phase that is drawn, and encode the samples.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def spikes_of(
     random : numpy.random.Generator
         Of the phases.
     pool : int
-        Taxels of so many by so many are taken for one, which holds their mean.
+        Squares of so many by so many taxels are averaged into one.
 
     Returns
     -------
@@ -232,7 +232,7 @@ def pictures_of(
     contact_us: NDArray[np.float64],
     bins: int,
 ) -> NDArray[np.float32]:
-    """Return what a sensor of pictures would have seen at the same times: the change since before the touch.
+    """Return pictures at the same times as the events: the change since before the touch.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def _encoded(
     period_us: int,
     pooled: tuple[NDArray[np.int64], int, NDArray[np.float64]] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
-    """Return bin, taxel and value of what an encoder says of the values held on a grid of times."""
+    """Return bin, taxel and value of the events that an encoder makes of the values held at a grid of times."""
     values = held.at(grid)
     if pooled is not None:
         where, count, share = pooled

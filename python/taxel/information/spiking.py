@@ -1,4 +1,4 @@
-"""Spiking neurons as classifiers: one a class, the one that is driven highest names the trial."""
+"""Spiking neurons as classifiers, one a class: the class of the highest potential is predicted."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class ConeRReadout(Classifier):
 
     Notes
     -----
-    Thesis 6.3.3. The class whose neuron's potential comes highest at the window's end is named.
+    Thesis 6.3.3. The class whose neuron's potential is highest at the window's end is predicted.
     """
 
     learners_: list[ConeR]
@@ -138,7 +138,7 @@ class TempotronReadout(Classifier):
 
     Notes
     -----
-    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is named.
+    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is predicted.
     """
 
     learners_: list[Tempotron]
@@ -240,7 +240,7 @@ def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
 def readout_responses(
     name: str, spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
 ) -> NDArray[np.generic]:
-    """Name each trial by neurons that were trained on the other folds.
+    """Predict each trial's label by neurons that were trained on the other folds.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def readout_responses(
     text("name", name, ("cone_r", "tempotron"))
     patterns = patterns_of(spikes, window_us)
     responses = np.empty_like(labels)
-    # Far shorter, and at the window's end nothing would be left of its beginning.
+    # With a far shorter constant the potential at the window's end would hold nothing of its beginning.
     tau = max(1.0, to_ms(window_us) / 3)
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)

@@ -1,4 +1,4 @@
-"""Trials: stretches of recordings, each with a label, and what is known of it."""
+"""Trials: labelled stretches of recordings, with their groups and parameters."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _KNOWN = (*_COLUMNS, "stop_us", "group", "host_ns")
 
 @dataclass(frozen=True, eq=False)
 class LabelledTrial:
-    """Hold one trial: where it lies, what it is called, what it belongs to.
+    """Hold one trial: a stretch of a recording, its label and its group.
 
     Its label is that of the whole stretch, which a classifier tells from others; a `taxel.detect.Example` has the times
     of labelled events, at which a neuron learns to fire.
@@ -42,7 +42,7 @@ class LabelledTrial:
     start_us : int, us
         The touch begins at the first event at or after it.
     stop_us : int, us, optional
-        The trial's end (exclusive): nothing after it is looked at, and how long the touch was is known.
+        The trial's end (exclusive): nothing after it is used, and the length of the touch is known.
     group : str
         What must not be split between folds (person, session, pose); every trial by itself where it is empty.
     parameters : mapping of str to str

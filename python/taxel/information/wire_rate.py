@@ -9,7 +9,7 @@ from taxel.information.sampling import Spikes
 
 __all__ = ["WIRE", "kilobits_per_second"]
 
-#: What the rates are of, to stand beside them.
+#: What the rates refer to, printed beside them.
 WIRE = (
     "wire version 2: 2 bytes an event (kind 0), 4 with a value (kind 2); a datagram for each time at which something "
     "changed, 24 bytes of its own, nothing held back; UDP and IP would add 28 a datagram; promises, states and totals "

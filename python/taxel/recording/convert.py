@@ -13,6 +13,7 @@ import numpy as np
 from taxel import _core
 from taxel._base.arguments import flag, path, shown, text
 from taxel._base.files import whole_file, write_whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
@@ -144,5 +145,5 @@ def _read_otherwise(part: Path, of: Contents) -> list[str]:
         return []
     again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
-        return [f"the pairing of intensities ({len(again)} events when paired directly)"]
+        return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]
     return ["the order of times that step back by more than 0.1 s"] * (not np.array_equal(again.t, events.t))

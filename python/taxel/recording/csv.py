@@ -15,9 +15,10 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import first_line, shown
+from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.limits import COLUMNS, TAXELS, VALUE, unpacked
+from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events

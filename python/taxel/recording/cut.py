@@ -59,7 +59,7 @@ def cut(
     >>> events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     >>> _ = taxel.convert(events, place)
     >>> taxel.cut(taxel.open(place), start_us=100, columns=slice(4, 8))
-    [Recording(two.npz: 1 events, 200 to 200 us, 8 x 4 taxels)]
+    [Recording(two.npz: 1 event, 200 to 200 us, 8 x 4 taxels)]
     """
     instance("recording", recording, Recording)
     start_us, stop_us = window("us", start_us, stop_us)

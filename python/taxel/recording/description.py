@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from taxel._base import limits
-from taxel._base.arguments import first_line, flag, number, text, whole
+from taxel._base.arguments import flag, number, text, whole
+from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.detections import Detections

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import flag, instance, number, several, shown
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -269,7 +270,7 @@ def _held(
         done = upto
         known = held != UNKNOWN
         if (now[known] != held[known]).any():
-            lost.append(f"what {np.count_nonzero(known)} taxels held where {part.name} begins")
+            lost.append(f"what {counted(int(known.sum()), 'taxel')} held where {part.name} begins")
     return first
 
 

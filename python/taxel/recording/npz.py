@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.archive import read_arrays, stored_names
-from taxel._base.arguments import first_line
 from taxel._base.columns import frozen
+from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events

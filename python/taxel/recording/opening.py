@@ -77,7 +77,7 @@ def open_any(
     ...     _ = taxel.convert(events, folder / name)
     >>> _ = (folder / "labels.csv").write_text("recording,label,t_us\nstep2,contact,200\n")
     >>> taxel.open(folder)
-    [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 notes),
+    [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 note),
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
     place = Path(arguments.path("path", path))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.messages import counted
 from taxel.array import Array
 from taxel.clock import Clock
 from taxel.events import Events
@@ -167,13 +168,14 @@ class _Source:
         rebuilt = self.rebuilt()
         bad = []
         if rebuilt["large_chunks"]:
-            bad.append(f"{rebuilt['large_chunks']} chunks skipped that say they unpack to more than 64 MiB")
+            bad.append(f"{counted(rebuilt['large_chunks'], 'chunk')} skipped, stated to unpack to more than 64 MiB")
         if rebuilt["bad_chunks"]:
-            bad.append(f"{rebuilt['bad_chunks']} bad chunks skipped")
+            bad.append(f"{counted(rebuilt['bad_chunks'], 'bad chunk')} skipped")
         if rebuilt["gaps"]:
-            bad.append(f"{rebuilt['skipped_bytes']} bytes of the file skipped in {rebuilt['gaps']} places")
+            skipped = counted(rebuilt["skipped_bytes"], "byte")
+            bad.append(f"{skipped} of the file skipped in {counted(rebuilt['gaps'], 'place')}")
         if rebuilt["torn_bytes"]:
-            bad.append(f"{rebuilt['torn_bytes']} torn bytes at the end")
+            bad.append(f"{counted(rebuilt['torn_bytes'], 'torn byte')} at the end")
         if "finished" in self.ending:
             recorded = str(self.ending["finished"]["verdict"])
             return f"LOST in the file: {', '.join(bad)}; while recording: {recorded}" if bad else recorded
@@ -181,7 +183,7 @@ class _Source:
         if "stopped" in self.ending:
             why = f"stopped by an error ({self.ending['stopped']}): what came last is missing"
         so_far = self.remarks()["counts"]
-        known = "no counts were kept yet"
+        known = "no counts were saved yet"
         if so_far is not None:
             # What was received then is more than what the file holds now: the rest is the unfinished end.
             known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))

@@ -66,7 +66,7 @@ def _one(figure: Figure) -> Markup:
         data = chart_data(figure)
     except _NotKnownError:
         return Markup('<div class="picture">') + Markup(_svg(figure)) + Markup("</div>")
-    # Within a page nothing may look like the end of the script.
+    # The data must not contain the end tag of the script element that holds it.
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     return Markup('<div class="charts"><script type="application/json">') + Markup(text) + Markup("</script></div>")
 
@@ -179,7 +179,7 @@ def _axis(axis: Axis, limits: tuple[float, float]) -> dict[str, Any]:
         # uPlot's own: straight around 0, logarithmic far from it.
         data |= {"scale": "asinh", "around": float(axis.get_transform().linthresh)}  # type: ignore[attr-defined]
     elif scale == "function":
-        # The one function that reports use is a root; which, two values tell.
+        # The only function scales of reports are roots; two values determine which root.
         there = np.asarray(axis.get_transform().transform(np.array([4.0, 9.0])))
         if not np.allclose(there, [2.0, 3.0]):
             raise _NotKnownError
@@ -229,7 +229,7 @@ class _Drawn:
         self.held: dict[str, list[dict[str, Any]]] = {}
 
     def add(self, artist: Any) -> None:
-        """Take one artist."""
+        """Add what one artist draws."""
         in_x, in_y = artist.get_transform().contains_branch_seperately(self.axes.transData)
         if isinstance(artist, AxesImage):
             self._image(artist)
@@ -421,7 +421,7 @@ def _first(*every: Iterable[Any]) -> Any:
 
 
 def _colour_scale(axes: Any) -> dict[str, Any] | None:
-    # Its only way to the scale that axes show.
+    # matplotlib has no public way from axes to the colour bar that they show.
     bar = axes._colorbar
     if not isinstance(bar.norm, colors.Normalize) or bar.vmin is None:
         return None

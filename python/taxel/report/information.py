@@ -1,4 +1,4 @@
-"""The page of ``taxel information``: bits by period, time, taxels, rate, training; who is taken for whom."""
+"""The page of ``taxel information``: bits by period, time, taxels, rate and training, and the confusion matrix."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["write_information"]
 
-#: Of verdicts.
+#: Colours of verdicts.
 _COLOURS = {"keeps": "#2f6690", "open": "#e8b04b", "loses": "#b5423c", "full": "#2b2b2b", "nothing": "#9a9a9a"}
 #: Labels whose names still fit a confusion matrix.
 _MOST_NAMES = 40

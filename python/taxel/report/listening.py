@@ -33,7 +33,7 @@ __all__ = ["write_listening"]
 
 #: How many moments are drawn a label, and how much around each in time constants of the neuron.
 _MOMENTS, _AROUND = 4, 6.0
-#: What `taxel view` shows, and how many recordings are named for it.
+#: Files that `taxel view` shows, and the largest number of them that the page lists.
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
@@ -41,7 +41,7 @@ _DETECTED, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
 
 
 class _Moment(NamedTuple):
-    """Something worth a look: a label's event, when (us), and what became of it."""
+    """A moment to draw: an event or detection of a label, its time (us), and its outcome."""
 
     recording: int
     label: str

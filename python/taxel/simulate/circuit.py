@@ -212,7 +212,7 @@ class VirtualGround(_Lines):
 class Divider(_Lines):
     """Pull rows to ground by resistors and put the supply on one driven line after the other: no amplifier.
 
-    Currents go astray by other taxels, so a taxel reads less, or more, than it would by itself.
+    Currents also flow through other taxels, so a taxel reads less, or more, than it would by itself.
 
     Parameters
     ----------
@@ -257,11 +257,11 @@ class Trace(NamedTuple):
     ----------
     t_us : float64, shape (n,), us
     line_v : float64, shape (n,), V
-        The sense line that the multiplexer has chosen, V.
+        The sense line that the multiplexer has chosen.
     input_v : float64, shape (n,), V
-        The comparator's input, which settles towards it, V.
+        The comparator's input, which settles towards it.
     ramp_v : float64, shape (n,), V
-        V.
+        The ramp.
     high : bool, shape (n,)
         The comparator's output: whether the ramp has passed.
     """
@@ -434,13 +434,13 @@ class Converted(NamedTuple):
     Attributes
     ----------
     t_us : float64, shape (frames,), us
-        When each began, us, shape (frames,); a column is read as it is when its turn comes.
+        When each began; a column is read with the voltages at the time of its own conversion.
     ramp : uint32, shape (frames,), ticks
-        How long its ramp took, ticks, shape (frames,).
+        How long its ramp took.
     ticks : float64, shape (frames, rows, columns), ticks
-        When the comparators tripped, shape (frames, rows, columns), as `Converter.ticks`.
+        When the comparators tripped, as `Converter.ticks`.
     volts : float64, shape (frames, rows, columns), V
-        The voltages of the whole ticks that a counter shows, V: halfway to the next tick, 3 V at the end.
+        The voltages of the whole ticks that a counter shows: halfway to the next tick, 3 V at the end.
     """
 
     t_us: Values

@@ -49,7 +49,7 @@ class Played(NamedTuple):
 def truth(
     acts: Sequence[Act], *, preset: str | None = None, array: Array | None = None
 ) -> tuple[list[Contact], NDArray[np.float32]]:
-    """Return what really happens in acts: touches by the board's clock (us from its first frame), force (N) by frame.
+    """Return the truth of acts: touches by the board's clock (us from its first frame), and force (N) by frame.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ def _parts(acts: Sequence[Act], array: Array) -> list[Any]:
 
 
 def _warn(acts: Sequence[Act], narrow: list[tuple[int, str]]) -> None:
-    """Say of scenes, by number of the act, that a touch is too narrow."""
+    """Warn of scenes, by number of the act, in which a touch is too narrow."""
     for n, problem in narrow:
         act = acts[n]
         if isinstance(act, Scene):

@@ -13,7 +13,7 @@ from taxel.wire import Registers
 
 __all__ = ["Pipe"]
 
-#: Longer first lines are none, bytes.
+#: Largest length of the first line, bytes.
 _LONGEST_LINE = 1 << 16
 
 
@@ -60,7 +60,7 @@ class Pipe:
         self._registers = held.replace(noise_floor=floor)
 
     def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames' line has their rate
-        """Return what the board holds that scans such frames.
+        """Return the registers of a board that scans such frames.
 
         Parameters
         ----------

@@ -24,7 +24,7 @@ from taxel.wire import Registers
 
 __all__ = ["SceneFile"]
 
-#: What a file may hold beside what a scene holds.
+#: Keys of a file beside those of a scene.
 _OWN = ("seed", "preset", "tare_ms", "array", "taxels")
 _SCENE = ("surface", "cells_per_pitch", "foam", "bodies", "slant_deg", "downhill_deg", "lead_ms", "tail_ms")
 _TAXELS = (
@@ -40,7 +40,7 @@ _TAXELS = (
 )
 #: Silence between the tare and the scene, and after it, ms.
 _BEFORE_MS, _AFTER_MS = 250.0, 100.0
-#: As long as a scene's silences may be.
+#: The longest tare, ms: the limit of a scene's silences.
 _LONGEST_MS = 60_000.0
 
 
@@ -135,7 +135,7 @@ class SceneFile:
             {name: document[name] for name in _SCENE if name in document}
             | {"bodies": _bodies(document["bodies"], folder)}
         )
-        # Says what makes no sense before anything is played.
+        # Refuses what makes no sense here, instead of when the scene is played.
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
         if not np.isfinite(scene.motion(array=array).force_n).all():
             raise SceneError("foam: the force on it is beyond what a float32 holds; must be softer")
@@ -155,7 +155,7 @@ class SceneFile:
 
     @property
     def registers(self) -> Registers:
-        """What the board holds that plays it."""
+        """The registers of the board that plays it."""
         return fitting(self.preset, self.array)
 
     def acts(self) -> list[Act]:
@@ -164,7 +164,7 @@ class SceneFile:
 
     @property
     def options(self) -> dict[str, Any]:
-        """What `play` and `emulate` take beside acts and seed."""
+        """Arguments of `play` and `emulate` beside acts and seed."""
         return {"preset": self.preset, "tare_ms": self.tare_ms, "array": self.array, "sensor": self.sensor}
 
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, flag, instance, text, whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -69,7 +70,7 @@ def decode(
     Examples
     --------
     >>> decode(bytes.fromhex("c000050304 e000280304"))
-    Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+    Events(1 event, 500 to 500 us, 64 x 64 taxels, 1 intensity)
     >>> from taxel.simulate import Board
     >>> from taxel.wire import Registers
     >>> sent = Board(Registers(wire_version=2)).frame(np.full(4096, 40, np.uint16))
@@ -133,7 +134,7 @@ class Decoder:
     >>> decoder.push(bytes.fromhex("c000050304 e00028"))
     Events(0 events, no time, 64 x 64 taxels, no intensities)
     >>> decoder.push(bytes.fromhex("0304"))
-    Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+    Events(1 event, 500 to 500 us, 64 x 64 taxels, 1 intensity)
     >>> decoder.counts.words, decoder.counts.skipped
     (2, 0)
 
@@ -143,7 +144,7 @@ class Decoder:
     >>> ticks = np.zeros(4096, np.uint16)
     >>> ticks[board.array.index(3, 4)] = 40
     >>> [decoder.push(datagram) for datagram in board.frame(ticks)]
-    [Events(1 events, 0 to 0 us, 64 x 64 taxels, 1 intensities)]
+    [Events(1 event, 0 to 0 us, 64 x 64 taxels, 1 intensity)]
     >>> decoder.last, decoder.counts.intact, decoder.counts.missing
     (Received(until=192, intact=True), 1, 0)
     """
@@ -185,7 +186,7 @@ class Decoder:
         Examples
         --------
         >>> Decoder().push(bytes.fromhex("c000050304 e000280304"))
-        Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+        Events(1 event, 500 to 500 us, 64 x 64 taxels, 1 intensity)
         """
         stream = buffer_bytes(data)
         columns = Columns._fresh(_core.wire_rows(self.version, len(stream)))
@@ -287,5 +288,5 @@ class Decoder:
     def __repr__(self) -> str:
         c, size = self.counts, f"{self.array.rows} x {self.array.columns} taxels"
         if self.version == 2:
-            return f"Decoder(version 2, {size}, {c.intact} datagrams, {c.missing} missing)"
-        return f"Decoder({size}, {c.changes} events, {c.skipped} bytes skipped)"
+            return f"Decoder(version 2, {size}, {counted(c.intact, 'datagram')}, {c.missing} missing)"
+        return f"Decoder({size}, {counted(c.changes, 'event')}, {counted(c.skipped, 'byte')} skipped)"

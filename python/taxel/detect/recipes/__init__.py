@@ -1,4 +1,4 @@
-"""Recipes by name: what `taxel train` starts from where nothing else is asked for; one data file each.
+"""Recipes by name, one data file each: where none is named, `taxel train` chooses the one that fits the recording.
 
 A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", or units of frames), the
 encoder, what all neurons share (`learner`), what is a neuron's own (`neurons`), and whose parameters any `other` label
@@ -23,7 +23,7 @@ from taxel.frames import Frames
 
 __all__ = ["fitting", "for_labels", "names", "read"]
 
-#: What fits where no other recipe does: levels in shares of the running range ask for no unit.
+#: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
 
 

@@ -120,13 +120,13 @@ class Indentation:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Indentation:
-        """Return what `to_dict` gave."""
+        """Build an indentation from the values that `to_dict` returned."""
         return cls(**{**values, "silicone": Yeoh(**values["silicone"])})
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Hold what happened along an indentation's path; forces are by mm of thickness.
+    """Hold the results along an indentation's path; forces are by mm of thickness.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class Course:
     reaction : float64, shape (n, 2), mN/mm
         The force that moves the half disc: along x, and down.
     base : float64, shape (n, 2), mN/mm
-        The force that the base gives back, the same ways: the sum of all its nodes'.
+        The reaction of the base along the same axes: the sum over its nodes.
     x_mm : float64, shape (base nodes,)
     pressure_kpa, shear_kpa : float64, shape (n, base nodes)
         Normal traction on the base, force by length at rest: a node's reaction by the length that belongs to it.
@@ -194,7 +194,7 @@ class Course:
         """Return the true stress along the base, kPa (tension above 0)."""
         law, b = self.indentation.silicone, self.stretch
         shear = np.zeros_like(b)
-        # sigma_xy = 2 W' a b, and W' itself moves with a: twice around is exact to rounding at these strains.
+        # sigma_xy = 2 W' a b, and W' itself moves with a: two iterations are exact to rounding at these strains.
         for _ in range(20):
             slope = law.slope(shear**2 + b**2 + b**-2 - 2)
             shear = self.shear_kpa / (2 * slope)

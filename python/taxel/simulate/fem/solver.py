@@ -69,8 +69,8 @@ def march(
     ----------
     solids, contact
     held : int64
-        The unknowns that are given.
-    given : function of the path
+        The unknowns that are prescribed.
+    prescribed : function of the path
         Their values.
     paths : float64, mm, rising
 
@@ -83,7 +83,7 @@ def march(
     free = np.setdiff1d(np.arange(size), held)
     state = State(float(paths[0]), np.zeros(size), contact.apart(), np.zeros(size), np.zeros(size))
     yield state
-    # The first touch, of a point or two, is where Newton is lost most easily.
+    # Newton's method fails most easily at the first contact, of a point or two.
     last, cut = state, _FIRST_HALVINGS
     for goal in paths[1:]:
         begun = state.path
@@ -107,7 +107,7 @@ def march(
 
 @dataclass(frozen=True, eq=False)
 class _Residual:
-    """Hold what a displacement leaves of forces, and its derivative."""
+    """Hold the residual forces of a displacement, and their derivative."""
 
     u: NDArray[np.float64]
     total: NDArray[np.float64]
@@ -168,7 +168,7 @@ def _along(
     *,
     patient: bool,
 ) -> _Residual:
-    """Go a Newton step; part of it only where the whole goes wrong: where points come and go, Newton may circle."""
+    """Take a Newton step, shortened only where the full one fails: where contacts open and close, Newton may cycle."""
     norm = np.linalg.norm(here.total[free])
     best, fault = None, None
     for part in _PARTS:
