@@ -89,12 +89,12 @@ def test_the_parts_of_a_delay_sum_to_it():
         begin = math.ceil(stamp / FRAME_US) * FRAME_US
         physics = (begin - contact.start_us) / 1000
         assert -0.2 < physics < delay
-        assert evaluation.found.known[evaluation.found.label == "contact"][said] >= begin + FRAME_US - 1
+        assert evaluation.detections.known[evaluation.detections.label == "contact"][said] >= begin + FRAME_US - 1
 
 
 def test_noise_alone_says_nothing():
     quiet = evaluate_acts([Silence(5_050.3)], shipped(), seed=8)
-    assert len(quiet.found) == 0
+    assert len(quiet.detections) == 0
     assert len(quiet.plain) == 0
     assert 20 < len(quiet.events) / 5 < 400
 

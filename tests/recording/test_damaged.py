@@ -93,7 +93,7 @@ def test_a_bad_chunk_is_skipped_counted_and_said(tmp_path: Path) -> None:
     path.write_bytes(damaged)
     rec = taxel.open(path)
     assert rec.rebuilt["bad_chunks"] == 1
-    assert rec.verdict.startswith("LOST in the file: 1 bad chunks skipped")
+    assert rec.verdict.startswith("LOST in the file: 1 bad chunk skipped")
     assert not rec.truncated
     assert len(rec.events) < 1000
 

@@ -1,4 +1,4 @@
-"""Spiking neurons as classifiers: one a class, the one that is driven highest names the trial."""
+"""Spiking neurons as classifiers, one a class: the class of the highest potential is predicted."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class ConeRReadout(_NeuronAClass):
 
     Notes
     -----
-    Thesis 6.3.3. The class whose neuron's potential comes highest at the window's end is named.
+    Thesis 6.3.3. The class whose neuron's potential is highest at the window's end is predicted.
     """
 
     learners_: list[ConeR]
@@ -157,7 +157,7 @@ class TempotronReadout(_NeuronAClass):
 
     Notes
     -----
-    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is named.
+    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is predicted.
     """
 
     learners_: list[Tempotron]
@@ -195,24 +195,24 @@ def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
     list of SpikeTrains
         Time 0 is the trial's first event.
     """
-    kept = np.flatnonzero(spikes.bin < spikes.bins_to(window_us)[spikes.trial])
-    sign = (spikes.value[kept] < 0).astype(np.int64)
-    active, train = np.unique(2 * spikes.taxel[kept] + sign, return_inverse=True)
-    trial, times = spikes.trial[kept], spikes.bin[kept] * (to_ms(spikes.period_us))
+    inside = np.flatnonzero(spikes.bin < spikes.bins_to(window_us)[spikes.trial])
+    sign = (spikes.value[inside] < 0).astype(np.int64)
+    active, train = np.unique(2 * spikes.taxel[inside] + sign, return_inverse=True)
+    trial, times = spikes.trial[inside], spikes.bin[inside] * (to_ms(spikes.period_us))
     order = np.lexsort((times, train, trial))
     key = trial[order] * len(active) + train[order]
     offsets = np.searchsorted(key, np.arange(spikes.trials * len(active) + 1))
-    times, found = times[order], []
+    times, patterns = times[order], []
     for k in range(spikes.trials):
         own = offsets[k * len(active) : (k + 1) * len(active) + 1]
-        found.append(SpikeTrains(times[own[0] : own[-1]], own - own[0], 0.0, to_ms(window_us)))
-    return found
+        patterns.append(SpikeTrains(times[own[0] : own[-1]], own - own[0], 0.0, to_ms(window_us)))
+    return patterns
 
 
 def readout_responses(
     name: str, spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
 ) -> NDArray[np.generic]:
-    """Name each trial by neurons that were trained on the other folds.
+    """Predict each trial's label by neurons that were trained on the other folds.
 
     Parameters
     ----------
@@ -228,15 +228,15 @@ def readout_responses(
     """
     text("name", name, ("cone_r", "tempotron"))
     patterns = patterns_of(spikes, window_us)
-    found = np.empty_like(labels)
-    # Far shorter, and at the window's end nothing would be left of its beginning.
+    responses = np.empty_like(labels)
+    # With a far shorter constant the potential at the window's end would hold nothing of its beginning.
     tau = max(1.0, to_ms(window_us) / 3)
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
         model: Any = ConeRReadout(tau=tau) if name == "cone_r" else TempotronReadout(tau=tau)
         model.fit([patterns[k] for k in train], labels[train])
-        found[test] = model.predict([patterns[k] for k in test])
-    return found
+        responses[test] = model.predict([patterns[k] for k in test])
+    return responses
 
 
 def _listed(patterns: object) -> list[SpikeTrains]:

@@ -27,7 +27,7 @@ __all__ = ["EmulateOptions"]
 
 
 def _nothing(_: object) -> None:
-    """Ignore what a function that was left out would be called with."""
+    """Do nothing: the default of a callback."""
 
 
 def _path(name: str, path: str | os.PathLike[str]) -> str:
@@ -85,7 +85,7 @@ class EmulateOptions:
     touched: Callable[[list[Contact]], object] = _nothing
 
     def completed(self) -> EmulateOptions:
-        """Return them with the array of the touch and the registers that the board begins with."""
+        """Return the options with the array of the touch and the registers that the board begins with."""
         touch, registers = self.touch, self.registers
         if isinstance(touch, Replay | Pipe):
             array, preset = touch.array, touch.registers
