@@ -1,7 +1,7 @@
 """Studies: a protocol, its parameters, the published values as data, and a runner that gives all of them the rest.
 
-A study is a file of this folder whose `STUDY` is a `taxel_studies.study.Study`, and a line in
-`STUDIES`.
+A study is a module of this package, with the constants and functions that `taxel_studies.study.Study` lists, and a line
+in `STUDIES`.
 """
 
 from __future__ import annotations
@@ -86,5 +86,6 @@ DRAWN = {
 
 def load(name: str) -> Study:
     """Return a study by its name in `STUDIES`."""
-    study: Study = import_module(f"taxel_studies.{name.replace('.', '_')}").STUDY
-    return study
+    from taxel_studies.study import Study  # noqa: PLC0415  matplotlib loads slowly
+
+    return Study.of(name, STUDIES[name], import_module(f"taxel_studies.{name.replace('.', '_')}"))

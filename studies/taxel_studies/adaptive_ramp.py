@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.3.2"
+PROTOCOL = (
+    "64 columns and four rows of one channel, read by ramps of five lengths, or by one that adapts between 38 and "
+    "510 ticks: so long that the fastest taxel moves by four of its ticks in a frame. A taxel and its neighbours "
+    "are pressed slowly and held (fine control), then tapped for 6 ms (gross movement); lines are ideal, "
+    "comparators without hysteresis, no noise but that of whole ticks. The thesis states neither a rule nor a gain."
+)
 
 PARAMETERS: dict[str, Any] = {
     "ramps": [38, 75, 150, 300, 510],
@@ -31,6 +35,7 @@ PARAMETERS: dict[str, Any] = {
     "fine_ms": 500.0,
     "realisations": 10,
 }
+SIZES = {"toy": {"realisations": 2, "ramps": [38, 150, 510], "period_us": 40.0, "fine_ms": 200.0}}
 #: A tap counts as seen from this rise on, V (the least load that the thesis resolves, 4.4.1).
 SEEN_V = 0.1
 #: Silence before the first tap and between two, ms.
@@ -217,8 +222,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the two errors against each other, and a tap as the adaptive ramp and the gentlest read it."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     for name, one in summary["ramps"].items():
@@ -244,24 +247,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     right.step(course["t_ms"], course["ramp"], where="post", color="C3")
     right.set(xlabel="time since a tap, ms", ylabel="ramp, ticks")
     return figure
-
-
-STUDY = Study(
-    name="adaptive_ramp",
-    title="a ramp that adapts to the signal: steep in gross movement, gentle in fine control",
-    where="thesis 4.3.2",
-    protocol=(
-        "64 columns and four rows of one channel, read by ramps of five lengths, or by one that adapts between 38 and "
-        "510 ticks: so long that the fastest taxel moves by four of its ticks in a frame. A taxel and its neighbours "
-        "are pressed slowly and held (fine control), then tapped for 6 ms (gross movement); lines are ideal, "
-        "comparators without hysteresis, no noise but that of whole ticks. The thesis states neither a rule nor a gain."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"realisations": 2, "ramps": [38, 150, 510], "period_us": 40.0, "fine_ms": 200.0}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-)

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel import information
 from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
+from taxel_studies.codes import drop_tasks, kinds_of
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.5, 7.2 and Table 7.1"
+PROTOCOL = (
+    "Balls of three radii fall from three heights, 30 times each, on the emulated board, its taxels and the ball's "
+    "place drawn anew each time; once its lines are scanned at 5208 frames/s, once each taxel compares by itself "
+    "with what it sent last and stamps are of 1 us. Who listens takes each taxel's first rise after contact; linear"
+    " discriminants name ball and height from these latencies. Between two frames of the simulation a taxel's "
+    "reading lies on a straight line, noise and all: a comparator's own faster noise is not simulated."
+)
 
 PARAMETERS: dict[str, Any] = {
     "radii_mm": [25.0, 30.0, 35.0],
@@ -28,6 +34,7 @@ PARAMETERS: dict[str, Any] = {
     "place_mm": 2.67,
     "seed": 1,
 }
+SIZES = {"toy": {"radii_mm": [25.0, 35.0], "drops_mm": [200.0], "trials": 6, "windows_ms": [0.7, 2.0]}}
 #: Taxels of a side under the impact; address and sign of an event among 64 x 64, in bits.
 SIDE, EVENT_BITS = 20, 13
 #: Before a scene, ms: nothing is tared, since only changes are looked at.
@@ -45,13 +52,7 @@ COSTS = {
 
 def tasks(p: Parameters) -> list[Task]:
     """List one drop a task."""
-    shared = {"listen_ms": max(p["windows_ms"]), "preset": p["preset"], "place_mm": p["place_mm"]}
-    return [
-        Task({**shared, "radius_mm": r, "drop_mm": d}, 10_000 * p["seed"] + 1000 * (3 * i + j) + k)
-        for i, r in enumerate(p["radii_mm"])
-        for j, d in enumerate(p["drops_mm"])
-        for k in range(p["trials"])
-    ]
+    return drop_tasks(p, apart=1000, preset=p["preset"], place_mm=p["place_mm"])
 
 
 def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[float]]:
@@ -102,7 +103,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Estimate the bits of first-spike and relative latencies by window, and tell what the arrays cost."""
-    labels = [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
+    labels = kinds_of(rows)
     summary: Summary = {"most": float(np.log2(len(set(labels)))), "bits": {}, "costs": {}}
     longest = max(p["windows_ms"])
     for array in ARRAYS:
@@ -212,8 +213,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the bits over time since contact, of both arrays."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     figure = Figure(figsize=(9, 3.8), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
@@ -232,25 +231,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     axes[0].set_ylabel("bits")
     axes[0].legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="asynchronous",
-    title="an array whose taxels compare by themselves: bits of a touch, and what they cost",
-    where="thesis 4.5, 7.2 and Table 7.1",
-    protocol=(
-        "Balls of three radii fall from three heights, 30 times each, on the emulated board, its taxels and the ball's "
-        "place drawn anew each time; once its lines are scanned at 5208 frames/s, once each taxel compares by itself "
-        "with what it sent last and stamps are of 1 us. Who listens takes each taxel's first rise after contact; linear"
-        " discriminants name ball and height from these latencies. Between two frames of the simulation a taxel's "
-        "reading lies on a straight line, noise and all: a comparator's own faster noise is not simulated."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"radii_mm": [25.0, 35.0], "drops_mm": [200.0], "trials": 6, "windows_ms": [0.7, 2.0]}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-)

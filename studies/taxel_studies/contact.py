@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.encode import FA1
@@ -14,14 +17,18 @@ from taxel.frames import Frames
 from taxel.simulate.fem import Course, KeptCourses, SamplingGrid, Yeoh, bodies
 from taxel.simulate.fem.solids import Solids
 from taxel_studies import indented
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2"
+PROTOCOL = (
+    "Finite elements of our own: plane stress, incompressible Yeoh (Table 5.2), bilinear quadrilaterals, contact "
+    "with friction 0.7, quasi-static. The block is 16 mm wide and 5 mm high and its base is held; the half disc's "
+    "flat top is moved along the path. 75 paths serve the 300 conditions, as each depth is reached in 100 ms. "
+    "Pressure is the normal traction at the base. What the thesis leaves open stands on the page Readings, and how "
+    "much each choice matters in the study contact_choices. Courses are kept beside the report and shared by "
+    "figures 5.5 to 5.8."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -29,6 +36,10 @@ PARAMETERS: dict[str, Any] = {
     "period_ms": 0.5,
     "alpha": 0.7,
     "seed": 1,
+}
+SIZES = {
+    "coarse": indented.COARSE,
+    "toy": {**indented.TOY, "drawn": {"diameter_mm": 2.0, "modulus_kpa": 50.0, "angle_deg": 10.0, "depth_mm": 0.5}},
 }
 #: A force on the base counts as equal to the one on the disc within this share of it.
 ROUNDING = 1e-8
@@ -38,10 +49,7 @@ PICTURE_MS, PICTURE_MM, GRIDS = 0.4, 0.1, 3
 COLOURS = ("C3", "C1", "C9")
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one course a path."""
-    del courses
-    return indented.course_tasks(list(indented.courses_of(p).values()))
+tasks = indented.tasks
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
@@ -191,9 +199,6 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
 
 
 def _draw_model(p: Parameters, model: dict[str, Any]) -> Figure:
-    from matplotlib.collections import PolyCollection  # noqa: PLC0415  loads slowly
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
     figure = Figure(figsize=(8, 7), layout="constrained")
     axes: Sequence[Axes] = figure.subplots(2, 1, sharex=True)
     quads, drawn = np.array(model["quads"]), p["drawn"]
@@ -232,8 +237,6 @@ def _draw_model(p: Parameters, model: dict[str, Any]) -> Figure:
 
 
 def _draw_spikes(sampled: dict[str, Any], p: Parameters) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 4), layout="constrained")
     ax = figure.subplots()
     rho, period = np.array(sampled["rho"]), p["period_ms"]
@@ -251,8 +254,6 @@ def _draw_spikes(sampled: dict[str, Any], p: Parameters) -> Figure:
 
 
 def _draw_grid(sampled: dict[str, Any]) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 4), layout="constrained")
     ax = figure.subplots()
     picture = np.array(sampled["picture"])
@@ -267,29 +268,3 @@ def _draw_grid(sampled: dict[str, Any]) -> Figure:
     ax.set_ylabel("place at the base, mm")
     ax.set_title("three draws of the sub-sampling grid (here every 5 ms) over one course")
     return figure
-
-
-STUDY = Study(
-    name="contact",
-    title="a half disc pressed on silicone, sampled by taxels at its base (5.1 to 5.4)",
-    where="thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2",
-    protocol=(
-        "Finite elements of our own: plane stress, incompressible Yeoh (Table 5.2), bilinear quadrilaterals, contact "
-        "with friction 0.7, quasi-static. The block is 16 mm wide and 5 mm high and its base is held; the half disc's "
-        "flat top is moved along the path. 75 paths serve the 300 conditions, as each depth is reached in 100 ms. "
-        "Pressure is the normal traction at the base. What the thesis leaves open stands on the page Readings, and how "
-        "much each choice matters in the study contact_choices. Courses are kept beside the report and shared by "
-        "figures 5.5 to 5.8."
-    ),
-    parameters=PARAMETERS,
-    sizes={
-        "coarse": indented.COARSE,
-        "toy": {**indented.TOY, "drawn": {"diameter_mm": 2.0, "modulus_kpa": 50.0, "angle_deg": 10.0, "depth_mm": 0.5}},
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    courses=True,
-)

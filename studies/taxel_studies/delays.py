@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.learn import ConeX
 from taxel.neuron import Neuron
@@ -13,12 +14,17 @@ from taxel.spikes import SpikeTrains
 from taxel_studies.capacity import DURATION_MS, patterns, satisfied, weakest
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "ours; the thesis has no delays"
+PROTOCOL = (
+    "Patterns and targets of 6.4.4: one spike an input on a random whole ms from 1 to 200, class c of C shall fire "
+    "once at 200 c / (C + 1) ms. Each input arrives as it is; or put off by one random delay of its own; or "
+    "several times, at delays spaced evenly from 0 to the longest, each copy with a weight. Load: the largest p, a "
+    "multiple of C, at which all realisations are feasible, p over inputs. Selection: at given loads the weights "
+    "of least l1 norm; p over the weights that are not 0. Table 6.1, bounds ±0.3 mV a copy, silence at every "
+    "instant from 0 to 200 ms."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 30,
@@ -30,6 +36,7 @@ PARAMETERS: dict[str, Any] = {
     "time": "continuous",
 }
 TOY: dict[str, Any] = {"realisations": 2, "inputs": [40], "copies": [3], "shares": [0.1]}
+SIZES = {"toy": TOY}
 #: A weight below it is none, mV: a millionth of the bound.
 NONE = 3e-7
 #: On gait, where nothing selects: feet off of gaitndd within 10 ms, % (the notes to the gait study).
@@ -197,8 +204,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw loads by inputs, and patterns a weight by load."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     for line in summary["lines"]:
@@ -211,25 +216,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     )
     left.legend(fontsize="small", title="delays")
     return figure
-
-
-STUDY = Study(
-    name="delays",
-    title="what learnt delays buy: copies of every input, chosen from by l1",
-    where="ours; the thesis has no delays",
-    protocol=(
-        "Patterns and targets of 6.4.4: one spike an input on a random whole ms from 1 to 200, class c of C shall fire "
-        "once at 200 c / (C + 1) ms. Each input arrives as it is; or put off by one random delay of its own; or "
-        "several times, at delays spaced evenly from 0 to the longest, each copy with a weight. Load: the largest p, a "
-        "multiple of C, at which all realisations are feasible, p over inputs. Selection: at given loads the weights "
-        "of least l1 norm; p over the weights that are not 0. Table 6.1, bounds ±0.3 mV a copy, silence at every "
-        "instant from 0 to 200 ms."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -43,11 +43,11 @@ __all__ = [
     "named",
     "named_by_neighbours",
     "pictures",
-    "play_tasks",
     "played",
     "sampled",
     "smoothed",
     "spatial_grams",
+    "tasks",
 ]
 
 #: 5.6.2's experiment: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
@@ -155,13 +155,13 @@ def conditions(p: Mapping[str, Any]) -> list[Condition]:
     return [Condition(*one) for one in product(p["balls_mm"], p["heights_mm"], p["slants_deg"])]
 
 
-def play_tasks(p: Mapping[str, Any]) -> list[Task]:
+def tasks(p: Mapping[str, Any]) -> list[Task]:
     """List one realisation a condition: all its drops."""
     return [Task({**named(p), "condition": list(one)}, p["seed"]) for one in conditions(p)]
 
 
 def played_summary(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
-    """Return the events and contact times of the drops of a realisation of `play_tasks`; None for another one."""
+    """Return the events and contact times of the drops of a realisation of `tasks`; None for another one."""
     if "condition" not in params:
         return None
     drops = played(params, Condition(*params["condition"]), seed, folder, rig)

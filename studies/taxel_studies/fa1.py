@@ -7,22 +7,26 @@ everything: adapting threshold, polarity, power law, and a spread of their thres
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel import information
 from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
-from taxel_studies.codes import PERIOD_US, SIDE, drop, since_contact
+from taxel_studies.codes import PERIOD_US, SIDE, drop, drop_tasks, kinds_of, since_contact
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 7.2, which asks it"
+PROTOCOL = (
+    "The drops of the study codes. FA-1 (Table 5.3), one sample a frame of 192 us, thresholds spread by a "
+    "factor with the log-sd given, drawn once. Taken away: the threshold's rise and decay (A and B 0), the sign of "
+    "spikes, the power law (alpha 1), the spread. Discriminants on counts and on first-spike latencies, 10 folds; the "
+    "more telling of the two; bits corrected, 95 % intervals over trials."
+)
 
 PARAMETERS: dict[str, Any] = {
     "radii_mm": [25.0, 30.0, 35.0],
@@ -31,6 +35,10 @@ PARAMETERS: dict[str, Any] = {
     "windows_ms": [2.0, 5.0, 20.0],
     "spread": 0.3,
     "seed": 1,
+}
+SIZES = {
+    "quick": {"trials": 10},
+    "toy": {"trials": 3, "drops_mm": [100.0, 200.0], "radii_mm": [25.0, 35.0], "windows_ms": [5.0]},
 }
 
 #: What is taken away, in the words of the page.
@@ -63,16 +71,7 @@ def spikes(frames: Frames, without: str, spread: float) -> SpikeTrains:
 
 def tasks(p: Parameters) -> list[Task]:
     """List one drop a task."""
-    listen = max(p["windows_ms"])
-    return [
-        Task(
-            {"radius_mm": r, "drop_mm": d, "listen_ms": listen, "spread": p["spread"]},
-            10_000 * p["seed"] + 100 * (3 * i + j) + k,
-        )
-        for i, r in enumerate(p["radii_mm"])
-        for j, d in enumerate(p["drops_mm"])
-        for k in range(p["trials"])
-    ]
+    return drop_tasks(p, spread=p["spread"])
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, list[list[float]]]:
@@ -86,7 +85,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, list[list[float]]]:
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Estimate bits and count events by what was taken away and by window."""
-    labels = [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
+    labels = kinds_of(rows)
     folds, resolution = min(10, p["trials"]), PERIOD_US * 1e-3
     summary: Summary = {"most": float(np.log2(len(set(labels)))), "bits": {}, "events": {}}
     for without in VARIANTS:
@@ -147,8 +146,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw bits over events."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     figure = Figure(figsize=(6.5, 4), layout="constrained")
     axes = figure.subplots()
@@ -162,25 +159,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     axes.set(xscale="log", xlabel="events of a touch, in windows of rising length", ylabel="bits")
     axes.legend(loc="lower right")
     return figure
-
-
-STUDY = Study(
-    name="fa1",
-    title="which properties of FA-1 are worth keeping, in bits and in events",
-    where="thesis 7.2, which asks it",
-    protocol="The drops of the study codes. FA-1 (Table 5.3), one sample a frame of 192 us, thresholds spread by a "
-    "factor with the log-sd given, drawn once. Taken away: the threshold's rise and decay (A and B 0), the sign of "
-    "spikes, the power law (alpha 1), the spread. Discriminants on counts and on first-spike latencies, 10 folds; the "
-    "more telling of the two; bits corrected, 95 % intervals over trials.",
-    parameters=PARAMETERS,
-    sizes={
-        "quick": {"trials": 10},
-        "toy": {"trials": 3, "drops_mm": [100.0, 200.0], "radii_mm": [25.0, 35.0], "windows_ms": [5.0]},
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    tables=tables,
-    draw=draw,
-)

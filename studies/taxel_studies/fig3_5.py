@@ -5,21 +5,26 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.encode import ThresholdIzhikevich
 from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
 from taxel_studies.fabric_array import PERIOD_US, SENSOR, depth_of, pressed, read
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 3.5 and 3.6.1, figures 3.5 and 3.6"
+PROTOCOL = (
+    "Spheres of 65 and 105 mm pressed to the depths of 1 N and 4 N into 10 mm of foam under the 8 x 8 array, 200 "
+    "trials each, at 10 mm/s; dividers at 10 kHz, threshold, Izhikevich pairs; Tempotron (tau 25 and 6.25 ms, rate "
+    "1e-4, threshold 1, no momentum) that is to fire for the larger, half of the trials for training, 10 splits, "
+    "at most 200 epochs. Trials differ in place (0.5 mm), depth (0.03 mm), speed (5 %), begin and noise (ours). "
+    "Beside it, other values of what the thesis leaves open: a faster press and softer foam."
+)
 
 PARAMETERS: dict[str, Any] = {
     **SENSOR,
@@ -42,6 +47,15 @@ PARAMETERS: dict[str, Any] = {
         "foam of 30 kPa": {"foam_kpa": 30.0},
         "100 mm/s, foam of 30 kPa": {"speed_mm_s": 100.0, "foam_kpa": 30.0},
     },
+}
+SIZES = {
+    "toy": {
+        "trials": 12,
+        "realisations": 2,
+        "epochs": 40,
+        "forces_n": [1.0],
+        "others": {"foam of 30 kPa": {"foam_kpa": 30.0}},
+    }
 }
 #: Accuracy and its standard deviation by force, % (3.6.1).
 PUBLISHED = {1.0: (99.65, 0.41), 4.0: (99.1, 1.41)}
@@ -215,8 +229,6 @@ def tables(_p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 3.5, accuracy by force, and 3.6, training error over epochs."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     accuracy, curves = (Figure(figsize=(6, 3.6), layout="constrained") for _ in range(2))
     ax = accuracy.subplots()
     lines = [{**line, "reading": "ours"} for line in summary["forces"]] + summary["others"]
@@ -249,33 +261,3 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
     ax.set(xlabel="epoch", ylabel="training error, %")
     ax.legend(fontsize="small")
     return [accuracy, curves]
-
-
-STUDY = Study(
-    name="fig3.5",
-    title="two spheres told apart by a Tempotron from first spikes of the fabric array",
-    where="thesis 3.5 and 3.6.1, figures 3.5 and 3.6",
-    protocol=(
-        "Spheres of 65 and 105 mm pressed to the depths of 1 N and 4 N into 10 mm of foam under the 8 x 8 array, 200 "
-        "trials each, at 10 mm/s; dividers at 10 kHz, threshold, Izhikevich pairs; Tempotron (tau 25 and 6.25 ms, rate "
-        "1e-4, threshold 1, no momentum) that is to fire for the larger, half of the trials for training, 10 splits, "
-        "at most 200 epochs. Trials differ in place (0.5 mm), depth (0.03 mm), speed (5 %), begin and noise (ours). "
-        "Beside it, other values of what the thesis leaves open: a faster press and softer foam."
-    ),
-    parameters=PARAMETERS,
-    sizes={
-        "toy": {
-            "trials": 12,
-            "realisations": 2,
-            "epochs": 40,
-            "forces_n": [1.0],
-            "others": {"foam of 30 kPa": {"foam_kpa": 30.0}},
-        }
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.3.2, figure 4.3"
+PROTOCOL = (
+    "One comparator with 0.1 V of hysteresis, a ramp of 150 ticks of 1/300 us that ends at 3 V: the board's RC "
+    "curve towards 5 V, and a straight one. Inputs from 0.5 to 3.4 V, each settled."
+)
 
 PARAMETERS: dict[str, Any] = {
     "shapes": ["rc", "linear"],
@@ -24,6 +26,7 @@ PARAMETERS: dict[str, Any] = {
     "points": 291,
     "drawn_v": 2.0,
 }
+SIZES = {"toy": {"points": 59}}
 #: Ticks of the counter in 1 us.
 TICKS_A_US = 300.0
 
@@ -100,8 +103,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw one conversion as 4.3 does, and the time against the input for both ramps."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     seen = next(iter(summary["shapes"].values()))["trace"]
@@ -115,21 +116,3 @@ def draw(_p: Parameters, summary: Summary) -> Figure:
     right.set(xlabel="V_in, V", ylabel="t_elapsed, us")
     right.legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="fig4.3",
-    title="single-slope conversion: the time until the ramp passes grows with the input",
-    where="thesis 4.3.2, figure 4.3",
-    protocol=(
-        "One comparator with 0.1 V of hysteresis, a ramp of 150 ticks of 1/300 us that ends at 3 V: the board's RC "
-        "curve towards 5 V, and a straight one. Inputs from 0.5 to 3.4 V, each settled."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"points": 59}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

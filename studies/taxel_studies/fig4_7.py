@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.4.1, figure 4.7"
+PROTOCOL = (
+    "(a) 0.5 N within 5 us on one taxel whose fabric answers 50 us late. (b) One comparator reads four lines, "
+    "loaded by 0.02, 0.6, 0.1 and 0.3 N, 0.75 us each, at 3 us a column; settled is within 2 % of the step. Then "
+    "the same with amplifiers of 47 kOhm x 15 pF, and a column at rest behind the loaded one."
+)
 
 PARAMETERS: dict[str, Any] = {
     "delay_us": 50.0,
@@ -25,6 +28,7 @@ PARAMETERS: dict[str, Any] = {
     "every_us": 0.002,
     "settled": 0.02,
 }
+SIZES = {"toy": {"every_us": 0.01}}
 #: When the thesis' input has settled, us.
 SETTLED_US = 0.2
 
@@ -126,8 +130,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw 4.7: the impact, and one comparator's input, ramp and output over a column."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=[1, 1.6])
     left.plot(summary["impact"]["t_us"], summary["impact"]["volts"], color="C2")
@@ -141,22 +143,3 @@ def draw(_p: Parameters, summary: Summary) -> Figure:
     right.set(xlabel="time since the column's change, us", ylabel="V", title="(b)")
     right.legend(fontsize="small", loc="upper right")
     return figure
-
-
-STUDY = Study(
-    name="fig4.7",
-    title="the transducer's answer to an impact, and settling while four channels are multiplexed",
-    where="thesis 4.4.1, figure 4.7",
-    protocol=(
-        "(a) 0.5 N within 5 us on one taxel whose fabric answers 50 us late. (b) One comparator reads four lines, "
-        "loaded by 0.02, 0.6, 0.1 and 0.3 N, 0.75 us each, at 3 us a column; settled is within 2 % of the step. Then "
-        "the same with amplifiers of 47 kOhm x 15 pF, and a column at rest behind the loaded one."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"every_us": 0.01}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

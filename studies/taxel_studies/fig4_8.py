@@ -4,21 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.information import confusion_matrix, nested_predictions, panzeri_treves
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.4.2, figures 4.8 and 4.10"
+PROTOCOL = (
+    "A tennis ball (65 mm, 56 g) falls from 40 and 80 cm on the emulated board at 2 kHz, level and tilted by 30 "
+    "degrees, 100 times each, under the 10 mm of foam of 4.3.1; it gives by a spring of 25 N/mm, as a rigid one "
+    "would crush the foam. By guess, heights and places vary by 5 mm (standard deviations). 17 x 17 taxels around "
+    "the first that answered, 40 ms from the impact's first frame on (the first in which three taxels rise: one "
+    "alone may be noise), as ticks above those before it. Slower sampling: what the host holds is looked at every "
+    "so often, from that frame on, as the thesis resampled its films; beside it, from any phase on. Linear "
+    "discriminants of the pictures, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
+    "by Panzeri and Treves."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TENNIS_TABLE,
@@ -27,6 +36,7 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 TOY: dict[str, Any] = {**dropped.TENNIS_TOY, "periods_ms": [2.0, 40.0]}
+SIZES = {"toy": TOY}
 #: Figure 4.8: pictures a ms, so many.
 PICTURE_MS, PICTURES = 1.0, 8
 #: 100 Hz, which 4.4.2 names.
@@ -39,15 +49,12 @@ AROUND = 3.0
 PHASES = 410
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one realisation a condition."""
-    del courses
-    return dropped.play_tasks(p)
+tasks = dropped.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List one realisation a period: sampled from the impact on, and from any phase on."""
-    del rows, courses
+    del rows
     return [
         Task({**dropped.named(p), "period_ms": period, "aligned": aligned}, p["seed"])
         for period in sorted(p["periods_ms"])
@@ -173,8 +180,6 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
 
 
 def _draw_pictures(p: Parameters, summary: Summary) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 5), layout="constrained")
     axes = figure.subplots(2, PICTURES // 2).ravel()
     pictures = np.array(summary["pictures"])[1:].reshape(PICTURES, TENNIS.region, TENNIS.region)
@@ -190,8 +195,6 @@ def _draw_pictures(p: Parameters, summary: Summary) -> Figure:
 
 
 def _draw_bits(summary: Summary) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6, 4), layout="constrained")
     ax = figure.subplots()
     rates = [1000 / line["period_ms"] for line in summary["lines"]]
@@ -206,29 +209,3 @@ def _draw_bits(summary: Summary) -> Figure:
     ax.set_title("figure 4.10")
     ax.legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="fig4.8",
-    title="a tennis ball dropped on the array: its pictures, and its bits by sampling rate (4.8, 4.10)",
-    where="thesis 4.4.2, figures 4.8 and 4.10",
-    protocol=(
-        "A tennis ball (65 mm, 56 g) falls from 40 and 80 cm on the emulated board at 2 kHz, level and tilted by 30 "
-        "degrees, 100 times each, under the 10 mm of foam of 4.3.1; it gives by a spring of 25 N/mm, as a rigid one "
-        "would crush the foam. By guess, heights and places vary by 5 mm (standard deviations). 17 x 17 taxels around "
-        "the first that answered, 40 ms from the impact's first frame on (the first in which three taxels rise: one "
-        "alone may be noise), as ticks above those before it. Slower sampling: what the host holds is looked at every "
-        "so often, from that frame on, as the thesis resampled its films; beside it, from any phase on. Linear "
-        "discriminants of the pictures, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
-        "by Panzeri and Treves."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    courses=True,
-)

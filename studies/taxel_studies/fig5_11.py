@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.array import Array
@@ -16,12 +17,19 @@ from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13"
+PROTOCOL = (
+    "The drops of the study drops. What the host holds is looked at every so often from the impact's first frame "
+    "on; a change above the board's noise floor since the last one that was sent is an event, rises and falls "
+    "apart. Trains are smoothed in time (5.8) and over taxels (5.11, a train counting twice at its own taxel, as "
+    "printed), and compared by the Euclidean norm over taxels and time that 5.12's left side names; each drop is "
+    "named by most of its 5 nearest others (the thesis gives no number). Bits of these answers, corrected by "
+    "Panzeri and Treves. Tau and sigma are searched at each period on the same drops, as in the thesis. Beside "
+    "it: sampling begun at any phase, and the absolute differences of 5.10 as printed, at the best tau and sigma."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TABLE,
@@ -49,6 +57,7 @@ TOY: dict[str, Any] = {
     "times_ms": [5.0, 50.0],
     "absolute_ms": [20.0],
 }
+SIZES = {"coarse": COARSE, "toy": TOY}
 #: The parameters of a drop, in the words of figure 5.12.
 VARIED = {"ball_mm": "ball", "height_mm": "height", "slant_deg": "slant"}
 #: What 5.6.3 found best: period, tau (ms), sigma (mm).
@@ -61,15 +70,11 @@ MARKED_MS = 5.0
 ALIKE = 0.02
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one realisation a condition: all its drops."""
-    del courses
-    return dropped.play_tasks(p)
+tasks = dropped.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List the search, one realisation a period and tau; then details at each period's best."""
-    del courses
     shared = {**dropped.named(p), "neighbours": p["neighbours"]}
     found: dict[float, dict[tuple[float, float], float]] = {}
     for row in rows:
@@ -327,29 +332,3 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
         times_ms=p["times_ms"],
         since="impact",
     )
-
-
-STUDY = Study(
-    name="fig5.11",
-    title="bits of a drop by sampling period, by parameter, and by time since impact (5.11 to 5.13)",
-    where="thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13",
-    protocol=(
-        "The drops of the study drops. What the host holds is looked at every so often from the impact's first frame "
-        "on; a change above the board's noise floor since the last one that was sent is an event, rises and falls "
-        "apart. Trains are smoothed in time (5.8) and over taxels (5.11, a train counting twice at its own taxel, as "
-        "printed), and compared by the Euclidean norm over taxels and time that 5.12's left side names; each drop is "
-        "named by most of its 5 nearest others (the thesis gives no number). Bits of these answers, corrected by "
-        "Panzeri and Treves. Tau and sigma are searched at each period on the same drops, as in the thesis. Beside "
-        "it: sampling begun at any phase, and the absolute differences of 5.10 as printed, at the best tau and sigma."
-    ),
-    parameters=PARAMETERS,
-    sizes={"coarse": COARSE, "toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-    courses=True,
-)

@@ -5,20 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.encode import FA1
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented, kept_bits
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 5.5.1 and 5.5.3, figures 5.5, 5.6 and 5.8"
+PROTOCOL = (
+    "The courses of the study contact, each condition sampled at random phases and places (figure 5.3); FA-1 with "
+    "Table 5.3's constants, theta_0 from the largest pressure of all; linear discriminants on the rasters, ten "
+    "folds; bits of their answers, corrected by Panzeri and Treves. Samples of a condition are shifts of one "
+    "course, so what is measured is interpolation, as in the thesis. Alpha is searched over the thesis' 13 values "
+    "at 2 ms and longer, below that around the best of those. A sample of rest comes before the first. At .2 ms "
+    "(the thesis' own step) only the first 20 ms are sampled, at the alpha of the shortest period."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -41,6 +48,7 @@ TOY: dict[str, Any] = {
     "times_ms": [20.0, 100.0],
     "part_period_ms": 2.5,
 }
+SIZES = {"coarse": {**indented.COARSE, "samples": 100, "alphas": [0.3, 0.5, 0.7, 0.9, 1.1]}, "toy": TOY}
 #: The parameters of a contact, in the words of figure 5.6.
 VARIED = {"diameter_mm": "radius", "modulus_kpa": "hardness", "depth_mm": "depth", "angle_deg": "slant"}
 #: Table 5.3's.
@@ -51,15 +59,11 @@ BITS_AT_10_MS = 6.0
 AROUND_100_HZ = (50.0, 200.0)
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one course a path."""
-    del courses
-    return indented.course_tasks(list(indented.courses_of(p).values()))
+tasks = indented.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List every alpha at the longer periods; then the best of those and its neighbours; then details at the best."""
-    del courses
     shared = indented.shared(p, rows)
     found: dict[float, dict[float, float]] = {}
     for row in rows:
@@ -302,28 +306,3 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
         times_ms=p["times_ms"],
         since="contact",
     )
-
-
-STUDY = Study(
-    name="fig5.5",
-    title="bits of an indentation by sampling period, by parameter, and by time since contact (5.5, 5.6, 5.8)",
-    where="thesis 5.5.1 and 5.5.3, figures 5.5, 5.6 and 5.8",
-    protocol=(
-        "The courses of the study contact, each condition sampled at random phases and places (figure 5.3); FA-1 with "
-        "Table 5.3's constants, theta_0 from the largest pressure of all; linear discriminants on the rasters, ten "
-        "folds; bits of their answers, corrected by Panzeri and Treves. Samples of a condition are shifts of one "
-        "course, so what is measured is interpolation, as in the thesis. Alpha is searched over the thesis' 13 values "
-        "at 2 ms and longer, below that around the best of those. A sample of rest comes before the first. At .2 ms "
-        "(the thesis' own step) only the first 20 ms are sampled, at the alpha of the shortest period."
-    ),
-    parameters=PARAMETERS,
-    sizes={"coarse": {**indented.COARSE, "samples": 100, "alphas": [0.3, 0.5, 0.7, 0.9, 1.1]}, "toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-    courses=True,
-)

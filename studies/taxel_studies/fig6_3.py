@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.learn import ConeR, ConeX
@@ -13,12 +14,15 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.3.4, figure 6.3"
+PROTOCOL = (
+    "Two synapses with one spike each, at 5 and 12 ms, one target at 20 ms; Table 6.1 but bounds of ±1 mV (with "
+    "±0.3 mV two inputs cannot reach the threshold: 2 x 0.3 x 0.368 = 0.22 mV), rows on a grid of 1 ms. The "
+    "surfaces are stated with NumPy from 6.5, 6.8, 6.11 and 6.14, apart from the learners; dots are the learners' "
+    "optima."
+)
 
 PARAMETERS: dict[str, Any] = {
     "inputs_at": [5.0, 12.0],
@@ -29,6 +33,7 @@ PARAMETERS: dict[str, Any] = {
     "lambdas_r": [2.0, 2.0, 100.0, 100.0, 100.0],
     "points": 101,
 }
+SIZES = {"toy": {"points": 41}}
 #: Delta t of Table 6.1, ms.
 DELTA_T: float = LEARN["delta_t_ms"]
 
@@ -198,8 +203,6 @@ def _bend(surface: NDArray[np.float64]) -> float:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.3: left CONE-X with its line, right CONE-R; below them the same from above."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(12, 10.5), layout="constrained")
     for number, (learner, title) in enumerate((("cone_x", "CONE-X"), ("cone_r", "CONE-R")), 1):
         found = summary[learner]
@@ -231,23 +234,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, fontsize="small", loc="outside upper center", ncols=3)
     return figure
-
-
-STUDY = Study(
-    name="fig6.3",
-    title="the objectives of CONE-X and CONE-R over two weights",
-    where="thesis 6.3.4, figure 6.3",
-    protocol=(
-        "Two synapses with one spike each, at 5 and 12 ms, one target at 20 ms; Table 6.1 but bounds of ±1 mV (with "
-        "±0.3 mV two inputs cannot reach the threshold: 2 x 0.3 x 0.368 = 0.22 mV), rows on a grid of 1 ms. The "
-        "surfaces are stated with NumPy from 6.5, 6.8, 6.11 and 6.14, apart from the learners; dots are the learners' "
-        "optima."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"points": 41}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -32,6 +32,7 @@ __all__ = [
     "shared",
     "summed",
     "table_of",
+    "tasks",
     "varying",
 ]
 
@@ -76,6 +77,11 @@ def courses_of(p: Mapping[str, Any], **settings: Any) -> dict[tuple[float, float
 def course_tasks(asked: Sequence[Indentation]) -> list[Task]:
     """List one realisation a course, the largest first."""
     return [Task({_COURSE: i.to_dict()}) for i in sorted(asked, key=lambda i: -i.diameter_mm)]
+
+
+def tasks(p: Mapping[str, Any]) -> list[Task]:
+    """List one realisation a path of a table of contacts."""
+    return course_tasks(list(courses_of(p).values()))
 
 
 def make(params: Mapping[str, Any], courses: Path) -> Course | None:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.information import confusion_matrix, panzeri_treves, plug_in
 from taxel_studies.study import Summary, logarithmic
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["by_period_parameter_and_time", "information", "listed", "lost", "shares"]
 
@@ -67,8 +65,6 @@ def by_period_parameter_and_time(
     times_ms : of the third, ms
     since : what times count from
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     lines = summary["lines"]
     periods = [line["period_ms"] for line in lines]
     labels = ("bits", "share of the largest possible bits", "bits")

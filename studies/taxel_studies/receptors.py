@@ -8,20 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.encode import FA1, FA2, SA1, SA2, Encoder
 from taxel.frames import Frames
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1"
+PROTOCOL = (
+    "One afferent a type, with its defaults, every 0.2 ms; FA-1's threshold decays by the ms. Half of the "
+    "range is pressed within 5 or 200 ms, held for 1 s and let go: spikes by phase. Sines from contact on, 200 sizes: "
+    "the least that gives a spike in every cycle. Times and thresholds of SA-1 and FA-2 were fitted to these published "
+    "frequencies, so that they agree is no discovery; FA-1 is the thesis', and was fitted to nothing."
+)
 
 PARAMETERS: dict[str, Any] = {
     "kinds": ["SA-1", "FA-1", "SA-2", "FA-2"],
@@ -30,6 +34,7 @@ PARAMETERS: dict[str, Any] = {
     "ramps_ms": [5.0, 200.0],
     "period_ms": 0.2,
 }
+SIZES = {"toy": {"frequencies_hz": [5, 34, 225], "amplitudes": 12}}
 #: Full scale of all of them, kPa, and how high the ramp goes.
 RANGE, HELD = 100.0, 50.0
 #: When the ramp begins, how long the hold lasts, ms.
@@ -165,8 +170,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw thresholds over frequency."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6.5, 4), layout="constrained")
     axes = figure.subplots()
     for kind, one in summary.items():
@@ -176,22 +179,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     axes.set(xscale="log", yscale="log", xlabel="frequency, Hz", ylabel="threshold, share of range, peak to peak")
     axes.legend()
     return figure
-
-
-STUDY = Study(
-    name="receptors",
-    title="what SA-1, FA-1, SA-2 and FA-2 answer to: phases of a ramp-and-hold, thresholds against frequency",
-    where="thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1",
-    protocol="One afferent a type, with its defaults, every 0.2 ms; FA-1's threshold decays by the ms. Half of the "
-    "range is pressed within 5 or 200 ms, held for 1 s and let go: spikes by phase. Sines from contact on, 200 sizes: "
-    "the least that gives a spike in every cycle. Times and thresholds of SA-1 and FA-2 were fitted to these published "
-    "frequencies, so that they agree is no discovery; FA-1 is the thesis', and was fitted to nothing.",
-    parameters=PARAMETERS,
-    sizes={"toy": {"frequencies_hz": [5, 34, 225], "amplitudes": 12}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    tables=tables,
-    draw=draw,
-)

@@ -7,20 +7,24 @@ such runs end with a neuron that fires at nearly every pattern, early in it, and
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.learn import STDP
 from taxel.spikes import SpikeTrains
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, one_task_per_seed
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377"
+PROTOCOL = (
+    "2000 inputs, Poisson at rates that wander between 0 and 90 Hz (speed within 1800 Hz/s, changed by up to "
+    "360 Hz/s a ms), none silent for 50 ms. 50 ms of the first 1000 of them are played again in a quarter of the "
+    "sections of 50 ms, never twice in a row, each spike moved by 1 ms (sd). 10 Hz of noise on all. 150 s, presented "
+    "three times; judged by the last."
+)
 
 PARAMETERS: dict[str, Any] = {
     "runs": 100,
@@ -34,6 +38,10 @@ PARAMETERS: dict[str, Any] = {
     "noise_hz": 10.0,
     "most_hz": 90.0,
     "threshold": 500.0,
+}
+SIZES = {
+    "quick": {"runs": 4, "seconds": 50},
+    "toy": {"runs": 1, "seconds": 2, "parts": 2, "trains": 200, "threshold": 50.0},
 }
 #: How fast a rate may change, Hz/s, and by how much that changes in a ms.
 SPEED, PUSH = 1800.0, 360.0
@@ -109,8 +117,7 @@ def pieces(p: Parameters, spikes: Spikes, start: float) -> Iterator[SpikeTrains]
 
 def tasks(p: Parameters) -> list[Task]:
     """List one run a task."""
-    shared = {name: value for name, value in p.items() if name != "runs"}
-    return [Task(shared, seed) for seed in range(p["runs"])]
+    return one_task_per_seed(p, "runs")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -219,8 +226,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw latencies of the first spikes of one run: 0 for those outside the pattern."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6.5, 3.6), layout="constrained")
     axes = figure.subplots()
     if summary["course"]:
@@ -228,25 +233,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         axes.plot(seconds, since, ".", markersize=2)
     axes.set(xlabel="s", ylabel="ms from the pattern's start (0: outside)", ylim=(-1, p["pattern_ms"] + 1))
     return figure
-
-
-STUDY = Study(
-    name="stdp",
-    title="a neuron finds a pattern that repeats in its inputs, without labels",
-    where="thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377",
-    protocol="2000 inputs, Poisson at rates that wander between 0 and 90 Hz (speed within 1800 Hz/s, changed by up to "
-    "360 Hz/s a ms), none silent for 50 ms. 50 ms of the first 1000 of them are played again in a quarter of the "
-    "sections of 50 ms, never twice in a row, each spike moved by 1 ms (sd). 10 Hz of noise on all. 150 s, presented "
-    "three times; judged by the last.",
-    parameters=PARAMETERS,
-    sizes={
-        "quick": {"runs": 4, "seconds": 50},
-        "toy": {"runs": 1, "seconds": 2, "parts": 2, "trains": 200, "threshold": 50.0},
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    tables=tables,
-    draw=draw,
-)

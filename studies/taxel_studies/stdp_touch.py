@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.array import Array
@@ -13,13 +14,18 @@ from taxel.learn import STDP
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, one_task_per_seed
 from taxel_studies.unlabelled import moved, threshold, unlearning
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008"
+PROTOCOL = (
+    "Balls fall on the emulated board: 35 % of them the same one from the same height on the same place (to "
+    "2 mm and 1 mm, standard deviations), the others of any radius (25 to 35 mm), height (10 to 20 cm) and place. One "
+    "neuron receives the rises and falls of all taxels, 8192 trains, with the paper's constants: half of the touches "
+    "four times, then the others for the first time, always learning; judged by these. Before it learns, its threshold "
+    "lets it fire twice a second; a touch comes three times a second. Beside it a neuron that never learns and fires "
+    "as often."
+)
 
 PARAMETERS: dict[str, Any] = {
     "touches": 240,
@@ -32,6 +38,7 @@ PARAMETERS: dict[str, Any] = {
     "passes": 4,
     "boards": 5,
 }
+SIZES = {"toy": {"touches": 24, "boards": 1, "passes": 2}}
 #: How long after a contact a spike belongs to it, and how much before it a stamp may lie, ms.
 TOUCH_MS, STAMP_MS = 60.0, 0.5
 #: How far random places keep from the array's edge, and the one that comes again from its middle, mm.
@@ -53,8 +60,7 @@ class Play(NamedTuple):
 
 def tasks(p: Parameters) -> list[Task]:
     """List one board a task."""
-    shared = {name: value for name, value in p.items() if name != "boards"}
-    return [Task(shared, seed) for seed in range(p["boards"])]
+    return one_task_per_seed(p, "boards")
 
 
 def played(p: Parameters, seed: int) -> Play:
@@ -195,8 +201,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw how soon after contact one neuron fires while it learns."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     figure = Figure(figsize=(6.5, 3.6), layout="constrained")
     axes = figure.subplots()
@@ -204,23 +208,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         axes.plot(*np.transpose(summary["course"]), ".", markersize=3)
     axes.set(xlabel="touches presented", ylabel="ms from contact to spike", ylim=(0, None))
     return figure
-
-
-STUDY = Study(
-    name="stdp_touch",
-    title="a neuron learns without labels, from an array on which balls fall, to fire as a touch begins",
-    where="thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008",
-    protocol="Balls fall on the emulated board: 35 % of them the same one from the same height on the same place (to "
-    "2 mm and 1 mm, standard deviations), the others of any radius (25 to 35 mm), height (10 to 20 cm) and place. One "
-    "neuron receives the rises and falls of all taxels, 8192 trains, with the paper's constants: half of the touches "
-    "four times, then the others for the first time, always learning; judged by these. Before it learns, its threshold "
-    "lets it fire twice a second; a touch comes three times a second. Beside it a neuron that never learns and fires "
-    "as often.",
-    parameters=PARAMETERS,
-    sizes={"toy": {"touches": 24, "boards": 1, "passes": 2}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.learn import STDP
 from taxel_studies.gait import sources
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 from taxel_studies.unlabelled import moved, threshold, unlearning
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
-
+WHERE = "thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008"
+PROTOCOL = (
+    "Two minutes of walking a foot, eight force sensors (PhysioNet gaitpdb), as crossings of levels in shares "
+    "of the running range: 112 trains. One neuron a foot gets the first minute eight times, then the second for the "
+    "first time, always learning; judged by that. Its threshold is such that before it learns it fires once in ten "
+    "seconds. Time constants are longer than the paper's (50 ms for 10), as a step is longer than its pattern. Beside "
+    "it a neuron that never learns, whose threshold lets it fire as often as the learnt one."
+)
 #: Whose recordings.
 SOURCE = "gaitpdb"
+DATA = (sources.SOURCES[SOURCE].folder,)
 PARAMETERS: dict[str, Any] = {
     "levels": [0.02, 0.045, 0.08, 0.15, 0.3, 0.45, 0.6],
     "tau_m": 50.0,
@@ -33,6 +38,7 @@ PARAMETERS: dict[str, Any] = {
     "passes": 8,
     "feet": 0,
 }
+SIZES = {"toy": {"feet": 2, "passes": 2}}
 #: Of all feet the constants were chosen on every sixth; statements are of the others.
 CHOSEN_ON = 6
 #: What counts as found: a share of strides with one spike and no other, and how far it wanders at most, ms.
@@ -178,8 +184,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw when one neuron fires while it learns, and when those fire that have found the stride."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -198,22 +202,6 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     return figure
 
 
-STUDY = Study(
-    name="stdp_walk",
-    title="a neuron learns without labels, from a foot that walks, to fire once a stride",
-    where="thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008",
-    protocol="Two minutes of walking a foot, eight force sensors (PhysioNet gaitpdb), as crossings of levels in shares "
-    "of the running range: 112 trains. One neuron a foot gets the first minute eight times, then the second for the "
-    "first time, always learning; judged by that. Its threshold is such that before it learns it fires once in ten "
-    "seconds. Time constants are longer than the paper's (50 ms for 10), as a step is longer than its pattern. Beside "
-    "it a neuron that never learns, whose threshold lets it fire as often as the learnt one.",
-    parameters=PARAMETERS,
-    sizes={"toy": {"feet": 2, "passes": 2}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    data=(sources.SOURCES[SOURCE].folder,),
-    unread=lambda _parameters, data: sources.unread(data, [SOURCE]),
-)
+def unread(_p: Parameters, data: Path) -> Mapping[str, str]:
+    """Return which recordings cannot be read, and why."""
+    return sources.unread(data, [SOURCE])

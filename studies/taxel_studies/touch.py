@@ -12,9 +12,10 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import detect
@@ -32,12 +33,19 @@ from taxel.simulate import Act, Contact, Scene, Silence, play, truth
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "after 5.6.2"
+PROTOCOL = (
+    "Balls of 36 g, 50 and 70 mm across, fall on foam over the emulated board; heights (100 to 200 mm), places and "
+    "foams are drawn by seed. The recordings and a table of labels are written to files, and read and learnt from "
+    "as `taxel train --recipe touch` does; the recipe was chosen on other seeds. Judged on other seeds, so other "
+    "places. Two questions: contact and lift of every fall and bounce; which sphere, at its first contact. Beside "
+    "the neuron: the best of some plain rules, chosen on the training scenes (loaded taxels for contact and lift; "
+    "a threshold on area, total, peak or a ratio of them for the sphere), and a linear discriminant on the 16 x 16 "
+    "taxels above rest around the touch, as 5.6.2 takes them (on the whole array it learns places by heart), for "
+    "the sphere also one on the logarithms of area, total and peak; ridges chosen inside the training scenes."
+)
 
 Floats = NDArray[np.float64]
 
@@ -52,6 +60,16 @@ PARAMETERS: dict[str, Any] = {
     "test_contacts": 40,
     "window_ms": 10.0,
     "seed": 1,
+}
+SIZES = {
+    "toy": {
+        "parts": 1,
+        "train": 16,
+        "test": 8,
+        "train_contacts": 4,
+        "test_contacts": 3,
+        "times_ms": [1.0, 5.0, 10.0],
+    }
 }
 
 #: What a loaded taxel reads above rest at least, ticks.
@@ -318,6 +336,7 @@ def _by_area(drop: Drop, level: int) -> Detections:
 
 
 def detections_at(t: NDArray[np.int64], label: str = "contact") -> Detections:
+    """Return detections of one label at these times."""
     return Detections(np.full(len(t), label), t, t)
 
 
@@ -444,8 +463,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw both questions."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 5), layout="constrained")
     left, right = figure.subplots(1, 2)
     for way, words in WAYS.items():
@@ -470,37 +487,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         # Below the axes: no line and no bar is hidden.
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize="small", frameon=False)
     return figure
-
-
-STUDY = Study(
-    name="touch",
-    title="contact and lift, and which of two spheres fell, learnt from labels alone",
-    where="after 5.6.2",
-    protocol=(
-        "Balls of 36 g, 50 and 70 mm across, fall on foam over the emulated board; heights (100 to 200 mm), places and "
-        "foams are drawn by seed. The recordings and a table of labels are written to files, and read and learnt from "
-        "as `taxel train --recipe touch` does; the recipe was chosen on other seeds. Judged on other seeds, so other "
-        "places. Two questions: contact and lift of every fall and bounce; which sphere, at its first contact. Beside "
-        "the neuron: the best of some plain rules, chosen on the training scenes (loaded taxels for contact and lift; "
-        "a threshold on area, total, peak or a ratio of them for the sphere), and a linear discriminant on the 16 x 16 "
-        "taxels above rest around the touch, as 5.6.2 takes them (on the whole array it learns places by heart), for "
-        "the sphere also one on the logarithms of area, total and peak; ridges chosen inside the training scenes."
-    ),
-    parameters=PARAMETERS,
-    sizes={
-        "toy": {
-            "parts": 1,
-            "train": 16,
-            "test": 8,
-            "train_contacts": 4,
-            "test_contacts": 3,
-            "times_ms": [1.0, 5.0, 10.0],
-        }
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-)

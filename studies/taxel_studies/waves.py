@@ -18,6 +18,7 @@ from taxel import learn
 from taxel.metrics import victor_purpura
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
+from taxel_studies.mapping import LEARN
 from taxel_studies.runner import Task
 from taxel_studies.study import Row
 
@@ -47,7 +48,6 @@ INPUTS, DURATION_MS, REPETITIONS = 200, 40.0, 30
 GAP_MS = (50.0, 100.0)
 #: Table 6.1 with the changes of 6.4.5; tau_rec is 2 tau in both tables. "reset": figures 6.9 to 6.11 need it.
 NEURON: dict[str, Any] = {"tau": 10.0, "theta_0": 0.3, "theta_plus": 0.0, "refractory": 3.0, "after_spike": "reset"}
-LEARN: dict[str, Any] = {"delta_t_ms": 1.5, "lb": -0.3, "ub": 0.3}
 #: Cost of a millisecond in the distance of Victor and Purpura.
 Q = 0.05
 #: Units of the noises, and the levels that are tested.

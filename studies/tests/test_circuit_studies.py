@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taxel_studies import adaptive_ramp, asynchronous, fabric_array, fig3_3, fig3_5, fig4_3, fig4_6, fig4_7
+from taxel_studies import fabric_array, load
 from taxel_studies.study import Study
 
 
@@ -15,7 +15,7 @@ def found(study: Study, report) -> tuple[dict, dict]:
 
 
 def test_the_time_of_a_straight_ramp_is_proportional_and_that_of_an_rc_ramp_is_its_logarithm(tmp_path):
-    said, statements = found(fig4_3.STUDY, tmp_path)
+    said, statements = found(load("fig4.3"), tmp_path)
     assert [s["holds"] for s in statements.values()] == [True, True, False, True]
     for shape, one in said["shapes"].items():
         volts, elapsed = np.array(one["volts"]), np.array(one["elapsed_us"])
@@ -25,7 +25,7 @@ def test_the_time_of_a_straight_ramp_is_proportional_and_that_of_an_rc_ramp_is_i
 
 
 def test_a_ramp_that_adapts_is_near_the_best_fixed_one_in_each_phase(tmp_path):
-    said, statements = found(adaptive_ramp.STUDY, tmp_path)
+    said, statements = found(load("adaptive_ramp"), tmp_path)
     assert [s["holds"] for s in statements.values()] == [True, True, True, None]
     ramps = said["ramps"]
     own, gentle, steep = (ramps[name]["rms_mv"] for name in ("adaptive", "510", "38"))
@@ -39,7 +39,7 @@ def test_a_ramp_that_adapts_is_near_the_best_fixed_one_in_each_phase(tmp_path):
 
 
 def test_an_asynchronous_array_tells_finer_times_of_the_same_touch(tmp_path):
-    said, statements = found(asynchronous.STUDY, tmp_path)
+    said, statements = found(load("asynchronous"), tmp_path)
     costs = said["costs"]
     assert next(iter(statements.values()))["holds"]
     assert costs["asynchronous"]["moments"] > costs["scanned"]["moments"]
@@ -49,7 +49,7 @@ def test_an_asynchronous_array_tells_finer_times_of_the_same_touch(tmp_path):
 
 
 def test_a_lower_voltage_of_the_lines_trades_sensitivity_for_range(tmp_path):
-    said, statements = found(fig4_6.STUDY, tmp_path)
+    said, statements = found(load("fig4.6"), tmp_path)
     high, low = said["lines"]
     # By hand: V_trans R_f G above rest, of 1.64 uS.
     assert (high["gained_v"], low["gained_v"]) == pytest.approx((0.1002, 0.0385), abs=2e-4)
@@ -60,7 +60,7 @@ def test_a_lower_voltage_of_the_lines_trades_sensitivity_for_range(tmp_path):
 
 
 def test_the_input_settles_in_time_unless_the_capacitors_lie_across_the_amplifiers(tmp_path):
-    said, statements = found(fig4_7.STUDY, tmp_path)
+    said, statements = found(load("fig4.7"), tmp_path)
     # What is taken over, or chosen for it, is no test.
     assert [s["holds"] for s in statements.values()] == [None, None, None]
     plain, slow = said["scans"]
@@ -71,7 +71,7 @@ def test_the_input_settles_in_time_unless_the_capacitors_lie_across_the_amplifie
 
 
 def test_a_pair_of_neurons_fires_once_for_each_step_that_lasts(tmp_path):
-    said, statements = found(fig3_3.STUDY, tmp_path)
+    said, statements = found(load("fig3.3"), tmp_path)
     assert said["steps"] == said["spikes"]
     assert said["wrong"] == 0
     assert said["active"] > 20
@@ -92,7 +92,7 @@ def test_a_sphere_is_pressed_to_its_force_and_felt_by_the_taxels_beneath():
 
 
 def test_two_spheres_give_trials_of_both_and_errors_by_epoch(tmp_path):
-    said, statements = found(fig3_5.STUDY, tmp_path)
+    said, statements = found(load("fig3.5"), tmp_path)
     (line,) = said["forces"]
     assert min(line["counts"]) > 2
     assert all(0 <= e <= 1 for e in line["error"])

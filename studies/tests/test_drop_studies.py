@@ -12,7 +12,7 @@ from taxel.information.neighbours import distances_of
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
-from taxel_studies import dropped, drops, fig4_8, fig4_9, fig5_11
+from taxel_studies import dropped, drops, fig4_8, fig4_9, fig5_11, load
 from taxel_studies.dropped import FRAMES, REGION, TENNIS, Condition
 from taxel_studies.study import Row
 
@@ -150,7 +150,7 @@ def test_none_is_its_own_neighbour():
 
 
 def test_search_first_then_details_at_each_periods_best(tmp_path):
-    p = fig5_11.STUDY.set("toy")
+    p = load("fig5.11").set("toy")
     rows = [Row(t.params, t.seed, {}) for t in fig5_11.tasks(p, tmp_path)]
     search = fig5_11.then(p, rows, tmp_path)
     assert [t.params["ask"] for t in search] == ["search"] * 4
@@ -197,7 +197,7 @@ def report(tmp_path_factory):
 
 
 def test_faster_films_of_a_tennis_ball_tell_more(report):
-    section = fig4_8.STUDY.run(report, size="toy", changes={"drops": 6}, quiet=True)
+    section = load("fig4.8").run(report, size="toy", changes={"drops": 6}, quiet=True)
     fast, slow = section["said"]["lines"]
     assert (fast["period_ms"], slow["period_ms"]) == (2.0, 40.0)
     assert fast["bits"] > slow["bits"] + 0.5
@@ -215,7 +215,7 @@ def test_own_neighbours_are_those_of_scikit_learn():
 
 
 def test_t_sne_lays_classes_that_differ_apart(report):
-    section = fig4_9.STUDY.run(
+    section = load("fig4.9").run(
         report, size="toy", changes={"drops": 6, "rates_hz": [1000.0], "perplexity": 4.0}, quiet=True
     )
     (line,) = section["said"]["lines"]
@@ -226,7 +226,7 @@ def test_t_sne_lays_classes_that_differ_apart(report):
 def test_without_its_package_a_study_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn", None)
     with pytest.raises(ProblemError, match=r'fig4.9: it needs sklearn: pip install "taxel\[studies\]"'):
-        fig4_9.STUDY.run(tmp_path, size="toy", quiet=True)
+        load("fig4.9").run(tmp_path, size="toy", quiet=True)
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_a_difference_of_a_few_drops_is_none(below, height, least, radius):
         }
 
     lines = [line(0.5, 3.9 - below, 1.0, 1.0), line(1.0, 3.9, 1.0, 1.0), line(20.0, 0.5, 0.1, 1.0 - height)]
-    found = fig5_11.statements(fig5_11.STUDY.set("toy"), {"lines": lines, "conditions": 18})
+    found = fig5_11.statements(load("fig5.11").set("toy"), {"lines": lines, "conditions": 18})
     holds = {
         one.says.split(":")[0]: one.holds for one in found if one.says.startswith(("Figure 5.11: most", "Figure 5.12"))
     }
@@ -268,5 +268,5 @@ def test_the_gain_above_100_hz_is_told_from_100_hz_itself_too():
         "middle": [0.0, 0.0],
         "full": 510,
     }
-    *_, gain = fig4_8.statements(fig4_8.STUDY.set("toy"), said)
+    *_, gain = fig4_8.statements(load("fig4.8").set("toy"), said)
     assert gain.ours.endswith("from 100 Hz itself on +0.20, begun at any phase +1.30")

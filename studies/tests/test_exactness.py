@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taxel_studies import exactness
+from taxel_studies import exactness, load
 
 
 @given(
@@ -28,7 +28,7 @@ def test_a_lost_spike_is_counted_and_is_within_no_step() -> None:
 
 
 def test_what_was_solved_runs_exactly_without_a_clock() -> None:
-    tasks = exactness.tasks(exactness.STUDY.set("toy"))
+    tasks = exactness.tasks(load("exactness").set("toy"))
     found = [exactness.realise(t.params, t.seed) for t in tasks if t.params["kind"] == "steps"][:4]
     solved = [one for one in found if one["status"] == "solved"]
     assert solved

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from taxel_studies import fig6_10
+from taxel_studies import fig6_10, load
 
 
 @pytest.mark.parametrize("sparse_gains", [1.0, -1.0])
@@ -21,6 +21,6 @@ def test_the_verdict_is_of_the_levels_asked_about_and_turns_with_the_curves(spar
 
 
 def test_every_ratio_of_norms_is_run_in_both_trainings() -> None:
-    p = fig6_10.STUDY.set("toy")
+    p = load("fig6.10").set("toy")
     ratios = {tuple(t.params["lambdas"][:2]) for t in fig6_10.tasks(p) if "lambdas" in t.params}
     assert not ratios or ratios == {tuple(map(float, ratio)) for ratio in p["ratios"]}

@@ -87,7 +87,7 @@ def test_a_second_run_reckons_nothing_again_and_says_the_same(report, name):
 def test_a_realisation_is_a_pure_function_of_parameters_and_seed(name, courses):
     study = load(name)
     given = {"courses": courses} if study.courses else {}
-    tasks = study.tasks(study.set("toy"), **given)
+    tasks = study.tasks(study.set("toy"))
     task = tasks[-1]
     first = json.dumps(study.realise(task.params, task.seed, **given))
     study.realise(tasks[0].params, tasks[0].seed, **given)

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from taxel_studies.gait import insole, sources
+from taxel_studies.gait.fits import TEST
 from taxel_studies.gait.plans import Plan, chooses, each, plans
 from taxel_studies.gait.protocols import ROWS, Protocol
-from taxel_studies.gait.realise import TEST
 from taxel_studies.gait.recipes import FULL, NOTES, SEARCH
 from taxel_studies.gait.sources import SOURCES
 from taxel_studies.runner import Task

@@ -30,7 +30,7 @@ from taxel_studies.study import Parameters
 
 __all__ = [
     "PARAMETERS",
-    "TOY",
+    "SIZES",
     "Plan",
     "chooses",
     "each",
@@ -47,7 +47,7 @@ PARAMETERS: dict[str, Any] = {
     "search": "listed",  # "full": on the plate, people left out, also the 528 settings of 6.5.2
     "test": "",  # another folder of other people: trained on all of the data, judged there, instead of by folds
 }
-TOY: dict[str, Any] = {"protocols": ["people left out"], "events": 1, "points": 2}
+SIZES = {"toy": {"protocols": ["people left out"], "events": 1, "points": 2}}
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.array import Array
 from taxel.encode import ChangeEvents
@@ -14,9 +15,6 @@ from taxel.formats.trial import Trial
 from taxel.frames import Frames
 from taxel.information import LabelledTrial, answer
 from taxel_studies.study import Parameters, Statement, Summary, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["ASKS", "USES", "draw", "footfalls", "realise", "statements", "tables"]
 
@@ -172,8 +170,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over time, a line a period, and the confusion of the full setting."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 4.2), layout="constrained")
     axes = figure.subplots(1, len(summary), squeeze=False)[0]
     for ax, (ask, one) in zip(axes, summary.items(), strict=True):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.encode import ChangeEvents
@@ -13,9 +14,6 @@ from taxel.formats import icub
 from taxel.frames import Frames
 from taxel.information import GramLDA, estimate, nested_predictions, zero_test
 from taxel_studies.study import Parameters, Statement, Summary, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["ASKS", "USES", "draw", "realise", "statements", "tables"]
 
@@ -159,8 +157,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over slices."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     one = summary["object"]
     figure = Figure(figsize=(6, 4), layout="constrained")

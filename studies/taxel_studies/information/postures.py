@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.formats import popu
 from taxel.information import estimate, nested_predictions, zero_test
 from taxel_studies.study import Parameters, Statement, Summary, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["ASKS", "USES", "draw", "realise", "statements", "tables"]
 
@@ -98,8 +96,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over the number of taxels."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     one = summary["posture"]
     figure = Figure(figsize=(6, 4), layout="constrained")
