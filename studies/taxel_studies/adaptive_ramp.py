@@ -36,7 +36,7 @@ PARAMETERS: dict[str, Any] = {
     "realisations": 10,
 }
 SIZES = {"toy": {"realisations": 2, "ramps": [38, 150, 510], "period_us": 40.0, "fine_ms": 200.0}}
-#: A tap counts as seen from this rise on, V (the least load that the thesis resolves, 4.4.1).
+#: A tap counts as detected once the reading has risen by this much, V (the least load that the thesis resolves, 4.4.1).
 SEEN_V = 0.1
 #: Silence before the first tap and between two, ms.
 APART_MS = 40.0
@@ -70,14 +70,14 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Convert a touch; tell what a host that holds the last reading is wrong by, by phase, and when it sees taps."""
+    """Convert a touch; return the error of the last reading by phase, and when each tap shows in the readings."""
     rng = np.random.default_rng([seed, 432])
     loads, taps = force(params, rng)
     rows, columns, every = params["rows"], params["columns"], params["period_us"]
     away = np.hypot(*np.meshgrid(np.arange(columns) - columns / 2, np.arange(rows) - rows / 2))
     share = np.exp(-((away / 3.0) ** 2)) * np.exp(0.2 * rng.standard_normal(away.shape))
     volts = VirtualGround().volts_alone(Fabric().conductance(loads[:, None, None] * share))
-    # Each taxel's rest is its own, so that no two quantise alike.
+    # Each taxel has its own rest, so that quantisation errors differ between taxels.
     volts += 0.02 * rng.standard_normal(share.shape)
     converter = Converter(hysteresis_v=0.0)
     fixed = params["ramp"]
@@ -88,7 +88,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     line_us = converter.line_us + converter.steps * (seen.ramp.astype(float) - converter.ramp) / 300.0
     loaded = np.argwhere(share > 0.2)
     ends = every * int(1e3 * params["fine_ms"] / every)
-    # What the host holds at each time: the last reading that was taken before.
+    # The host's value at each time is the last reading before it.
     t = every * np.arange(len(loads))
     squares = {phase: [0.0, 0] for phase in PHASES}
     late: list[float] = []
@@ -128,7 +128,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Return of each converter how wrong it is in each phase, how late it sees a tap, and how often it scans."""
+    """Return each converter's error in each phase, its delay until a tap shows, and its scan rate."""
     del p
     summary: Summary = {"ramps": {}}
     for name in dict.fromkeys(row.params["ramp"] for row in rows):
@@ -154,7 +154,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         return float(one["rms_mv"][phase])
 
     def whole(one: dict[str, Any]) -> float:
-        """How much worse it is than the best fixed ramp of each phase, at its worst."""
+        """Return the largest ratio, over the phases, of a converter's error to that of the best fixed ramp."""
         return max(wrong(one, phase) / min(wrong(other, phase) for other in ramps.values()) for phase in PHASES)
 
     best = min(ramps, key=lambda name: whole(ramps[name]))

@@ -35,12 +35,12 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 SIZES = {"toy": {"radii_mm": [25.0, 35.0], "drops_mm": [200.0], "trials": 6, "windows_ms": [0.7, 2.0]}}
-#: Taxels of a side under the impact; address and sign of an event among 64 x 64, in bits.
+#: Taxels along a side of the region under the impact; bits of the address (64 x 64) and sign of an event.
 SIDE, EVENT_BITS = 20, 13
-#: Before a scene, ms: nothing is tared, since only changes are looked at.
+#: Silence before a scene, ms. The board is not tared, since only changes count.
 BEFORE_MS = 5.0
 ARRAYS = ("scanned", "asynchronous")
-#: What an array costs, in the words of its table.
+#: The costs of an array, as the table names them.
 COSTS = {
     "events": "events a touch",
     "events_a_s": "events/s",
@@ -60,7 +60,7 @@ def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[flo
     low = events.array.columns // 2 - SIDE // 2
     x, y = events.x.astype(int) - low, events.y.astype(int) - low
     since = to_ms(events.t - contact_us)
-    # A frame's stamp is its beginning: it may lie before what it shows.
+    # The stamp of a frame is its beginning, which may lie before the contact that the frame shows.
     inside = events.p & (x >= 0) & (x < SIDE) & (y >= 0) & (y < SIDE) & (since > -0.5) & (since < listen_ms)
     first = np.full(SIDE * SIDE, np.inf)
     np.minimum.at(first, SIDE * y[inside] + x[inside], np.maximum(since[inside], 0.0))
@@ -68,7 +68,7 @@ def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[flo
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Drop a ball on one board that scans and on one that does not; tell first rises, events and bytes."""
+    """Drop a ball on one board that scans and on one that does not; return first rises, events and bytes."""
     random = np.random.default_rng([seed, 71])
     x, y = (32 * 2.67 + random.uniform(-params["place_mm"], params["place_mm"], 2)).tolist()
     ball: dict[str, Any] = {"shape": {"sphere": {"radius_mm": params["radius_mm"]}}, "x_mm": x, "y_mm": y}
@@ -87,7 +87,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         }
         played = play(acts, **board)
         length_us = played.events.markers[-1][0]
-        # The same board untouched for as long: noise, headers, promises.
+        # The bytes of the same board untouched for as long: noise, headers and promises.
         rest = play([Silence(to_ms(length_us))], **board).bytes
         touched = np.zeros(len(played.events), bool)
         for c in contacts:
@@ -102,7 +102,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Estimate the bits of first-spike and relative latencies by window, and tell what the arrays cost."""
+    """Estimate the bits of first-spike and relative latencies by window, and the costs of both arrays."""
     labels = kinds_of(rows)
     summary: Summary = {"most": float(np.log2(len(set(labels)))), "bits": {}, "costs": {}}
     longest = max(p["windows_ms"])
@@ -131,7 +131,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Judge what 4.5 and Table 7.1 hope of an asynchronous array."""
+    """Judge what 4.5 and Table 7.1 expect of an asynchronous array."""
     bits, costs = summary["bits"], summary["costs"]
     scanned, alone = (costs[array] for array in ARRAYS)
     soon, late = (f"{w:g}" for w in (min(p["windows_ms"]), max(p["windows_ms"])))
@@ -223,7 +223,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
             windows = [float(w) for w in summary["bits"][array]]
             found = np.array([one[code] for one in summary["bits"][array].values()])
             off = np.abs(found[:, 1:] - found[:, :1]).T
-            # A little apart, so that neither interval hides the other.
+            # The two curves are drawn a little apart, so that neither interval hides the other.
             ax.errorbar(np.multiply(windows, beside), found[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
         ax.axhline(summary["most"], color="0.6", ls=":", label="ceiling")
         ax.set(xlabel="time since contact, ms", title=title)

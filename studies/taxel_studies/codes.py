@@ -2,7 +2,7 @@
 
 Balls of several radii fall from several heights on one place of the emulated board, its taxels and the ball's place
 drawn anew each time; FA-1 afferents under the impact fire; each code reads the same spikes, and linear discriminants
-name ball and height from what it read. Once the reference signal is the true moment of contact, once it slips.
+name ball and height from the code. The reference time is the moment of contact, and in a second comparison jitters.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PARAMETERS: dict[str, Any] = {
 }
 SIZES = {"toy": {"trials": 3, "drops_mm": [100.0, 200.0], "radii_mm": [25.0, 35.0], "windows_ms": [2.0, 10.0]}}
 
-#: Taxels of a side under the impact, and the period of the afferents: whole frames of 192 us.
+#: Taxels along a side of the region under the impact, and the period of the afferents: whole frames of 192 us.
 SIDE = 20
 PERIOD_US = 192
 NAMES = {
@@ -52,10 +52,10 @@ NAMES = {
 
 
 def codes(window_ms: float) -> dict[str, information.Code]:
-    """Return the four codes, as long as one listens."""
+    """Return the four codes over a window."""
     resolution = PERIOD_US * 1e-3
     return {
-        # No more than a spike a frame can come.
+        # At most one spike falls into a frame.
         "rate": information.RateCode(window_ms=window_ms, most_hz=1e6 / PERIOD_US),
         "first": information.FirstSpikeLatency(window_ms=window_ms, resolution_ms=resolution),
         "relative": information.RelativeLatency(window_ms=window_ms, resolution_ms=resolution),
@@ -116,7 +116,7 @@ def realise(params: dict[str, Any], seed: int) -> list[list[float]]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Estimate the bits of each code by window, with the reference at contact and with one that slips."""
+    """Estimate the bits of each code by window, with the reference at contact and with one that jitters."""
     labels = kinds_of(rows)
     slips = np.random.default_rng(p["seed"]).uniform(0.0, p["slip_ms"], len(rows))
     folds = min(10, p["trials"])
@@ -175,7 +175,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
-    """Draw bits by how long is listened, with the reference at contact, and with one that slips."""
+    """Draw bits by window, with the reference at contact, and with one that jitters."""
     figure = Figure(figsize=(10, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     titles = ("reference: the moment of contact", f"reference: up to {p['slip_ms']:g} ms early")

@@ -139,7 +139,7 @@ def every(
                 quiet=as_json,
             )
     finally:
-        # Whatever stopped it: the page shows what was run, and names the rest.
+        # The page is written however the run ends: it shows what was run, and names the rest.
         page = _page(report)
     if as_json:
         typer.echo(json.dumps(sections))

@@ -1,4 +1,4 @@
-"""Figures 5.1 to 5.4: a half disc pressed on silicone, what the base feels, how it is sampled, and the spikes."""
+"""Figures 5.1 to 5.4: a half disc pressed on silicone, the pressure at its base, how it is sampled, and the spikes."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ SIZES = {
 ROUNDING = 1e-8
 #: Samples of figure 5.3's picture, ms and mm (the thesis recorded every 0.2 ms), and its grids.
 PICTURE_MS, PICTURE_MM, GRIDS = 0.4, 0.1, 3
-#: What the pictures' grids are drawn with.
+#: Colours of the sampling grids in the picture.
 COLOURS = ("C3", "C1", "C9")
 
 
@@ -53,10 +53,10 @@ tasks = indented.tasks
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Press once, and tell whether all is in balance."""
+    """Press once, and return how well the forces balance."""
     del seed
     course = indented.make(params, courses)
-    assert course is not None  # it has no other realisations
+    assert course is not None  # every realisation of this study makes a course
     most = max(float(np.abs(course.reaction).max()), 1e-300)
     mirrored = course.pressure_kpa - course.pressure_kpa[:, ::-1]
     return {
@@ -70,7 +70,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
-    """List the courses; keep what the pictures show of one of them."""
+    """List the courses, and what the pictures show of one of them."""
     paths = [{**row.params["course"], **row.result} for row in rows]
     wanted = p["drawn"]
     asked = indented.courses_of(p)

@@ -87,7 +87,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Press once; or sample all contacts under one choice, and see what discriminants make of the spikes."""
+    """Press once; or sample all contacts under one choice, and return the bits of the discriminants' answers."""
     course = indented.make(params, courses)
     if course is not None:
         return indented.course_summary(course)
@@ -149,7 +149,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Return each choice's bits as they differ from the first's."""
+    """Return each choice's bits less those of the first."""
     del p
     first, *others = summary["lines"]
     rows = [

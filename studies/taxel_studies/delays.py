@@ -1,4 +1,4 @@
-"""What delays that are learnt buy: copies of every input, chosen from by l1, beside one random delay an input."""
+"""The gain of learnt delays: copies of every input, chosen from by l1, beside one random delay an input."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ PARAMETERS: dict[str, Any] = {
 }
 TOY: dict[str, Any] = {"realisations": 2, "inputs": [40], "copies": [3], "shares": [0.1]}
 SIZES = {"toy": TOY}
-#: A weight below it is none, mV: a millionth of the bound.
+#: A weight below this counts as 0, mV: a millionth of the bound.
 NONE = 3e-7
-#: On gait, where nothing selects: feet off of gaitndd within 10 ms, % (the notes to the gait study).
+#: Of gaitndd's foot-offs, the share within 10 ms, %, without selection of delays (notes to the gait study).
 GAIT = {"without": 82, "with copies from 0 to 50 ms": 57}
 
 
@@ -84,7 +84,7 @@ def fit(params: dict[str, Any], count: int, seed: int, lambdas: tuple[float, flo
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Search the largest load that all realisations bear, or select weights by l1 at a given one.
+    """Search the largest load at which all realisations are feasible, or select weights by l1 at a given one.
 
     Returns
     -------

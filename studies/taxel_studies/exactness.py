@@ -1,4 +1,4 @@
-"""What exactness costs and buys: slope at the targets against clocked steps, and against capacity (ours)."""
+"""The cost and the benefit of exactness: slope at the targets against clocked steps, and against capacity (ours)."""
 
 from __future__ import annotations
 
@@ -228,7 +228,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         here = [c for c in summary["cases"] if (c["count"], c["theta_plus"]) == (count, rise)]
         label = f"{count} target{'s' if count > 1 else ''}, theta+ {rise:g}"
         for k, step in enumerate(p["steps_ms"]):
-            # What comes first is drawn broader: at 100 % lines lie on each other.
+            # Earlier lines are drawn broader, since lines at 100 % overlap.
             style = {"color": f"C{number}", "ls": ("-", "--", ":")[k % 3], "marker": ".", "lw": max(4.5 - number, 1.2)}
             shares = [100 * _share(c, step) for c in here]
             within.plot(p["margins"], shares, **style, label=f"{label}" if k == 0 else None)

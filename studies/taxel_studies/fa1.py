@@ -49,7 +49,7 @@ VARIANTS = {
     "power": "power law",
     "spread": "spread of thresholds",
 }
-#: Of the thresholds of one skin, the same in all trials.
+#: Seed of the spread of thresholds, the same in all trials.
 SKIN = 52
 
 

@@ -132,7 +132,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 def _line(rows: Sequence[Row], force: float) -> dict[str, Any]:
     here = [r.result for r in rows if r.params["force_n"] == force]
     longest = max(len(r["error"]) for r in here)
-    # Training stops when an epoch had no error: from there on there is none.
+    # Training stops after an epoch without an error: from there on the error is 0.
     errors = np.array([r["error"] + [r["error"][-1]] * (longest - len(r["error"])) for r in here])
     mean = errors.mean(axis=0)
     below = np.flatnonzero(mean < ERROR)
@@ -235,7 +235,7 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
     readings = list(dict.fromkeys(line["reading"] for line in lines))
     for k, force in enumerate(p["forces_n"]):
         here = [line for line in lines if line["force_n"] == force]
-        # Points, beside each other: bars would have to begin at 0, and what matters lies above chance.
+        # Points beside each other: bars would have to begin at 0, but the differences lie above chance.
         at = np.arange(len(readings)) + (k - (len(p["forces_n"]) - 1) / 2) * 0.2
         ax.errorbar(
             at,

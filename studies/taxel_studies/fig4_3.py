@@ -37,7 +37,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Convert a row of inputs, each settled; and watch one conversion."""
+    """Convert a row of inputs, each settled, and trace one conversion."""
     del seed
     converter = Converter(shape=params["shape"], ramp=params["ramp"], steps=1)
     volts = np.linspace(params["least_v"], params["most_v"], params["points"])
@@ -56,7 +56,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Return of each shape whether the time grows, up to which input, and how far it is from straight."""
+    """Return for each shape whether the time grows, up to which input, and how far it is from a straight line."""
     summary: Summary = {"shapes": {}}
     for row in rows:
         volts, elapsed = np.array(row.result["volts"]), np.array(row.result["elapsed_us"])

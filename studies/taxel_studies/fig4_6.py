@@ -50,7 +50,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     gain = float(np.exp(params["gain_spread"] * random.standard_normal())) if seed else 1.0
     fabric = Fabric(touch_us=law.touch_us * gain, exponent=params["exponent"])
     loads = np.geomspace(params["least_n"], params["most_n"], params["loads"])
-    # The load that is seen stands among them.
+    # One of the loads is exactly the one that the thesis detects.
     loads[np.abs(np.log(loads / SEEN_N)).argmin()] = SEEN_N
     loads = np.concatenate([[0.0], loads])
     x, y = params["at"]
@@ -69,7 +69,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Return of each voltage: the law's curve, which taxels see 0.02 N, where the ramp and the amplifier end."""
+    """Return for each voltage the law's curve, the taxels that detect 0.02 N, and where ramp and amplifier saturate."""
     floor, ramp = Registers().noise_floor, Registers().ramp
     summary: Summary = {"floor": floor, "ramp": ramp, "lines": []}
     for v_trans in p["v_trans"]:

@@ -1,4 +1,4 @@
-"""Figure 4.7: how soon the transducer answers, and how soon the input settles while four channels are multiplexed."""
+"""Figure 4.7: how soon the transducer responds, and how soon the input settles while four channels are multiplexed."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Play the impact, or watch a comparator for a column."""
+    """Simulate the impact, or trace a comparator over a column."""
     del seed
     return _impact(params) if "impact_n" in params else _scan(params)
 
@@ -80,7 +80,7 @@ def _scan(params: dict[str, Any]) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Keep the impact and the scans by time constant."""
+    """List the impact, and the scans by time constant."""
     (impact,) = [r.result for r in rows if "impact_n" in r.params]
     scans = [{"amplifier_us": tau, **r.result} for tau in p["amplifiers_us"] for r in _of(rows, tau)]
     return {"impact": impact, "scans": scans}

@@ -45,7 +45,7 @@ SLOW_MS = 10.0
 LITTLE, MARKED = 0.5, 0.5
 #: How far from the region's middle the middle of the pressure may lie to be around the first taxel, taxels.
 AROUND = 3.0
-#: Of the first moment, which comes at any phase of a slow sampler.
+#: Seed of the phase at which a slow sampler takes its first picture.
 PHASES = 410
 
 
@@ -63,7 +63,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Drop the ball so many times; or see what discriminants make of all films at a period."""
+    """Drop the ball as often as asked; or return the bits of discriminants on all drops at a period."""
     drops = dropped.played_summary(params, seed, courses, TENNIS)
     if drops is not None:
         return drops
@@ -79,7 +79,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 def sampled_drops(
     p: Parameters, seed: int, courses: Path, period_ms: float, length_ms: float, *, aligned: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return all drops' films at a period, one a row, and the number of each one's condition."""
+    """Return the pictures of all drops at a period, one drop a row, and the number of each drop's condition."""
     rng = np.random.default_rng([seed, PHASES])
     parts = []
     for condition in dropped.conditions(p):
@@ -91,7 +91,7 @@ def sampled_drops(
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
-    """List the bits by period; keep one drop's pictures."""
+    """List the bits by period, and one drop's pictures."""
     asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
     one = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses, TENNIS).ticks[:1]
     frame_ms = TENNIS.frame_us / 1000

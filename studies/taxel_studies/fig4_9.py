@@ -36,7 +36,7 @@ SIZES = {"toy": TOY}
 LENGTH_MS = 20.0
 #: From here on the classes lie clearly apart, Hz.
 CLEAR_HZ = 500.0
-#: How many nearest neighbours in the map are asked, and what share of one's own class counts as clearly apart.
+#: How many nearest neighbours in the map count, and what share of one's own class counts as clearly apart.
 NEIGHBOURS, CLEAR = 10, 0.95
 
 
@@ -53,7 +53,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Drop the ball so many times; or lay all films at a rate out on a plane, and look at each one's neighbours."""
+    """Drop the ball as often as asked; or map all drops at a rate onto a plane, and classify each by its neighbours."""
     drops = dropped.played_summary(params, seed, courses, TENNIS)
     if drops is not None:
         return drops

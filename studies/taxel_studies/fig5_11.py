@@ -101,7 +101,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> Any:
-    """Drop a ball so many times; or compare all drops at a period, and see what their neighbours make of them."""
+    """Drop a ball as often as asked; or compare all drops at a period, and return the bits of neighbours' answers."""
     drops = dropped.played_summary(params, seed, courses)
     if drops is not None:
         return drops
@@ -135,7 +135,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> Any:
 
 
 def _samples_before(time_ms: float, period_ms: float, most: int) -> int:
-    """Return how many samples are there a time after the impact, the first one at it."""
+    """Return the number of samples up to a time after the impact, the first one at the impact."""
     return min(max(1, int(np.ceil(time_ms / period_ms - 1e-9))), most)
 
 
@@ -155,7 +155,7 @@ def _spikes(
 def _bits(
     distances: NDArray[np.float64], y: NDArray[np.int64], params: dict[str, Any], *, by: bool = False
 ) -> dict[str, Any]:
-    """Return the information of what the neighbours say, and of each parameter in it."""
+    """Return the information of the neighbours' answers, and of each parameter in them."""
     answers = dropped.named_by_neighbours(distances, y, params["neighbours"])
     found: dict[str, Any] = kept_bits.information(y, answers, "bits", "right")
     if by:

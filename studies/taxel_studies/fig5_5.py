@@ -51,11 +51,11 @@ TOY: dict[str, Any] = {
 SIZES = {"coarse": {**indented.COARSE, "samples": 100, "alphas": [0.3, 0.5, 0.7, 0.9, 1.1]}, "toy": TOY}
 #: The parameters of a contact, in the words of figure 5.6.
 VARIED = {"diameter_mm": "radius", "modulus_kpa": "hardness", "depth_mm": "depth", "angle_deg": "slant"}
-#: Table 5.3's.
+#: Alpha of Table 5.3.
 PRINTED_ALPHA = 0.7
-#: What 5.5.3 says of 10 ms at .5 ms.
+#: Bits within 10 ms at a period of .5 ms, according to 5.5.3.
 BITS_AT_10_MS = 6.0
-#: What counts as around 100 Hz.
+#: Rates that count as around 100 Hz.
 AROUND_100_HZ = (50.0, 200.0)
 
 
@@ -107,7 +107,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Press once; or sample all contacts at a period, and see what discriminants make of the spikes."""
+    """Press once; or sample all contacts at a period, and return the bits of the discriminants' answers."""
     course = indented.make(params, courses)
     if course is not None:
         return indented.course_summary(course)
@@ -267,7 +267,7 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
 
 
 def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: str) -> Statement:
-    """Set the beginning of a contact at a period below the shortest beside that one, at the same alpha."""
+    """Compare the beginning of a contact, sampled at a shorter period, with the shortest one at the same alpha."""
     theirs = dict(map(tuple, short["times"]))
     beside = [(t, bits, theirs[t]) for t, bits in part["times"] if t in theirs]
     at = f"at {short['period_ms']:g} ms"

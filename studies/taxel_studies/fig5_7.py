@@ -51,7 +51,7 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Press once; or sample all contacts, and see what discriminants make of spikes with so many bits."""
+    """Press once; or sample all contacts, and return the bits of discriminants on spikes with so many bits."""
     course = indented.make(params, courses)
     if course is not None:
         return indented.course_summary(course)

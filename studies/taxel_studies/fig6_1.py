@@ -37,7 +37,7 @@ tasks = one_task
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Train one neuron and follow it."""
+    """Train one neuron, and return its potential and spikes."""
     trains = mapping.poisson(seed, params["inputs"], params["stop"], *params["rates_hz"])
     neuron = Neuron(**TABLE, after_spike=params["after_spike"])
     cone = ConeX(neuron=neuron, **LEARN, lambdas=(1.0, 0.0, 0.0), kappa=1.0)

@@ -116,12 +116,12 @@ class _Rows:
         return total
 
     def silent(self, weights: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Mark the weights that keep every silent row."""
+        """Mark the weights that satisfy every row at which the neuron must not fire."""
         kept: NDArray[np.bool_] = np.all(weights @ self.quiet.T <= self.limit + 1e-12, axis=-1)
         return kept
 
     def line(self, axis: NDArray[np.float64], hard: bool) -> dict[str, Any]:
-        """Follow the equality of the target through the box."""
+        """Return the line within the bounds on which the target is met, and the objective along it."""
         fine = np.linspace(axis[0], axis[-1], 4001)
         other = (self.theta - fine * self.target[1]) / self.target[0]
         inside = np.abs(other) <= self.params["bound"]
@@ -137,7 +137,7 @@ class _Rows:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Keep both surfaces."""
+    """Return both surfaces."""
     del p
     return {row.params["learner"]: row.result for row in rows}
 
@@ -219,10 +219,10 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         ax.set(xlabel="w1, mV", ylabel="w2, mV", zlabel="objective", title=title, xticks=ends, yticks=ends)
         ax.view_init(30, -60)
         above = figure.add_subplot(2, 2, number + 2, aspect="equal")
-        # Equal steps of rank, not of height: the floor is flat and the walls are steep.
+        # Levels have equal steps of rank, not of height: the surface is flat at its optimum and steep at the bounds.
         heights = np.unique(np.quantile(surface, np.linspace(0, 1, 25)))
         drawn = above.contourf(first, second, surface, heights, cmap="viridis")
-        drawn.set(edgecolor="face", linewidth=0.4)  # else the page shows between two bands
+        drawn.set(edgecolor="face", linewidth=0.4)  # closes the gaps that the page shows between two bands
         broken = np.where(found["silent"], np.nan, 1.0)
         above.contourf(first, second, broken, [0.5, 1.5], colors="none", hatches=["////"])
         above.plot(*line.T, color="0.2", lw=1.0, ls="--")

@@ -1,4 +1,4 @@
-"""Figure 6.8: the three noises on a wave train, and what a trained neuron makes of them (thesis 6.4.5)."""
+"""Figure 6.8: the three noises on a wave train, and the response of a trained neuron (thesis 6.4.5)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PARAMETERS: dict[str, Any] = {
 }
 SIZES = {"toy": {"repetitions": 8}}
 
-#: What each noise is, with its level, and what is drawn faint or grey.
+#: The title of each panel: the noise with its level, and the spikes that are drawn faint or grey.
 TITLES = {
     "jitter": "jitter, sd {:g} ms (faint: before it)",
     "background": "background, {:g} Hz an input (grey: added)",

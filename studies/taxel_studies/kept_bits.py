@@ -16,7 +16,7 @@ __all__ = ["by_period_parameter_and_time", "information", "listed", "lost", "sha
 
 
 def information(truth: NDArray[Any], answers: NDArray[Any], *wanted: str) -> dict[str, float]:
-    """Return of answers ``bits`` (corrected), ``plug_in`` (as counted), ``right`` (share), ``most`` (bits)."""
+    """Return of answers: ``bits`` (corrected), ``plug_in`` (as counted), ``right`` (share), ``most`` (bits)."""
     counts, classes = confusion_matrix(truth, answers)
     found = {
         "bits": panzeri_treves(counts),
@@ -54,11 +54,11 @@ def by_period_parameter_and_time(
     times_ms: Sequence[float],
     since: str,
 ) -> list[Figure]:
-    """Draw three figures of what was found, period by period (``summary["lines"]``).
+    """Draw three figures of the results, period by period (``summary["lines"]``).
 
     Parameters
     ----------
-    summary : what a study found; what was sampled in part (``summary["part"]``) is in the third
+    summary : of a study; what was sampled in part (``summary["part"]``) is in the third
     figures : the thesis' numbers of the three
     curves : of the first figure, what each curve of bits is called
     named : of the second, what each parameter is called
@@ -86,7 +86,7 @@ def by_period_parameter_and_time(
         ax.set_xlabel(f"ms since {since}" if k == 2 else "sampling period, ms")
         ax.set_ylabel(label)
         ax.set_title(f"figure {title}")
-        # Curves over time fill the axes; their names stand beside them.
+        # Curves over time fill the axes, so the legend stands beside them.
         beside: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if k == 2 else {}
         ax.legend(fontsize="small", **beside)
         found.append(figure)

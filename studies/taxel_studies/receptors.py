@@ -1,4 +1,4 @@
-"""What SA-1, FA-1, SA-2 and FA-2 answer to: a ramp and a hold, and sines of all frequencies (thesis 2.1.5, 3.3, 7.2).
+"""Responses of SA-1, FA-1, SA-2 and FA-2 to a ramp and a hold, and to sines of all frequencies (thesis 2.1.5, 3.3, 7.2).
 
 Published: the phases of a ramp-and-hold in which each type fires; the frequency at which its threshold of one spike a
 cycle is least, near 5 Hz (SA-1), 34 Hz (FA-1) and 200 to 250 Hz (FA-2).
@@ -102,7 +102,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Keep what each type answered, and where its threshold is least."""
+    """List each type's spikes, and the frequency at which its threshold is least."""
     summary: Summary = {}
     for row in rows:
         known = [(f, a) for f, a in zip(p["frequencies_hz"], row.result["thresholds"], strict=True) if a is not None]

@@ -45,17 +45,17 @@ SIZES = {
 }
 #: How fast a rate may change, Hz/s, and by how much that changes in a ms.
 SPEED, PUSH = 1800.0, 360.0
-#: What counts as success over the last part: share of patterns met, latency in ms; and no spike outside.
+#: A run succeeds if over the last part it fires at this share of patterns, within this latency, ms, and never outside.
 HITS, LATENCY = 0.98, 10.0
 PUBLISHED = 96.0
-#: Fewer runs say little of a share.
+#: With fewer runs a share is not judged.
 ENOUGH_RUNS = 20
 
 Spikes = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def background(p: Parameters, rng: np.random.Generator) -> Spikes:
-    """Draw what all inputs do for one part: Poisson at rates that wander, none silent for a pattern's length."""
+    """Draw the spikes of all inputs for one part: Poisson at rates that wander, none silent for a pattern's length."""
     trains, steps = p["trains"], 1000 * p["seconds"]
     rate = np.asarray(rng.uniform(0, p["most_hz"], trains), np.float32)
     speed = np.asarray(rng.uniform(-SPEED, SPEED, trains), np.float32)
@@ -80,7 +80,7 @@ def starts(p: Parameters, rng: np.random.Generator) -> NDArray[np.int64]:
     """Draw when the pattern is played, ms: in a share of the sections of its length, never twice in a row."""
     sections = 1000 * p["seconds"] // p["pattern_ms"]
     played = round(p["share"] * sections)
-    # So many places of the shortened row, each followed by a section without.
+    # Each pattern is followed by a section without one: places are drawn in a row shortened by those sections.
     places = np.sort(rng.choice(sections - played + 1, played, replace=False)) + np.arange(played)
     return np.asarray(places * p["pattern_ms"], np.int64)
 
@@ -121,7 +121,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Give one neuron the spikes of a run; return what it found, and from when on it fired at the pattern alone."""
+    """Train one neuron on a run; return its success, and from when on it fired at the pattern alone."""
     rng = np.random.default_rng([seed, 2008])
     spikes, begin = part(params, rng)
     stdp, fired = STDP(threshold=params["threshold"]), []

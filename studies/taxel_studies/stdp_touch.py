@@ -48,14 +48,14 @@ EVERY, NONE = 0.95, 0.1
 
 
 class Play(NamedTuple):
-    """A play: the spikes that reach a neuron, and what truly happened."""
+    """The spikes that a neuron receives, and the true contacts."""
 
     spikes: SpikeTrains
-    """Rises and falls of each taxel, beside each other."""
+    """Two trains a taxel: its rises, then its falls."""
     contacts: NDArray[np.float64]
     """When balls touched, ms."""
     same: NDArray[np.bool_]
-    """Whether it was the ball that falls again and again on one place."""
+    """Whether each touch was by the ball that falls again and again on one place."""
 
 
 def tasks(p: Parameters) -> list[Task]:
@@ -103,7 +103,7 @@ def _scene(rng: np.random.Generator, same: bool) -> Scene:
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     """Train a neuron on half of the touches, many times over; test it on the others, beside an untrained one."""
     play = played(params, seed)
-    # Whole, so that pieces end where the next ones begin; and between two touches.
+    # A whole ms, so that each piece begins where the last one ends, and between two touches.
     half = float(np.floor(play.contacts[params["touches"] // 2] - 20))
     first, second = play.spikes.between(0, half), play.spikes.between(half, play.spikes.stop)
     taus = {name: params[name] for name in ("tau_m", "tau_s", "tau_plus", "tau_minus")}
@@ -115,7 +115,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         course += [[len(play.contacts) // 2 * k + n, round(float(t), 2)] for n, t in enumerate(late) if t < TOUCH_MS]
     last = (params["passes"] - 1) * half
     stdp.partial_fit(moved(second, last))
-    # As often, without learning: at another threshold.
+    # For comparison a neuron that does not learn, with a threshold at which it fires as often.
     hz = 1000 * len(stdp.spikes_) / (play.spikes.stop - half)
     untrained = unlearning(threshold(first, max(hz, params["untrained_hz"]), taus), taus).partial_fit(play.spikes)
     return {
@@ -137,7 +137,7 @@ def latencies(times: NDArray[np.float64], contacts: NDArray[np.float64]) -> NDAr
 
 
 def judged(times: NDArray[np.float64], play: Play, begin: float) -> dict[str, Any]:
-    """Return at which share of the touches from `begin` on a neuron fired, how soon, and how often beside them."""
+    """Return at which share of the touches from `begin` on a neuron fired, how soon, and how often outside them."""
     there = play.contacts >= begin
     late = latencies(times, play.contacts)
     fired = np.isfinite(late)
@@ -163,7 +163,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Say what it found."""
+    """Judge how often and how soon neurons fire at touches."""
     boards = summary["boards"]
 
     def middle(how: str, what: str) -> float:

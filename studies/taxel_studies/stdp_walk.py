@@ -25,7 +25,7 @@ PROTOCOL = (
     "seconds. Time constants are longer than the paper's (50 ms for 10), as a step is longer than its pattern. Beside "
     "it a neuron that never learns, whose threshold lets it fire as often as the learnt one."
 )
-#: Whose recordings.
+#: The source of the recordings, of those of the gait study.
 SOURCE = "gaitpdb"
 DATA = (sources.SOURCES[SOURCE].folder,)
 PARAMETERS: dict[str, Any] = {
@@ -41,7 +41,7 @@ PARAMETERS: dict[str, Any] = {
 SIZES = {"toy": {"feet": 2, "passes": 2}}
 #: Of all feet the constants were chosen on every sixth; statements are of the others.
 CHOSEN_ON = 6
-#: What counts as found: a share of strides with one spike and no other, and how far it wanders at most, ms.
+#: A stride is found with this share of strides with one spike, and at most this deviation of its time, ms.
 ONCE, WANDERS_MS = 0.8, 50.0
 #: Longer than this is no stride but a pause, ms.
 LONGEST_STRIDE_MS = 2000.0
@@ -73,7 +73,7 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
 
 def train_and_test(foot: Piece, params: Parameters) -> dict[str, Any]:
     """Train a neuron on the first half of a walk, presented again and again, and test it on the second."""
-    # Whole, so that pieces end where the next ones begin.
+    # A whole ms, so that each piece begins where the last one ends.
     half = float(foot.spikes.stop // 2)
     first, second = foot.spikes.between(0, half), foot.spikes.between(half, foot.spikes.stop)
     taus = {name: params[name] for name in ("tau_m", "tau_s", "tau_plus", "tau_minus")}
@@ -121,7 +121,7 @@ def phases(
 
 
 def judged(times: NDArray[np.float64], foot: Piece, begin: float) -> dict[str, Any]:
-    """Return how often a neuron fired once a stride, when in it, and how far that wanders (circular deviation)."""
+    """Return how often a neuron fired once a stride, when in the stride, and the circular deviation of that."""
     counts, phased, length = phases(times, foot.truth["contact"], begin, foot.scored[1])
     if not len(counts) or not phased:
         return {"strides": len(counts), "once": 0.0, "phase_ms": None, "wanders_ms": None}
@@ -154,7 +154,7 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Say what it found."""
+    """Judge how many neurons have found the stride."""
     del p
     feet = [one for one in summary["feet"] if not one["chosen_on"]] or summary["feet"]
     good, by_chance = ([one for one in feet if found(one[how])] for how in ("learnt", "untrained"))

@@ -1,4 +1,4 @@
-"""What a study is: a protocol, its parameters, the published values as data, a picture, and what holds."""
+"""A study: a protocol, its parameters, the published values as data, a picture, and judged statements."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ __all__ = [
 
 #: Experiment parameters by name: what JSON can hold.
 Parameters = Mapping[str, Any]
-#: What a study found, as JSON holds it: enough to judge its statements and to draw its picture.
+#: The results of a study, as JSON holds them: enough to judge its statements and to draw its picture.
 Summary = dict[str, Any]
 #: One study's part of the page, as ``summary.json`` holds it.
 Section = dict[str, Any]
@@ -52,7 +52,7 @@ Section = dict[str, Any]
 
 @dataclass(frozen=True)
 class Statement:
-    """Hold a published statement beside what was found.
+    """A published statement with its value and ours.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Statement:
         Its value.
     ours : str
     holds : bool, optional
-        None: nothing to hold it against (the picture is lost, or too little was run).
+        None: it cannot be judged (the published picture is lost, or too little was run).
     why : str
         Why it does not hold; or the reading under which it does.
     """
@@ -76,7 +76,7 @@ class Statement:
 
 @dataclass(frozen=True)
 class Table:
-    """Hold a table of the page.
+    """A table of the page.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Table:
     rows : sequence of sequences of str
         The first cell names the row.
     note : str
-        What to know of it.
+        An explanation below it.
     folded : bool
         Shown on the page only where it is opened, and not by the command.
     """
@@ -99,7 +99,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Row:
-    """Hold one realisation, its result and the CPU seconds that it took."""
+    """One realisation, its result and the CPU seconds that it took."""
 
     params: dict[str, Any]
     seed: int
@@ -195,7 +195,7 @@ class Study:
 
         Raises
         ------
-        ProblemError : a size or a parameter that is none, or a value of another kind
+        ProblemError : an unknown size or parameter, or a value of another kind
         """
         one_of("size", size, ("full", *self.sizes))
         values = {**self.parameters, **self.sizes.get(size, {})}
@@ -211,17 +211,17 @@ class Study:
 
     @property
     def code(self) -> str:
-        """The digest of what a realisation is computed by: when it changes, results are computed anew."""
+        """The digest of the code that computes a realisation: when it changes, results are computed anew."""
         return installed_sources("taxel_studies").digest(self.realise.__module__)
 
     @property
     def made_of(self) -> dict[str, str]:
-        """The digest of every source that what it shows is computed from, by name."""
+        """The digest of every source that its figures are computed from, by name."""
         return installed_sources("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
 
     @property
     def lacks(self) -> str | None:
-        """Say which modules are not installed; None where all are."""
+        """The modules that are not installed, in words; None where all are."""
         missing = [name for name in self.needs if find_spec(name) is None]
         return f'it needs {", ".join(missing)}: pip install "taxel[studies]"' if missing else None
 
@@ -241,7 +241,7 @@ class Study:
         Parameters
         ----------
         report : Path
-            Of all studies; this one's folder in it has its name.
+            The folder of all studies; this one's folder in it has its name.
         size : str
             "full", "toy" ...
         changes : mapping, optional
@@ -260,7 +260,7 @@ class Study:
 
         Raises
         ------
-        ProblemError : a size or parameter that is none; a module that is not installed
+        ProblemError : an unknown size or parameter; a module that is not installed
         FormatError : recordings that it needs are not there, or cannot be read (none of them; one, with `strict`)
         """
         parameters = self.set(size, **(changes or {}))
@@ -346,13 +346,13 @@ def _alike(value: Any, other: Any) -> bool:
 
 
 def _kind(value: Any) -> str:
-    """Say in words what is alike."""
+    """Return the kind of value that is allowed, in words."""
     kinds = {bool: "true or false", int: "a whole number", float: "a number", list: "a list", tuple: "a list"}
     return kinds.get(type(value), "a text")
 
 
 def _machine() -> dict[str, Any]:
-    """Return what a reader needs to place the times: processor, versions, date."""
+    """Return what times depend on: processor, versions, date."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -407,7 +407,7 @@ def logarithmic(axes: Axes, *, x: Sequence[float] = (), y: Sequence[float] = ())
 
 
 def drawn(study: Study, parameters: Parameters, summary: Summary) -> list[bytes]:
-    """Return a study's pictures of what it found, as SVG."""
+    """Return the pictures of a study's results, as SVG."""
     figures = study.draw(parameters, summary)
     return [svg(figure) for figure in (figures if isinstance(figures, Sequence) else [figures])]
 
@@ -426,7 +426,7 @@ def _put(data: bytes, file: BinaryIO) -> None:
 
 
 def read_section(folder: Path) -> Section | None:
-    """Return what a study left, pictures as data addresses; None where nothing was run."""
+    """Return the section that a run saved, with pictures as data addresses; None where nothing was run."""
     path = folder / "summary.json"
     if not path.exists():
         return None

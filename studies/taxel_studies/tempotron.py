@@ -75,7 +75,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold what was noted beside ours."""
+    """Compare the noted epochs with ours."""
     full = (p["inputs"], p["epochs"]) == (PARAMETERS["inputs"], PARAMETERS["epochs"])
     found = []
     for line in summary["lines"]:
@@ -102,7 +102,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
-    """Draw the share of tasks solved, and the epochs that they took, by load."""
+    """Draw the share of tasks solved, and the epochs that they needed, by load."""
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     left.plot(

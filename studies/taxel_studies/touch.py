@@ -1,8 +1,8 @@
 """Touch learnt from labels alone: contact and lift, and which of two spheres fell (after thesis 5.6.2).
 
-Nobody writes a rule: the recipe `touch` and the training of `taxel train` learn both questions from labelled recordings
-of the emulated board. Beside each stand the best plain rule that we could think of and an LDA on frames around the
-touch, on the same scenes; for the spheres also an LDA on three numbers.
+No rule is written by hand: the recipe `touch` and the training of `taxel train` learn both questions from labelled
+recordings of the emulated board. For comparison the best plain rule that we could think of and an LDA on frames around
+the touch run on the same scenes; for the spheres also an LDA on three numbers.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ ABOVE = ContactArea().above
 #: The two spheres, as labels.
 KINDS = ("small", "large")
 EVENTS = ("contact", "lift")
-#: Who answers which sphere fell, and who contact and lift.
+#: The methods that classify the spheres, and those that detect contact and lift.
 WAYS = {
     "neuron": "neuron, learnt",
     "rule": "best plain rule",
@@ -97,7 +97,7 @@ MOST_FRAMES = 1500
 
 
 class Drop(NamedTuple):
-    """A recording as `taxel train` reads it, and what the simulation knows of it besides."""
+    """A recording as `taxel train` reads it, with the ground truth of the simulation."""
 
     example: Example
     events: Events
@@ -106,7 +106,7 @@ class Drop(NamedTuple):
     kind: int
 
     def frames(self, period_us: int, start: float, stop: float) -> Frames:
-        """Return what stands above rest as pictures, us."""
+        """Return pictures of the readings above rest; times in us."""
         return self.tare.off(Frames.from_events(self.events, period_us, round(start), round(stop)))
 
 
@@ -160,7 +160,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Draw scenes, learn from some, judge all three ways by the others."""
+    """Draw scenes, learn from some, judge all three methods by the others."""
     with tempfile.TemporaryDirectory() as place:
         sets = {}
         for n, which in enumerate(("train", "test")):
@@ -176,7 +176,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Drop], test: list[Drop]) -> dict[str, Any]:
-    """Say which sphere fell, by time since contact."""
+    """Classify the spheres, by time since contact."""
     times = params["times_ms"]
     right: dict[str, Any] = {"neuron": [], "said_ms": [], "silent": 0}
     for drop in test:
@@ -221,7 +221,7 @@ def _since_contact(drop: Drop, times: Sequence[float]) -> list[Frames]:
 
 
 def _best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
-    """Return the feature whose threshold tells most training scenes apart, and its answers for the others."""
+    """Return the feature whose threshold classifies most training scenes right, and its answers for the others."""
     features = [_features(which) for which in by_moment]
     best: tuple[float, str, float, int] = (-1.0, "", 0.0, 1)
     for name, values in features[0].items():
@@ -235,7 +235,7 @@ def _best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple
 
 
 def _features(pictures: list[Frames]) -> dict[str, Floats]:
-    """Return what a person would look at first, of each picture."""
+    """Return the simple features of each picture: area, total, peak and their ratios."""
     area = np.array([frames.area(ABOVE)[0] for frames in pictures])
     total = np.array([frames.total()[0] for frames in pictures])
     peak = np.array([frames.peak()[0] for frames in pictures])
@@ -260,8 +260,8 @@ def _numbers(pictures: list[Frames]) -> Floats:
 def _around(pictures: Iterable[Frames]) -> Floats:
     """Return the values of 16 x 16 taxels around the centre of what is loaded, picture by picture; beyond the edge 0.
 
-    A touch is anywhere on the array: what is learnt of a taxel at one place holds at no other. Where nothing is loaded,
-    they are those in the middle of the array.
+    A touch is anywhere on the array, and weights learnt for the taxels of one place are of no use at another. Where
+    nothing is loaded, the taxels are those in the middle of the array.
     """
     found = []
     for frames in pictures:
@@ -295,7 +295,7 @@ def _lda(values: ArrayLike, classes: NDArray[Any]) -> Callable[[ArrayLike], NDAr
 
 
 def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Drop], test: list[Drop]) -> dict[str, Any]:
-    """Say when touches begin and end."""
+    """Detect when touches begin and end."""
     window = params["window_ms"]
     levels = {level: _tally([_by_area(t, level) for t in train], train, window) for level in (1, 2, 4, 8)}
     level = max(
@@ -329,7 +329,7 @@ def _tally(found: list[Detections], drops: list[Drop], window_ms: float) -> dict
 
 
 def _by_area(drop: Drop, level: int) -> Detections:
-    """Say contact where so many taxels are loaded, and lift where fewer are."""
+    """Detect contact where so many taxels are loaded, and lift where fewer are."""
     spikes = ContactArea(levels=[level], tare=drop.tare).encode(drop.events)
     times = [np.rint(to_us(train)).astype(np.int64) for train in spikes]
     return detections_at(times[0]) + detections_at(times[1], "lift")
@@ -354,14 +354,14 @@ def _touched(train: list[Drop]) -> Callable[[ArrayLike], NDArray[Any]]:
 
 
 def _by_frames(drop: Drop, touched: Callable[[ArrayLike], NDArray[Any]]) -> Detections:
-    """Say contact and lift where the LDA changes its mind from one picture to the next, 1 ms apart."""
+    """Detect contact and lift where the LDA's answer changes from one picture to the next, 1 ms apart."""
     frames = drop.frames(1000, drop.events.markers[0][0], drop.contacts[-1].stop_us + AFTER_US)
     change = np.diff(touched(_around([frames])), prepend=0)
     return detections_at(frames.t[change > 0]) + detections_at(frames.t[change < 0], "lift")
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Join the parts."""
+    """Merge the results of the parts."""
     kinds = [row.result for row in rows if row.params["question"] == "kind"]
     contacts = [row.result for row in rows if row.params["question"] == "contact"]
     late = [ms for one in kinds for ms in one["said_ms"]]
@@ -388,7 +388,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Judge what the study is to show, and say where another way wins."""
+    """Judge what the study is to show, and name the other method where it does better."""
     at = summary["times_ms"].index(10.0) if 10.0 in summary["times_ms"] else len(summary["times_ms"]) - 1
     shares = {way: summary["kinds"][way][at] for way in WAYS}
     best = max(shares, key=lambda way: shares[way])
@@ -431,7 +431,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """List both questions by way."""
+    """List both questions by method."""
     del p
     recipe = Recipe.load("touch", labels=EVENTS)
     trained = " and ".join(f"{label} {recipe.learner_of(label)[1]:g} ms" for label in EVENTS)
@@ -484,6 +484,6 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     right.set(xticks=places, xticklabels=EVENTS, ylabel="of the touches (%)")
     right.set_title(f"contact and lift, within {p['window_ms']:g} ms")
     for ax, columns in ((left, 2), (right, 3)):
-        # Below the axes: no line and no bar is hidden.
+        # The legend stands below the axes, so that it hides no line and no bar.
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize="small", frameon=False)
     return figure

@@ -1,4 +1,4 @@
-"""What the study comes to: every foot, summed up by row, event, person and group."""
+"""The results of the study: every foot, summed up by row, event, person and group."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ GOALS: dict[str, dict[str, dict[str, float]]] = {
 
 
 class Known:
-    """Look up what realisations gave, by their tasks."""
+    """The results of realisations, by their tasks."""
 
     def __init__(self, rows: Sequence[Row]) -> None:
         self._rows = {Task(row.params, row.seed).key(""): row for row in rows}
@@ -59,7 +59,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Unit:
-    """What was found at one foot in one fold."""
+    """The result at one foot in one fold."""
 
     name: str
     person: str
@@ -222,7 +222,7 @@ def _conversion(data: Path) -> dict[str, Any]:
 
 
 def _full_search(plan: Plan, known: Known) -> Iterator[dict[str, Any]]:
-    """List what each fold chose of the 528 settings, what it had found of it inside, and what it came to."""
+    """List the setting of the 528 that each fold chose, its errors inside the training groups and in the test."""
     for scope, event, row in each(plan):
         for left_out in plan.outer(scope) if row in FULL else ():
             fitted = known[plan.task(scope, left_out, event, row)]
@@ -318,7 +318,7 @@ def _counted(points: Sequence[Any]) -> list[dict[str, Any]]:
 
 
 def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Say, event by event, how the neuron stands beside the plain rules: by missed + false, then by % within 10 ms."""
+    """Compare the neuron with the plain rules, event by event: by missed + false, then by % within 10 ms."""
     lines = []
     for event in dict.fromkeys(row["event"] for row in rows):
         here = {row["row"]: row["figures"] for row in rows if row["event"] == event}

@@ -1,4 +1,4 @@
-"""Figures 6.12 to 6.14: pressure and spikes of the insole during a footfall, and what was found."""
+"""Figures 6.12 to 6.14: pressure and spikes of the insole during a footfall, and the shares of events found."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _bars(rows: Sequence[Mapping[str, Any]]) -> Figure:
 
 
 def _conversion(summary: Mapping[str, Any]) -> Figure:
-    """Draw 6.12 and 6.13: the insole, what three taxels feel, and the spikes of all inputs over one footfall."""
+    """Draw 6.12 and 6.13: the insole, the readings of three taxels, and the spikes of all inputs over one footfall."""
     figure = Figure(figsize=(13, 4.6), layout="constrained")
     foot, analog, raster = figure.subplots(1, 3, width_ratios=[1, 2, 3])
     at = [(c - (n - 1) / 2, r) for r, n in enumerate(insole.CELLS) for c in range(n)]

@@ -77,7 +77,7 @@ class Plan:
             yield from ([g] for g in range(len(scope.groups)))
 
     def neuron(self, scope: Scope, left_out: list[int], event: str, row: str) -> Task:
-        """Name the fit of a row's neuron in a fold, with the points that it chooses from inside the training groups."""
+        """Return the fit of a row's neuron in a fold, with the points that are tried inside the training groups."""
         points = _points(self, event, row)
         placed = "others" if row == "others" else "own"
         params: dict[str, Any] = {"kind": "neuron", "left_out": left_out, "event": event, "points": points}
@@ -88,24 +88,24 @@ class Plan:
         return Task(self.common | params, seed=1)
 
     def _each(self, scope: Scope, left_out: list[int]) -> list[list[int]]:
-        """Let each of the other groups test what the rest trained."""
+        """Return folds that test on each of the other groups, trained on the rest."""
         return [[g] for g in range(len(scope.groups)) if g not in left_out]
 
     def _third(self, scope: Scope, left_out: list[int]) -> list[list[int]]:
-        """Let a third of the other groups test what the rest trained."""
+        """Return one fold that tests on a third of the other groups, trained on the rest."""
         after = max(left_out, default=-1) + 1
         groups = len(scope.groups)
         others = [g for g in ((after + k) % groups for k in range(groups)) if g not in left_out]
         return [sorted(others[: max(1, len(others) // 3 + (len(others) % 3 > 1))])]
 
     def task(self, scope: Scope, left_out: list[int], event: str, row: str) -> Task:
-        """Name the task of a row in a fold."""
+        """Return the task of a row in a fold."""
         if row.startswith("rule: "):
             return self.rule(scope, left_out, event, row.removeprefix("rule: "))
         return self.neuron(scope, left_out, event, row)
 
     def rule(self, scope: Scope, left_out: list[int], event: str, rule: str) -> Task:
-        """Name a plain rule's choice."""
+        """Return the task that chooses the numbers of a plain rule in a fold."""
         encoder = RULE_ENCODERS[self.source][event]
         params = {"kind": "rule", "left_out": left_out, "event": event, "rule": rule, "encoder": encoder}
         train = dict(self.protocol.train)
@@ -208,7 +208,7 @@ def _points(plan: Plan, event: str, row: str) -> list[Point]:
 
 
 def _rest(point: Point) -> list[float]:
-    """Return the lambdas of a point behind the first two."""
+    """Return the lambdas of a point after the first two."""
     rest: list[float] = point["learner"]["lambdas"][2:]
     return rest
 

@@ -32,7 +32,7 @@ __all__ = [
     "to_json",
 ]
 
-#: The three rows of the study, and what stands beside them.
+#: The three rows of the study, and those for comparison.
 ROWS = {
     "notes": "the notes' recipe (tuned on the shared people, and flattered by that)",
     "chosen": "parameters chosen inside the training folds (missed + false first, then error): the honest row",
@@ -131,7 +131,7 @@ def to_json(scopes: Sequence[Scope], names: Sequence[str]) -> list[dict[str, Any
 
 @dataclass(frozen=True)
 class Protocol:
-    """Say how a source is split and what is run on it.
+    """Describe how a source is split and what is run on it.
 
     Attributes
     ----------

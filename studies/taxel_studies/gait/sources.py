@@ -27,9 +27,9 @@ from taxel_studies.study import refuse
 
 __all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "readable", "readings", "unread"]
 
-#: Silence before each footfall of the plate, ms: random, so that no cut marks time.
+#: Silence before each footfall of the plate, ms: random, so that its length does not reveal when events come.
 SILENCE_MS = (300, 900)
-#: A footfall's piece ends so long after foot-off, ms; the encoder and the delay have spoken by then.
+#: A footfall's piece ends so long after foot-off, ms; by then the encoder's latency and the delay are over.
 TAIL_MS = 100
 #: How long a row of footfalls stays silent at its end, ms.
 END_MS = 500
@@ -133,7 +133,7 @@ def _present(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
 
 @dataclass(frozen=True)
 class Readings:
-    """Hold what a source's files gave.
+    """The trials that a source's files hold.
 
     Attributes
     ----------
@@ -243,7 +243,7 @@ def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "
     encoder : mapping
         Its `name` and parameters.
     placed : {"own", "others"}
-        Whose footfalls tell the insole's size and toe-out on the plate: the person's other ones, or other people's.
+        Whose footfalls give the insole's size and toe-out on the plate: the person's other ones, or other people's.
     """
     return _encoded(folder, name, json.dumps(encoder, sort_keys=True), placed)
 
@@ -306,7 +306,7 @@ def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
     found = []
     for at, silence, k in zip(begins, silences, order, strict=True):
         start, stop = float(at - silence), float(at + lengths[k])
-        if at > silences[0]:  # the tail of the footfall before belongs to it
+        if at > silences[0]:  # the first spikes still belong to the footfall before
             start += TAIL_MS
         stop += TAIL_MS
         rows = slice(int(start) // step, int(stop) // step)
@@ -328,7 +328,7 @@ def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
 
 @dataclass(frozen=True)
 class Cut:
-    """One footfall as the insole feels it; truth in ms from its first frame."""
+    """One footfall as the insole measures it; truth in ms from its first frame."""
 
     name: str
     person: str

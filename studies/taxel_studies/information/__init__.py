@@ -1,6 +1,7 @@
-"""Chapter 5's question on other people's recordings: how many bits do touches hold, and what else would tell as much.
+"""Chapter 5's question on other people's recordings: how many bits do touches hold, and which simpler measurements do.
 
-Footfalls on a plate, grasps of a robot's hand, postures on a mat; each beside chance, pictures and what is trivial.
+Footfalls on a plate, grasps of a robot's hand, postures on a mat; each compared with chance, with pictures and with
+trivial measurements.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ PROTOCOL = (
     "postures, whole poses with all their variants left out; it has no time, so only the number of taxels counts. "
     "What was tried beforehand is our own, with other code, and stands where else published values stand."
 )
-#: Folders of recordings, and what is asked of each.
+#: Folders of recordings, and the module with the questions on each.
 ASKED: dict[str, Any] = {"plate": footfalls, "touch_icub_grasp": grasps, "mat_popu": postures}
 DATA = tuple(ASKED)
 
@@ -75,7 +76,7 @@ def realise(params: dict[str, Any], seed: int, data: Path) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Summary:
-    """Keep every answer, by folder and question."""
+    """Return every answer, by folder and question."""
     del p, data
     summary: Summary = {}
     for row in rows:
@@ -84,7 +85,7 @@ def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold the answers against what was tried beforehand, with other code."""
+    """Compare the answers with those of an earlier trial with other code."""
     return [one for folder, found in summary.items() for one in ASKED[folder].statements(p, found)]
 
 

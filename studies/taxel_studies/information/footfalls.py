@@ -76,7 +76,7 @@ def _placed(trial: Trial) -> tuple[Frames, int]:
 
 
 def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
-    """Ask the footfalls."""
+    """Estimate the bits of the footfalls on one question."""
     return answer(
         footfalls(folder, params["ask"], params["most_trials"]),
         encoder=ChangeEvents(noise_floor=params["floor_counts"]),
@@ -97,7 +97,7 @@ def _bits(summary: dict[str, Any], period: float, window: float) -> float | None
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold bits by period and time against what was tried beforehand."""
+    """Compare bits by period and time with the earlier trial."""
     found = []
     whole = p["most_trials"] == 0
     if "person" in summary:

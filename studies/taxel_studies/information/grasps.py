@@ -22,12 +22,12 @@ USES = ("slices", "draws", "shuffles", "most_trials")
 
 #: A change of so much of the 8-bit value makes an event.
 _FLOOR = 3.0
-#: Of the comparison of early grasps with late ones, as nothing is chosen there.
+#: Ridge of the comparison of early grasps with late ones, in which no parameter is chosen.
 _RIDGE = 1.0
 
 
 def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
-    """Ask the grasps: pictures and events since the first slice, that slice itself, and how many slices there are."""
+    """Estimate the bits of pictures and events since the first slice, of that slice, and of the number of slices."""
     values, labels, order = [], [], []
     count: dict[str, int] = {}
     for trial in icub.trials(folder):
@@ -88,7 +88,7 @@ def _events(values: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _early_and_late(x: NDArray[Any], y: NDArray[Any], order: NDArray[np.int64], seed: int) -> dict[str, float]:
-    """Return the share named rightly: late grasps by early ones, and random halves by the others."""
+    """Return the share classified right: late grasps after training on early ones, and random halves on the others."""
     flat = x.reshape(len(x), -1).astype(np.float64)
     flat = flat - flat.mean(0)
     gram, features = flat @ flat.T, max(1, int(flat.any(0).sum()))
@@ -109,7 +109,7 @@ def _early_and_late(x: NDArray[Any], y: NDArray[Any], order: NDArray[np.int64], 
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold bits by slice against what was tried beforehand."""
+    """Compare bits by slice with the earlier trial."""
     one, whole = summary["object"], p["most_trials"] == 0
     first = one["first"]
     found = [

@@ -1,4 +1,4 @@
-"""Postures on a mat: how many taxels it takes. It has no time."""
+"""Postures on a mat: bits by the number of taxels. The recordings have no time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ USES = ("mat_taxels", "draws", "shuffles", "most_trials")
 
 
 def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
-    """Ask which of the postures, whole poses with all their variants left out."""
+    """Estimate the bits on the posture, whole poses with all their variants left out."""
     values, labels, groups = [], [], []
     for trial in popu.trials(folder):
         if trial.about["posture"] == "empty":
@@ -62,7 +62,7 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold bits by number of taxels against what was tried beforehand."""
+    """Compare bits by number of taxels with the earlier trial."""
     one = summary["posture"]
     before = {16: 1.1, 64: 1.87}
     ours = {n: b["bits"] for n, b in zip(one["taxels"], one["random"], strict=True) if n in before}

@@ -76,7 +76,7 @@ realise = protocols.realise
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """List patterns and loads by protocol and rule, with what is ours in each, and every load that was looked at."""
+    """List patterns and loads by protocol and rule, with the constants that are ours, and every load that was tried."""
     lines = []
     for protocol in p["protocols"]:
         for rule in p["rules"]:
@@ -112,7 +112,7 @@ def _at_90(tried: Sequence[Sequence[float]], inputs: int) -> float | None:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold Gardner and Grüning's figures, and the loads that the thesis names, beside ours."""
+    """Compare Gardner and Grüning's figures, and the loads that the thesis names, with ours."""
     found = []
     a = {line["rule"]: line for line in summary["lines"] if line["protocol"] == "a"}
     full = (p["runs_a"], p["epochs_a"]) == (PARAMETERS["runs_a"], PARAMETERS["epochs_a"])
@@ -179,7 +179,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
                 ax.axhline(line["published"], color=f"C{k}", lw=0.8, ls=":")
         ax.set_title(titles[protocol], fontsize="medium")
         ax.set_xlabel("inputs N")
-    # Once all is drawn: a limit set before would keep what the first panel needs.
+    # The limit is set after all panels are drawn: set before, it would be that of the first panel.
     axes[0].set_ylim(bottom=0)
     axes[0].set_ylabel("largest load p / N; dotted: published, other criteria")
     axes[-1].legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.0, 1.0))

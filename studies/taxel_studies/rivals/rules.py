@@ -24,7 +24,7 @@ NEURON: dict[str, Any] = {"tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
 
 @dataclass(frozen=True)
 class Rule:
-    """Hold what the comparison gives a rule.
+    """The learner and constants that the comparison gives a rule.
 
     Attributes
     ----------
