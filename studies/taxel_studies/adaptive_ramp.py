@@ -84,8 +84,8 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     ramp = AdaptiveRamp(converter=converter)
     if fixed is not None:
         ramp = AdaptiveRamp(converter=converter, steepest=fixed, gentlest=fixed)
-    seen = ramp.convert(volts, period_us=every)
-    line_us = converter.line_us + converter.steps * (seen.ramp.astype(float) - converter.ramp) / 300.0
+    scans = ramp.convert(volts, period_us=every)
+    line_us = converter.line_us + converter.steps * (scans.ramp.astype(float) - converter.ramp) / 300.0
     loaded = np.argwhere(share > 0.2)
     ends = every * int(1e3 * params["fine_ms"] / every)
     # The host's value at each time is the last reading before it.
@@ -96,33 +96,33 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     for tap in taps:
         tapped |= (t >= tap) & (t < tap + 1e3 * params["tap_ms"])
     for y, x in loaded.tolist():
-        sampled_us = seen.t_us + x * line_us
+        sampled_us = scans.t_us + x * line_us
         last = np.searchsorted(sampled_us, t, side="right") - 1
         known = last >= 0
-        wrong = seen.volts[last[known], y, x] - volts[known, y, x]
+        wrong = scans.volts[last[known], y, x] - volts[known, y, x]
         for phase, when in (("fine", t[known] < ends), ("gross", tapped[known])):
             squares[phase][0] += float((wrong[when] ** 2).sum())
             squares[phase][1] += int(when.sum())
     y, x = loaded[np.argmax(share[loaded[:, 0], loaded[:, 1]])].tolist()
-    sampled_us = seen.t_us + x * line_us
+    sampled_us = scans.t_us + x * line_us
     for tap in taps:
-        before = seen.volts[max(0, int(np.searchsorted(sampled_us, tap)) - 1), y, x]
-        after = np.flatnonzero((sampled_us >= tap) & (seen.volts[:, y, x] > before + SEEN_V))
+        before = scans.volts[max(0, int(np.searchsorted(sampled_us, tap)) - 1), y, x]
+        after = np.flatnonzero((sampled_us >= tap) & (scans.volts[:, y, x] > before + SEEN_V))
         late.append(float(sampled_us[after[0]] - tap) if len(after) else float("nan"))
     result: dict[str, Any] = {
         "rms_mv": {phase: 1e3 * float(np.sqrt(s / max(1, n))) for phase, (s, n) in squares.items()},
         "late_us": late,
         "frames_a_s": {
-            "fine": float((seen.t_us < ends).sum() / (1e-6 * ends)),
-            "gross": float(np.median(1e6 / (columns * line_us[np.searchsorted(seen.t_us, taps + 2e3)]))),
+            "fine": float((scans.t_us < ends).sum() / (1e-6 * ends)),
+            "gross": float(np.median(1e6 / (columns * line_us[np.searchsorted(scans.t_us, taps + 2e3)]))),
         },
     }
     if seed == 0:
-        near = (seen.t_us > taps[0] - 2e3) & (seen.t_us < taps[0] + 1e3 * params["tap_ms"] + 6e3)
+        near = (scans.t_us > taps[0] - 2e3) & (scans.t_us < taps[0] + 1e3 * params["tap_ms"] + 6e3)
         result["course"] = {
             "t_ms": (1e-3 * (sampled_us[near] - taps[0])).round(4).tolist(),
-            "volts": seen.volts[near, y, x].round(5).tolist(),
-            "ramp": seen.ramp[near].tolist(),
+            "volts": scans.volts[near, y, x].round(5).tolist(),
+            "ramp": scans.ramp[near].tolist(),
         }
     return result
 

@@ -114,8 +114,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
                 "first": information.FirstSpikeLatency(window_ms=window),
                 "relative": information.RelativeLatency(window_ms=window),
             }
-            found = information.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
-            summary["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
+            bits = information.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
+            summary["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in bits.items()}
         results = [r.result[array] for r in rows]
         touched_s = np.array([1e-3 * r.result["touched_ms"] for r in rows])
         events = np.array([one["events"] for one in results])
@@ -221,10 +221,10 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     ):
         for array, colour, beside in zip(ARRAYS, ("C0", "C3"), (0.98, 1.02), strict=True):
             windows = [float(w) for w in summary["bits"][array]]
-            found = np.array([one[code] for one in summary["bits"][array].values()])
-            off = np.abs(found[:, 1:] - found[:, :1]).T
+            bits = np.array([one[code] for one in summary["bits"][array].values()])
+            off = np.abs(bits[:, 1:] - bits[:, :1]).T
             # The two curves are drawn a little apart, so that neither interval hides the other.
-            ax.errorbar(np.multiply(windows, beside), found[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
+            ax.errorbar(np.multiply(windows, beside), bits[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
         ax.axhline(summary["most"], color="0.6", ls=":", label="ceiling")
         ax.set(xlabel="time since contact, ms", title=title)
         logarithmic(ax, x=windows)

@@ -126,8 +126,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     for window in p["windows_ms"]:
         every = codes(window)
         for name, onsets in (("bits", np.zeros(len(rows))), ("slipped", -slips)):
-            found = information.compare_codes(trials, labels, every, onsets_ms=onsets, folds=folds, seed=p["seed"])
-            summary[name][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
+            estimates = information.compare_codes(trials, labels, every, onsets_ms=onsets, folds=folds, seed=p["seed"])
+            summary[name][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in estimates.items()}
         counted = np.mean([[np.count_nonzero(np.asarray(t) < window) for t in row.result] for row in rows])
         summary["spikes"][f"{window:g}"] = float(counted)
     return summary

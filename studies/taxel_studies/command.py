@@ -70,13 +70,13 @@ def _root(
     if stale:
         from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
 
-        found = stale_figures(figures)
-        for name, parts in found.items():
+        outdated = stale_figures(figures)
+        for name, parts in outdated.items():
             more = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
             typer.echo(f"{name}: {', '.join(parts[:MOST_NAMED])}{more}")
         typer.echo(
-            f"{len(found)} kept figures are stale; taxel study NAME --confirm, or run them again"
-            if found
+            f"{len(outdated)} kept figures are stale; taxel study NAME --confirm, or run them again"
+            if outdated
             else "no kept figure is stale"
         )
     elif context.invoked_subcommand is None:

@@ -149,7 +149,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     short = [one for one in paths if one["fault"]]
     slanted = [one["asymmetry"] for one in paths if one["angle_deg"]]
     straight = [one["asymmetry"] for one in paths if not one["angle_deg"]]
-    found = [
+    judged = [
         Statement(
             "Table 5.1: every combination of diameter, modulus, depth and angle is simulated.",
             "300 conditions",
@@ -169,7 +169,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         ),
     ]
     if slanted and straight:
-        found.append(
+        judged.append(
             Statement(
                 "Figure 5.2b: a contact under a slant deforms the sensor asymmetrically.",
                 "the picture, 10 degrees",
@@ -181,7 +181,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         )
     drawn = summary["sampled"]
     count = sum(map(len, drawn["times"]))
-    found.append(
+    judged.append(
         Statement(
             "Figure 5.4: spikes are discharged only when a pressure change above the threshold is sensed.",
             "the picture",
@@ -190,7 +190,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             f"one sample path at {p['period_ms']:g} ms",
         )
     )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:

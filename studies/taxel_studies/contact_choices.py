@@ -109,11 +109,11 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by choice and period."""
     del courses
-    found = {(r.params["choice"], r.params["period_ms"]): r.result["bits"] for r in rows if "choice" in r.params}
+    bits = {(r.params["choice"], r.params["period_ms"]): r.result["bits"] for r in rows if "choice" in r.params}
     periods = sorted(p["periods_ms"])
     return {
         "periods_ms": periods,
-        "lines": [{"choice": c, "bits": [found[c, t] for t in periods]} for c in p["choices"]],
+        "lines": [{"choice": c, "bits": [bits[c, t] for t in periods]} for c in p["choices"]],
         "conditions": len(indented.table_of(p).conditions()),
     }
 

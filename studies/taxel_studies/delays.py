@@ -51,14 +51,14 @@ def arms(p: Parameters) -> list[str]:
 def tasks(p: Parameters) -> list[Task]:
     """List one search an arm and N, and one selection an arm, N, load and realisation; the longest first."""
     shared = {"classes": p["classes"], "longest_ms": p["longest_ms"], "time": p["time"]}
-    found = []
+    listed = []
     for inputs in sorted(p["inputs"], reverse=True):
         for arm in reversed(arms(p)):
             one = {**shared, "inputs": inputs, "arm": arm}
-            found.append(Task({**one, "asks": "capacity", "realisations": p["realisations"]}))
+            listed.append(Task({**one, "asks": "capacity", "realisations": p["realisations"]}))
             for share in p["shares"]:
-                found += [Task({**one, "asks": "weights", "share": share}, seed) for seed in range(p["realisations"])]
-    return found
+                listed += [Task({**one, "asks": "weights", "share": share}, seed) for seed in range(p["realisations"])]
+    return listed
 
 
 def delayed(params: dict[str, Any], drawn: Sequence[SpikeTrains], seed: int) -> list[SpikeTrains]:
@@ -111,8 +111,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
         here = [r for r in rows if r.params["arm"] == arm]
         line: dict[str, Any] = {"arm": arm, "inputs": list(p["inputs"]), "load": [], "selected": []}
         for inputs in p["inputs"]:
-            (found,) = (r.result["p"] for r in here if _of(r, inputs, "capacity"))
-            line["load"].append(round(found / inputs, 4))
+            (largest,) = (r.result["p"] for r in here if _of(r, inputs, "capacity"))
+            line["load"].append(round(largest / inputs, 4))
         for share in p["shares"]:
             for inputs in p["inputs"]:
                 some = [r.result for r in here if _of(r, inputs, "weights") and r.params["share"] == share]
@@ -146,7 +146,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     plain, random, copied = (lines[arm]["load"][last] for arm in ("none", "random", most))
     loads = ", ".join(f"{arm} {line['load'][last]:g}" for arm, line in lines.items())
     at = f"N = {p['inputs'][last]}"
-    found = [
+    judged = [
         Statement(
             "Copies at several delays let a neuron learn more patterns an input.",
             "not in the thesis",
@@ -172,7 +172,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         known = {arm: s for arm, s in here.items() if s is not None}
         if {"none", most} <= set(known):
             by_arm = ", ".join(f"{arm} {s['by_weight']:.2f} ({s['weights']:.0f} weights)" for arm, s in known.items())
-            found.append(
+            judged.append(
                 Statement(
                     f"At a load of {share:g}, l1 over all copies learns with fewer weights than over the inputs alone.",
                     "not in the thesis",
@@ -181,7 +181,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     "so what the copies buy is the choice of delays, and not the number of weights alone",
                 )
             )
-    found.append(
+    judged.append(
         Statement(
             "Delays found by a linear programme are not new.",
             "Rostro-Gonzalez, Vasquez, Cessac and Viéville 2010 (hal inria-00455415): weights at each delay, "
@@ -190,7 +190,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             None,
         )
     )
-    found.append(
+    judged.append(
         Statement(
             "Copies without selection hurt on recordings.",
             "not in the thesis",
@@ -199,7 +199,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "measured once with CONE-R and l2 when the gait recipes were sought; not rerun here",
         )
     )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

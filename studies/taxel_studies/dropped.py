@@ -298,9 +298,9 @@ def sampled(drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.flo
     drop, sample = train // taxels, np.round(spikes.times).astype(np.int64) - 1
     first = np.full(len(drops), count)
     np.minimum.at(first, drop, sample)
-    found = np.zeros((len(drops), count, 2, taxels), np.uint8)
-    found[drop, sample - first[drop], (spikes.values < 0).astype(int), train % taxels] = 1
-    return found
+    counts = np.zeros((len(drops), count, 2, taxels), np.uint8)
+    counts[drop, sample - first[drop], (spikes.values < 0).astype(int), train % taxels] = 1
+    return counts
 
 
 def pictures(
@@ -365,17 +365,17 @@ def spatial_grams(
     decay = np.float32(np.exp(-period_ms / tau))
     passed = -np.expm1(-2 * period_ms / tau)
     totals = [np.zeros((count, count)) for _ in kernels]
-    found: list[list[NDArray[np.float64]]] = [[] for _ in kernels]
+    grams: list[list[NDArray[np.float64]]] = [[] for _ in kernels]
     for k in range(ends[-1]):
         state *= decay
         state += spikes[:, k]
         for n, kernel in enumerate(kernels):
-            seen = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
-            here = seen @ seen.T
+            smooth = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
+            here = smooth @ smooth.T
             if k + 1 in ends:
-                found[n].append((totals[n] + here) * (tau / 2))
+                grams[n].append((totals[n] + here) * (tau / 2))
             totals[n] += passed * here
-    return found
+    return grams
 
 
 def absolute_distances(
@@ -393,8 +393,8 @@ def absolute_distances(
     for k in range(samples):
         state *= decay
         state += spikes[:, k]
-        seen = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
-        total += cdist(seen, seen, "cityblock")
+        smooth = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
+        total += cdist(smooth, smooth, "cityblock")
     return total
 
 

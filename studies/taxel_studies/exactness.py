@@ -168,7 +168,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     exact, solved = sum(c["exact"] for c in cases), sum(c["solved"] for c in cases)
     shares = [_share(c, fine) for c in hard]
     listed = ", ".join(f"{s:.0%} at {c['margin']:g}" for s, c in zip(shares, hard, strict=True))
-    found = [
+    judged = [
         Statement(
             "Every solved problem is exact in continuous time (ours).",
             "none",
@@ -203,7 +203,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     small = [
         c["p"] / grid[c["inputs"]]["p"] for c in summary["loads"] if 0 < c["margin"] <= 1e-3 and grid[c["inputs"]]["p"]
     ]
-    found.append(
+    judged.append(
         Statement(
             "Silence at every instant costs little capacity while margin and slope are 1e-3 or less (ours).",
             "none; 0 to 10 % in trials",
@@ -212,7 +212,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "margin in mV and slope in mV/ms alike",
         )
     )
-    return found
+    return judged
 
 
 def _share(case: dict[str, Any], step: float) -> float:

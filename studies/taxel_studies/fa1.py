@@ -96,10 +96,10 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
                 "rate": information.RateCode(window_ms=window, most_hz=1e6 / PERIOD_US),
                 "first": information.FirstSpikeLatency(window_ms=window, resolution_ms=resolution),
             }
-            found = information.compare_codes(
+            bits = information.compare_codes(
                 trials, labels, codes, onsets_ms=np.zeros(len(rows)), folds=folds, seed=p["seed"]
             )
-            best = max(found.values(), key=lambda one: one.bits)
+            best = max(bits.values(), key=lambda one: one.bits)
             summary["bits"][without][f"{window:g}"] = [best.bits, *best.interval]
             events = [np.count_nonzero(one.times < window) for one in trials]
             summary["events"][without][f"{window:g}"] = float(np.mean(events))
@@ -111,11 +111,11 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     late = f"{max(p['windows_ms']):g}"
     whole, bottom, top = summary["bits"]["all"][late]
     events = summary["events"]["all"][late]
-    found = []
+    judged = []
     for without, name in list(VARIANTS.items())[1:]:
         bits, low, high = summary["bits"][without][late]
         cost = summary["events"][without][late] / max(events, 1e-9)
-        found.append(
+        judged.append(
             Statement(
                 f"It is to be found out whether FA-1's {name} is worth keeping.",
                 "asked in 7.2, not answered",
@@ -125,7 +125,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 + "; of two codes, counts and first spikes, the one with more bits",
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:

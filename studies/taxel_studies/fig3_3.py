@@ -122,10 +122,10 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 3.3: analog, digital, spikes, of the twelve taxels that are on for longest."""
     figure = Figure(figsize=(11, 3.6), layout="constrained")
     left, middle, right = figure.subplots(1, 3, sharey=True)
-    seen = summary["drawn"]
-    t = np.array(seen["t_ms"])
-    for row, (volts, digital, spikes) in enumerate(zip(seen["volts"], seen["digital"], seen["spikes"], strict=True)):
-        left.plot(t, row + 0.8 * np.array(volts) / max(map(max, seen["volts"])), color="C0", lw=0.8)
+    shown = summary["drawn"]
+    t = np.array(shown["t_ms"])
+    for row, (volts, digital, spikes) in enumerate(zip(shown["volts"], shown["digital"], shown["spikes"], strict=True)):
+        left.plot(t, row + 0.8 * np.array(volts) / max(map(max, shown["volts"])), color="C0", lw=0.8)
         middle.step(t, row + 0.8 * np.array(digital), color="C2", lw=0.8, where="post")
         right.vlines(spikes, row, row + 0.8, color="k", lw=0.9)
     for ax, title in ((left, "analog readout"), (middle, f"above {p['threshold_v']:g} V"), (right, "spikes")):

@@ -78,7 +78,7 @@ def tasks(p: Parameters) -> list[Task]:
 def _trials(text: str) -> list[SpikeTrains]:
     """Return the recordings of one force, sphere after sphere."""
     p = json.loads(text)
-    found = []
+    trials = []
     for sphere, diameter in enumerate(p["diameters_mm"]):
         depth = depth_of(diameter, p["force_n"], p["foam_kpa"], p["foam_mm"])
         for trial in range(p["trials"]):
@@ -91,8 +91,8 @@ def _trials(text: str) -> list[SpikeTrains]:
             course = np.clip((t - began) / 1000 * speed, 0.0, deep)
             frames = read(p, *pressed(p, diameter, deep, x, y), course, int(random.integers(2**31)))
             spikes = ThresholdIzhikevich([p["threshold_v"]], published="3.4.3").encode(frames)
-            found.append(spikes.split_by_sign())
-    return found
+            trials.append(spikes.split_by_sign())
+    return trials
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -152,13 +152,13 @@ def _line(rows: Sequence[Row], force: float) -> dict[str, Any]:
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 3.6.1 says."""
     full = p["realisations"] >= PARAMETERS["realisations"] and p["trials"] >= PARAMETERS["trials"]
-    found = []
+    judged = []
     for line in summary["forces"]:
         force = line["force_n"]
         if force not in PUBLISHED:
             continue
         mean, sd = PUBLISHED[force]
-        found.append(
+        judged.append(
             Statement(
                 f"Two spheres are told apart at {force:g} N.",
                 f"{mean:g} +- {sd:g} %",
@@ -171,7 +171,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     for line in _best(summary["others"]):
         if line["force_n"] in PUBLISHED:
             mean, sd = PUBLISHED[line["force_n"]]
-            found.append(
+            judged.append(
                 Statement(
                     f"The same at {line['force_n']:g} N with other values: {line['reading']}.",
                     f"{mean:g} +- {sd:g} %; below 5 % of error in training within tens of epochs",
@@ -181,7 +181,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     "neuron's 25 ms, and on hard foam 1 N touches few taxels",
                 )
             )
-    found += [
+    judged += [
         Statement(
             f"Training error falls below 5 % within tens of epochs ({line['force_n']:g} N).",
             "tens of epochs",
@@ -191,7 +191,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         )
         for line in summary["forces"]
     ]
-    return found
+    return judged
 
 
 def _best(others: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -59,22 +59,22 @@ def _scan(params: dict[str, Any]) -> dict[str, Any]:
     """Read four lines of one channel; then two columns of which the first was pressed and the second was not."""
     converter = Converter(amplifier_us=params["amplifier_us"])
     lines = VirtualGround().volts(Fabric().conductance(np.array(params["forces_n"]))[:, None]).ravel()
-    seen = converter.trace(lines.tolist(), every_us=params["every_us"], stop_us=2 * converter.line_us)
-    second = seen.t_us >= converter.line_us
-    took = []
+    trace = converter.trace(lines.tolist(), every_us=params["every_us"], stop_us=2 * converter.line_us)
+    second = trace.t_us >= converter.line_us
+    settling_us = []
     for step in range(converter.steps):
         begins = converter.line_us + step * converter.step_us
-        here = second & (seen.t_us >= begins) & (seen.t_us < begins + converter.step_us)
-        off = np.abs(seen.input_v - seen.line_v)[here]
+        here = second & (trace.t_us >= begins) & (trace.t_us < begins + converter.step_us)
+        off = np.abs(trace.input_v - trace.line_v)[here]
         last = np.flatnonzero(off > params["settled"] * off[0])
-        took.append(float(seen.t_us[here][last[-1]] - begins) if len(last) else 0.0)
+        settling_us.append(float(trace.t_us[here][last[-1]] - begins) if len(last) else 0.0)
     pressed = np.stack([lines, np.full(len(lines), VirtualGround().v_trans)], axis=1)
     plain = Converter().ticks(np.stack([pressed[:, 1:]] * 2))[1].ravel()
     left = converter.ticks(np.stack([pressed] * 2))[1][:, 1]
     return {
-        "trace": {name: getattr(seen, name)[second].round(6).tolist() for name in ("t_us", "input_v", "ramp_v")}
-        | {"high": seen.high[second].astype(int).tolist()},
-        "settles_us": np.round(took, 4).tolist(),
+        "trace": {name: getattr(trace, name)[second].round(6).tolist() for name in ("t_us", "input_v", "ramp_v")}
+        | {"high": trace.high[second].astype(int).tolist()},
+        "settles_us": np.round(settling_us, 4).tolist(),
         "left_ticks": np.round(left - plain, 3).tolist(),
     }
 
@@ -92,7 +92,7 @@ def _of(rows: Sequence[Row], tau: float) -> list[Row]:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.4.1 says."""
-    found = [
+    judged = [
         Statement(
             "The sensor responds at approximately 50 us.",
             "50 us",
@@ -104,7 +104,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     for scan in summary["scans"]:
         worst = max(scan["settles_us"])
         if scan["amplifier_us"] == 0:
-            found.append(
+            judged.append(
                 Statement(
                     "V_in settles within 0.2 us while 4 channels are multiplexed at 3 us a column.",
                     f"{SETTLED_US:g} us",
@@ -114,7 +114,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 )
             )
         else:
-            found.append(
+            judged.append(
                 Statement(
                     f"The same, were the board's 15 pF to lie across R_f ({scan['amplifier_us']:g} us).",
                     "no word of a column's traces in the next",
@@ -125,7 +125,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     "what a lab can measure: none if the capacitors lie elsewhere",
                 )
             )
-    return found
+    return judged
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
@@ -135,11 +135,11 @@ def draw(_p: Parameters, summary: Summary) -> Figure:
     left.plot(summary["impact"]["t_us"], summary["impact"]["volts"], color="C2")
     left.axvline(0.0, color="k", ls=":", lw=0.9)
     left.set(xlabel="time since the impact, us", ylabel="V_in, V", title="(a)")
-    seen = summary["scans"][0]["trace"]
-    t = np.array(seen["t_us"]) - seen["t_us"][0]
-    right.plot(t, seen["ramp_v"], color="C3", label="V_ramp")
-    right.plot(t, seen["input_v"], color="C2", label="V_in")
-    right.step(t, seen["high"], color="C0", where="post", label="V_comp (high: 1)")
+    trace = summary["scans"][0]["trace"]
+    t = np.array(trace["t_us"]) - trace["t_us"][0]
+    right.plot(t, trace["ramp_v"], color="C3", label="V_ramp")
+    right.plot(t, trace["input_v"], color="C2", label="V_in")
+    right.step(t, trace["high"], color="C0", where="post", label="V_comp (high: 1)")
     right.set(xlabel="time since the column's change, us", ylabel="V", title="(b)")
     right.legend(fontsize="small", loc="upper right")
     return figure

@@ -127,7 +127,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     at, over = float(total[total[:, 1].argmax(), 0]), total[:, 1] < 0.1 * total[:, 1].max()
     ended = next((t for (t, _), low in zip(summary["sum"], over, strict=True) if low and t > at), float("inf"))
     apart = float(np.hypot(*summary["middle"]))
-    found = [
+    judged = [
         Statement(
             "Figure 4.8: pressure grows and decays around the taxel that answered first.",
             "the picture, 8 ms",
@@ -142,7 +142,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     if slow and fast:
         least, best = max(line["bits"] for line in slow), max(line["bits"] for line in fast)
         phased = max(line["any_phase_bits"] for line in slow)
-        found += [
+        judged += [
             Statement(
                 "Figure 4.10: below 100 Hz little is known of the impact.",
                 "insufficient",
@@ -158,7 +158,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"marked: half a bit or more; simulated drops vary as we guess; {size}",
             ),
         ]
-    return found
+    return judged
 
 
 def _from_100_hz(lines: list[dict[str, Any]], best: float) -> str:

@@ -59,14 +59,14 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
         return drops
     from sklearn.manifold import TSNE  # noqa: PLC0415  an extra
 
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for how, aligned in (("", True), ("any_phase_", False)):
         x, y = fig4_8.sampled_drops(params, seed, courses, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
         laid = TSNE(perplexity=params["perplexity"], init="pca", random_state=seed).fit_transform(x)
-        found[f"{how}own"] = round(own_neighbours(np.asarray(laid, np.float64), y), 4)
+        result[f"{how}own"] = round(own_neighbours(np.asarray(laid, np.float64), y), 4)
         if aligned:
-            found["map"] = [[round(float(a), 1), round(float(b), 1)] for a, b in laid]
-    return found
+            result["map"] = [[round(float(a), 1), round(float(b), 1)] for a, b in laid]
+    return result
 
 
 def own_neighbours(places: NDArray[np.float64], y: NDArray[np.int64]) -> float:

@@ -76,22 +76,22 @@ tasks = dropped.tasks
 def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List the search, one realisation a period and tau; then details at each period's best."""
     shared = {**dropped.named(p), "neighbours": p["neighbours"]}
-    found: dict[float, dict[tuple[float, float], float]] = {}
+    listed: dict[float, dict[tuple[float, float], float]] = {}
     for row in rows:
         if row.params.get("ask") == "search":
             for sigma, bits in zip(row.params["sigmas_mm"], row.result, strict=True):
-                found.setdefault(row.params["period_ms"], {})[row.params["tau_ms"], sigma] = bits
+                listed.setdefault(row.params["period_ms"], {})[row.params["tau_ms"], sigma] = bits
     periods = sorted(p["periods_ms"])
     first = [
         Task({**shared, "ask": "search", "period_ms": t, "tau_ms": tau, "sigmas_mm": p["sigmas_mm"]}, p["seed"])
         for t in periods
         for tau in p["taus_ms"]
     ]
-    if any(len(found.get(t, {})) < len(p["taus_ms"]) * len(p["sigmas_mm"]) for t in periods):
+    if any(len(listed.get(t, {})) < len(p["taus_ms"]) * len(p["sigmas_mm"]) for t in periods):
         return first
     last = []
     for t in periods:
-        tau, sigma = max(found[t], key=lambda at: found[t][at])
+        tau, sigma = max(listed[t], key=lambda at: listed[t][at])
         at = {**shared, "period_ms": t, "tau_ms": tau, "sigma_mm": sigma}
         last.append(Task({**at, "ask": "detail", "times_ms": p["times_ms"]}, p["seed"]))
         last.append(Task({**at, "ask": "any phase"}, p["seed"]))
@@ -157,15 +157,15 @@ def _bits(
 ) -> dict[str, Any]:
     """Return the information of the neighbours' answers, and of each parameter in them."""
     answers = dropped.named_by_neighbours(distances, y, params["neighbours"])
-    found: dict[str, Any] = kept_bits.information(y, answers, "bits", "right")
+    bits: dict[str, Any] = kept_bits.information(y, answers, "bits", "right")
     if by:
         all_of_them = dropped.conditions(params)
-        found["by"] = {}
+        bits["by"] = {}
         for name in VARIED:
             values = np.array([f"{getattr(one, name):g}" for one in all_of_them])
             if len(set(values.tolist())) > 1:
-                found["by"][name] = kept_bits.information(values[y], values[answers], "bits", "most")
-    return found
+                bits["by"][name] = kept_bits.information(values[y], values[answers], "bits", "most")
+    return bits
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
@@ -199,7 +199,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     best = max(lines, key=lambda line: line["bits"])
     shorter = [line for line in lines if line["period_ms"] < PRINTED["period_ms"]]
     less = best["bits"] - max((line["bits"] for line in shorter), default=float("nan"))
-    found = [
+    judged = [
         Statement(
             "Figure 5.11: most information at a period of 1 ms, a little less below it.",
             "1 ms; ceiling 4.17 bits",
@@ -213,7 +213,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     long = [line for line in lines if line["period_ms"] > MARKED_MS]
     if MARKED_MS in by and long:
         before, after = best["bits"] - by[MARKED_MS]["bits"], by[MARKED_MS]["bits"] - long[-1]["bits"]
-        found.append(
+        judged.append(
             Statement(
                 "Figure 5.11: a marked loss above 5 ms.",
                 "the picture",
@@ -223,7 +223,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"marked: half a bit or more, and more than up to 5 ms; {size}",
             )
         )
-    found += [
+    judged += [
         Statement(
             "5.6.3: tau .4 ms and sigma 2 mm give most.",
             "0.4 ms, 2 mm",
@@ -244,7 +244,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
     printed = [line for line in lines if line["absolute_bits"] is not None]
     if printed:
-        found.append(
+        judged.append(
             Statement(
                 "5.10 and 5.12 as printed (absolute differences) instead of the Euclidean distance (ours).",
                 "none",
@@ -255,7 +255,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 "at the Euclidean one's best tau and sigma",
             )
         )
-    return found + _by_parameter(best, lines[-1], size) + _by_time(lines, size)
+    return judged + _by_parameter(best, lines[-1], size) + _by_time(lines, size)
 
 
 def _ms(period: float) -> str:

@@ -65,10 +65,10 @@ tasks = indented.tasks
 def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List every alpha at the longer periods; then the best of those and its neighbours; then details at the best."""
     shared = indented.shared(p, rows)
-    found: dict[float, dict[float, float]] = {}
+    listed: dict[float, dict[float, float]] = {}
     for row in rows:
         if row.params.get("ask") == "bits" and not row.params["even_ms"]:
-            found.setdefault(row.params["period_ms"], {})[row.params["alpha"]] = row.result["bits"]
+            listed.setdefault(row.params["period_ms"], {})[row.params["alpha"]] = row.result["bits"]
 
     def asked(ask: str, period: float, alpha: float, even: float = 0.0) -> Task:
         more: dict[str, Any] = {"times_ms": p["times_ms"]} if ask == "detail" else {}
@@ -91,16 +91,16 @@ def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     periods = sorted(p["periods_ms"])
     long = [period for period in periods if period >= p["search_from_ms"]]
     first = [asked("bits", period, alpha) for period in long for alpha in p["alphas"]]
-    if any(period not in found for period in long):
+    if any(period not in listed for period in long):
         return first
-    mean = {alpha: np.mean([found[period][alpha] for period in long]) for alpha in p["alphas"]}
+    mean = {alpha: np.mean([listed[period][alpha] for period in long]) for alpha in p["alphas"]}
     best = max(mean, key=lambda alpha: mean[alpha])
     beside = min(np.diff(sorted(p["alphas"])), default=0.0)
     near = {PRINTED_ALPHA, *(alpha for alpha in p["alphas"] if abs(alpha - best) < 1.5 * beside)}
     second = [asked("bits", period, alpha) for period in periods if period not in long for alpha in sorted(near)]
-    if any(period not in found for period in periods):
+    if any(period not in listed for period in periods):
         return first + second
-    chosen = {period: max(found[period], key=lambda alpha: found[period][alpha]) for period in periods}
+    chosen = {period: max(listed[period], key=lambda alpha: listed[period][alpha]) for period in periods}
     last = [asked("detail", period, alpha) for period, alpha in chosen.items()]
     last.append(asked("part", p["part_period_ms"], chosen[periods[0]]))
     return first + second + last + [asked("bits", period, a, p["even_ms"]) for period, a in chosen.items()]
@@ -192,7 +192,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     bits = [line["bits"] for line in lines]
     size = f"{summary['conditions']} conditions, {p['samples']} samples each, mesh {p['mesh_mm']:g} mm"
     short, long = lines[0], lines[-1]
-    found = [
+    judged = [
         Statement(
             "Figure 5.5: mutual information falls as the sampling period grows, with a large gap between .5 and 20 ms.",
             "falls; ceiling 8.23 bits",
@@ -219,8 +219,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "it falls with the period, as one spike raises the threshold by A T theta_0",
         ),
     ]
-    found += _by_parameter(short, long, size) + _by_time(lines, size)
-    return [*found, _finer(short, summary["part"], p["part_until_ms"], size)]
+    judged += _by_parameter(short, long, size) + _by_time(lines, size)
+    return [*judged, _finer(short, summary["part"], p["part_until_ms"], size)]
 
 
 def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
@@ -241,10 +241,10 @@ def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> lis
 
 def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
     by = {line["period_ms"]: dict(map(tuple, line["times"])) for line in lines}
-    found = []
+    judged = []
     if 10.0 in by.get(0.5, {}):
         early = by[0.5][10.0]
-        found.append(
+        judged.append(
             Statement(
                 "Figure 5.8: over 6 bits are there within 10 ms at a period of .5 ms.",
                 "> 6 bits",
@@ -254,7 +254,7 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
             )
         )
         slow = [t for t, bits in by.get(5.0, {}).items() if bits >= early]
-        found.append(
+        judged.append(
             Statement(
                 "Figure 5.8: a period of 5 ms needs 80 ms for as much.",
                 "80 ms (held to be 40 or more)",
@@ -263,7 +263,7 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
                 f"for the {early:.2f} bits that .5 ms has at 10 ms; {size}",
             )
         )
-    return found
+    return judged
 
 
 def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: str) -> Statement:

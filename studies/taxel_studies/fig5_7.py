@@ -77,7 +77,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by period and bits an event."""
     del courses
-    found = {
+    bits = {
         (row.params["period_ms"], row.params["event_bits"]): row.result["bits"]
         for row in rows
         if "event_bits" in row.params
@@ -85,7 +85,7 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     periods = sorted(p["periods_ms"])
     return {
         "periods_ms": periods,
-        "lines": [{"event_bits": b, "bits": [found[period, b] for period in periods]} for b in p["event_bits"]],
+        "lines": [{"event_bits": b, "bits": [bits[period, b] for period in periods]} for b in p["event_bits"]],
         "conditions": len(indented.reached(rows[-1].params)),
     }
 
@@ -98,7 +98,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     of_each = f"{p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
     size = f"{summary['conditions']} conditions, {of_each}"
     gain = {period: by[many][period] - by[few][period] for period in (short, long)}
-    found = [
+    judged = [
         Statement(
             "Figure 5.7: more bits an event raise the information, and only at long periods by much.",
             "the picture",
@@ -110,7 +110,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
     if {1, 10} <= set(by) and {2.0, 20.0} <= set(summary["periods_ms"]):
         slow, quick = by[10][20.0], by[1][2.0]
-        found.append(
+        judged.append(
             Statement(
                 "20 ms with 10 bits does much worse than 2 ms with 1 bit, at the same data rate.",
                 "much lower",
@@ -119,7 +119,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"much: by half a bit or more; {size}",
             )
         )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -45,7 +45,7 @@ summarise = waves.summarise
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
-    found = []
+    judged = []
     for reading in p["readings"]:
         curves = summary["curves"][reading]
         why = waves.why(reading)
@@ -56,13 +56,13 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             ("shunting", "against weak shunting sparse is worse", True, WEAK),
             ("shunting", "against strong shunting sparse is better", False, STRONG),
         )
-        found += [
+        judged += [
             _compared(f"Noise-free training: {says}.", clean[noise], UNITS[noise], dense_is_better, levels, why)
             for noise, says, dense_is_better, levels in claims
             if noise in clean
         ]
         spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
-        found.append(
+        judged.append(
             Statement(
                 "Trained with noise, sparsity matters less.",
                 "results of sparsity were less evident",
@@ -72,7 +72,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             )
         )
-    return found
+    return judged
 
 
 def _compared(

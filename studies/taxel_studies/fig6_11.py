@@ -84,27 +84,27 @@ def modes(shares: NDArray[np.float64]) -> list[int]:
     """Return the bins of the modes that stand out, in a histogram smoothed over three bins."""
     smooth = np.convolve(np.pad(shares, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
     least = STANDS_OUT * smooth.max()
-    found: list[int] = []
+    places: list[int] = []
     best, rising, valley = 0, True, smooth[0]
     for k, value in enumerate(smooth):
         if rising:
             if value > smooth[best]:
                 best = k
             elif value < smooth[best] - least:
-                found.append(best)
+                places.append(best)
                 rising, valley = False, value
         elif value < valley:
             valley = value
         elif value > valley + least:
             rising, best = True, k
     if rising:
-        found.append(best)
-    return found
+        places.append(best)
+    return places
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
-    found = []
+    judged = []
     centres = np.array(summary["centres"])
     for reading in p["readings"]:
         why = READINGS[reading]
@@ -121,8 +121,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 behind = shares[centres > 0.5 * p["bin_mv"]]
                 back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
                 ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
-            found.append(Statement(says, published, ours, holds, why))
-    return found
+            judged.append(Statement(says, published, ours, holds, why))
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -96,10 +96,10 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
             if kind == "skim":
                 added = {t: _added([r.result["by_threshold"][t] for r in here]) for t in here[0].result["by_threshold"]}
                 threshold = min(added, key=lambda t: (added[t]["missed"] + added[t]["false"], float(t)))
-                found = added[threshold] | {"threshold": float(threshold)}
+                best = added[threshold] | {"threshold": float(threshold)}
             else:
-                found = _added([r.result["tested"] for r in here])
-            summary["rows"].append({"source": source, "recipe": recipe, "event": event, "learner": kind, **found})
+                best = _added([r.result["tested"] for r in here])
+            summary["rows"].append({"source": source, "recipe": recipe, "event": event, "learner": kind, **best})
     return summary
 
 
@@ -120,7 +120,7 @@ def _added(tested: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.5.4 says, in each recipe and source."""
-    found = []
+    judged = []
     for recipe in p["recipes"]:
         about = RECIPES[recipe][0]
         for source, event in dict.fromkeys((r["source"], r["event"]) for r in summary["rows"] if r["recipe"] == recipe):
@@ -136,7 +136,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             why = f"{source}, {STANDS_FOR[source][0]}; {about} for both"
             refires = "; printed, CONE's neuron keeps its potential after a spike (6.7), and fires again and again"
             low = "; targets are rare beside silence (6.6 names it), so the output hardly comes to the lowest threshold"
-            found += [
+            judged += [
                 Statement(
                     f"SKIM produces significantly higher errors ({EVENTS[event]}).",
                     "SKIM clearly worse",
@@ -163,7 +163,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     why,
                 ),
             ]
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -205,16 +205,16 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.3: left CONE-X with its line, right CONE-R; below them the same from above."""
     figure = Figure(figsize=(12, 10.5), layout="constrained")
     for number, (learner, title) in enumerate((("cone_x", "CONE-X"), ("cone_r", "CONE-R")), 1):
-        found = summary[learner]
-        axis, surface = np.array(found["axis"]), np.array(found["objective"])
+        result = summary[learner]
+        axis, surface = np.array(result["axis"]), np.array(result["objective"])
         first, second = np.meshgrid(axis, axis, indexing="ij")
-        line, height = np.array(found["line"]["weights"]), np.array(found["line"]["objective"])
-        kept = np.array(found["line"]["kept"])
+        line, height = np.array(result["line"]["weights"]), np.array(result["line"]["objective"])
+        kept = np.array(result["line"]["kept"])
         ax = figure.add_subplot(2, 2, number, projection="3d", computed_zorder=False)
         ax.plot_surface(first, second, surface, cmap="viridis", alpha=0.75, rcount=80, ccount=80, lw=0, rasterized=True)
         ax.plot(*line.T, height, color="0.2", lw=1.0, ls="--", label="target met")
         ax.plot(*line[kept].T, height[kept], color="C3", lw=2.5, label="target met, silence kept")
-        ax.scatter(*found["weights"], found["optimum"], color="k", s=40, label="optimum", depthshade=False)
+        ax.scatter(*result["weights"], result["optimum"], color="k", s=40, label="optimum", depthshade=False)
         ends = [-p["bound"], 0.0, p["bound"]]
         ax.set(xlabel="w1, mV", ylabel="w2, mV", zlabel="objective", title=title, xticks=ends, yticks=ends)
         ax.view_init(30, -60)
@@ -223,11 +223,11 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         heights = np.unique(np.quantile(surface, np.linspace(0, 1, 25)))
         drawn = above.contourf(first, second, surface, heights, cmap="viridis")
         drawn.set(edgecolor="face", linewidth=0.4)  # closes the gaps that the page shows between two bands
-        broken = np.where(found["silent"], np.nan, 1.0)
+        broken = np.where(result["silent"], np.nan, 1.0)
         above.contourf(first, second, broken, [0.5, 1.5], colors="none", hatches=["////"])
         above.plot(*line.T, color="0.2", lw=1.0, ls="--")
         above.plot(*line[kept].T, color="C3", lw=2.5)
-        above.plot(*found["weights"], "ko", ms=6)
+        above.plot(*result["weights"], "ko", ms=6)
         above.set(xlabel="w1, mV", ylabel="w2, mV", xlim=(-p["bound"], p["bound"]), ylim=(-p["bound"], p["bound"]))
         above.set_title("from above; hatched: silence broken", fontsize="small")
         figure.colorbar(drawn, ax=above, shrink=0.8, label="objective", format="%.3f")

@@ -108,12 +108,12 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.1 says."""
-    found = []
+    judged = []
     for reading, all_ in summary["readings"].items():
         behind = [c["behind"] for c in all_]
         weights = [c["near_weight"] for c in all_]
         why = READINGS[reading]
-        found += [
+        judged += [
             Statement(
                 "The potential crosses the threshold at 100 ms for every kappa: all sets of solutions are feasible.",
                 "100 ms",
@@ -135,7 +135,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             ),
         ]
-    return found
+    return judged
 
 
 def _by_kappa(p: Parameters, values: Sequence[float | None], form: str) -> str:

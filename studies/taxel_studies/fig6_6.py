@@ -103,11 +103,11 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.3 says."""
     del p
-    found = []
+    judged = []
     for reading, norms in summary["readings"].items():
         why = f"after a spike “{reading}”"
         mean = {norm: c["mean_between"] for norm, c in norms.items()}
-        found += [
+        judged += [
             Statement(
                 "For all realisations the weights map the trains to the targets.",
                 "100 of 100, both norms",
@@ -122,7 +122,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             ),
         ]
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

@@ -88,15 +88,15 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.4 says, in each reading of what remains after a spike, on the grid and in continuous time."""
-    found = []
+    judged = []
     for reading in p["readings"]:
         for time in p["times"]:
             lines = [line for line in summary["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
-            found += _of(
+            judged += _of(
                 p, lines, f"after a spike “{reading}”, " + ("1 ms grid" if time == "grid" else "every instant")
             )
-    found += _price(p, summary)
-    return found
+    judged += _price(p, summary)
+    return judged
 
 
 def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> list[Statement]:
@@ -136,7 +136,7 @@ def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> list[Statement]
 
 
 def _price(p: Parameters, summary: Summary) -> list[Statement]:
-    found = []
+    judged = []
     for reading in p["readings"]:
         lines = {
             time: np.array(
@@ -148,7 +148,7 @@ def _price(p: Parameters, summary: Summary) -> list[Statement]:
             grid, exact = lines["grid"].sum(axis=0), lines["continuous"].sum(axis=0)
             large = np.array(p["inputs"]) >= min(BEND, max(p["inputs"]))
             cost = 100 * (1 - exact[large].sum() / max(grid[large].sum(), 1))
-            found.append(
+            judged.append(
                 Statement(
                     "Silence at every instant, not only on the grid, costs little capacity (ours, not the thesis').",
                     "none",
@@ -157,7 +157,7 @@ def _price(p: Parameters, summary: Summary) -> list[Statement]:
                     f"after a spike “{reading}”; margin {p['margin']:g} mV, slope {p['slope']:g} mV/ms",
                 )
             )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

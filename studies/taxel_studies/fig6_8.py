@@ -88,10 +88,10 @@ summarise = only_result
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.5 and the caption say."""
     noises = summary["noises"]
-    found = []
+    judged = []
     if "jitter" in noises:
         sd = noises["jitter"]["moved_sd_ms"]
-        found.append(
+        judged.append(
             Statement(
                 "Jitter: each spike is moved by a normal deviate of zero mean.",
                 f"sd {p['levels']['jitter']:g} ms",
@@ -103,7 +103,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     if "background" in noises:
         n = noises["background"]
         rate = (n["count"] - n["of"]) / waves.INPUTS / (n["stop"] / 1000)
-        found.append(
+        judged.append(
             Statement(
                 "Background: Poisson spikes are added.",
                 f"{p['levels']['background']:g} Hz",
@@ -115,7 +115,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     if "shunting" in noises:
         n = noises["shunting"]
         lost = 100 * (1 - n["count"] / n["of"])
-        found.append(
+        judged.append(
             Statement(
                 "Shunting: spikes are deleted at random.",
                 f"{p['levels']['shunting']:g} %",
@@ -125,7 +125,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         )
     listed = ", ".join(f"{n} {v['distance']:.2f}" for n, v in noises.items())
     worst = max(v["distance"] for v in noises.values())
-    found.append(
+    judged.append(
         Statement(
             "A robust solution produces the target train despite noise.",
             "the bottom panel",
@@ -134,7 +134,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             f"kappa {p['kappa']:g}, B over the number of targets; robust: below {ROBUST:.0%} of silence",
         )
     )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

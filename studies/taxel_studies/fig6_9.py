@@ -48,21 +48,21 @@ summarise = waves.summarise
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.5 and 6.4.6 say, in each reading of B."""
-    found = []
+    judged = []
     for reading in p["readings"]:
         curves = summary["curves"][reading]
         why = waves.why(reading)
         for training, source in (("clean", "6.4.5"), ("noisy", "6.4.6")):
             trained = "noise-free training" if training == "clean" else "noisy training"
-            found += [
+            judged += [
                 _larger_is_better(p, curves[training][noise], noise, f"{source}, {trained}", why)
                 for noise in ("jitter", "shunting")
                 if noise in curves[training]
             ]
             if "background" in curves[training]:
-                found += _turn(p, curves[training]["background"], f"{source}, {trained}", why)
-        found.append(_training_helps(p, curves, why))
-    return found
+                judged += _turn(p, curves[training]["background"], f"{source}, {trained}", why)
+        judged.append(_training_helps(p, curves, why))
+    return judged
 
 
 def _larger_is_better(p: Parameters, curve: dict[str, Any], noise: str, where: str, why: str) -> Statement:

@@ -114,7 +114,7 @@ def rasters(
     """
     kept = KeptCourses(courses)
     steps = grid.steps(encoder.period_ms) if until_ms is None else round(until_ms / encoder.period_ms)
-    found = np.zeros((len(conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
+    raster = np.zeros((len(conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
     t = np.round(np.arange(steps + 1) * encoder.period_ms * 1000).astype(np.int64)
     loaded: dict[tuple[float, float, float], Course] = {}
     for k, c in enumerate(conditions):
@@ -127,8 +127,8 @@ def rasters(
         assert spikes.values is not None  # FA-1's spikes have signs
         train = np.repeat(np.arange(len(spikes)), np.diff(spikes.offsets))
         step = np.round(spikes.times / encoder.period_ms).astype(np.int64) - 1
-        found[k, train // grid.taxels, step, train % grid.taxels] = spikes.values
-    return found.reshape(len(conditions) * samples, -1)
+        raster[k, train // grid.taxels, step, train % grid.taxels] = spikes.values
+    return raster.reshape(len(conditions) * samples, -1)
 
 
 def summed(x: NDArray[Any], conditions: int, samples: int, seed: int) -> FoldSums:
@@ -168,7 +168,7 @@ def course_summary(course: Course) -> dict[str, Any]:
 
 
 def shared(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
-    """Return the parameters that all realisations on samples share, such as the largest pressure and conditions left out.
+    """Return the parameters that all realisations on samples share: the largest pressure, conditions left out and more.
 
     A condition that its course did not reach is left out, never filled in.
     """

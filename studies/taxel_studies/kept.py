@@ -56,8 +56,8 @@ def coarse_result(name: str, data: Path | None = None, *, strict: bool = False) 
     """Run a study at its smallest size, and return its parameters and results without times."""
     with tempfile.TemporaryDirectory() as report:
         section = load(name).run(Path(report), size=COARSE, data=data, strict=strict, quiet=True)
-    found = {"parameters": section["parameters"], "unread": section["unread"], "said": _timeless(section["said"])}
-    plain: dict[str, Any] = json.loads(json.dumps(found))
+    result = {"parameters": section["parameters"], "unread": section["unread"], "said": _timeless(section["said"])}
+    plain: dict[str, Any] = json.loads(json.dumps(result))
     return plain
 
 
@@ -116,16 +116,16 @@ def keep_coarse(name: str, folder: Path, *, data: Path | None = None, strict: bo
     _write(folder / "coarse" / f"{name}.json", coarse_result(name, data, strict=strict))
 
 
-def _differences(kept: Any, found: Any, where: str = "") -> Any:
+def _differences(kept: Any, now: Any, where: str = "") -> Any:
     """List where two results differ."""
-    if isinstance(kept, dict) and isinstance(found, dict) and kept.keys() == found.keys():
+    if isinstance(kept, dict) and isinstance(now, dict) and kept.keys() == now.keys():
         for key in kept:
-            yield from _differences(kept[key], found[key], f"{where}.{key}".lstrip("."))
-    elif isinstance(kept, list) and isinstance(found, list) and len(kept) == len(found):
-        for k, (a, b) in enumerate(zip(kept, found, strict=True)):
+            yield from _differences(kept[key], now[key], f"{where}.{key}".lstrip("."))
+    elif isinstance(kept, list) and isinstance(now, list) and len(kept) == len(now):
+        for k, (a, b) in enumerate(zip(kept, now, strict=True)):
             yield from _differences(a, b, f"{where}[{k}]")
-    elif json.dumps(kept) != json.dumps(found):
-        yield f"{where} was {str(kept)[:40]}, is {str(found)[:40]}"
+    elif json.dumps(kept) != json.dumps(now):
+        yield f"{where} was {str(kept)[:40]}, is {str(now)[:40]}"
 
 
 def _write(file: Path, value: Any) -> None:

@@ -18,13 +18,13 @@ __all__ = ["by_period_parameter_and_time", "information", "listed", "lost", "sha
 def information(truth: NDArray[Any], answers: NDArray[Any], *wanted: str) -> dict[str, float]:
     """Return of answers: ``bits`` (corrected), ``plug_in`` (as counted), ``right`` (share), ``most`` (bits)."""
     counts, classes = confusion_matrix(truth, answers)
-    found = {
+    values = {
         "bits": panzeri_treves(counts),
         "plug_in": plug_in(counts),
         "right": np.mean(truth == answers),
         "most": np.log2(len(classes)),
     }
-    return {name: round(float(found[name]), 4) for name in wanted}
+    return {name: round(float(values[name]), 4) for name in wanted}
 
 
 def listed(lines: Sequence[Mapping[str, Any]]) -> str:
@@ -68,7 +68,7 @@ def by_period_parameter_and_time(
     lines = summary["lines"]
     periods = [line["period_ms"] for line in lines]
     labels = ("bits", "share of the largest possible bits", "bits")
-    found = []
+    drawn_figures = []
     for k, (title, label) in enumerate(zip(figures, labels, strict=True)):
         figure = Figure(figsize=(6, 4), layout="constrained")
         ax = figure.subplots()
@@ -89,5 +89,5 @@ def by_period_parameter_and_time(
         # Curves over time fill the axes, so the legend stands beside them.
         beside: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if k == 2 else {}
         ax.legend(fontsize="small", **beside)
-        found.append(figure)
-    return found
+        drawn_figures.append(figure)
+    return drawn_figures

@@ -1,4 +1,4 @@
-"""Responses of SA-1, FA-1, SA-2 and FA-2 to a ramp and a hold, and to sines of all frequencies (thesis 2.1.5, 3.3, 7.2).
+"""Responses of SA-1, FA-1, SA-2 and FA-2 to ramp and hold, and to sines of all frequencies (thesis 2.1.5, 3.3, 7.2).
 
 Published: the phases of a ramp-and-hold in which each type fires; the frequency at which its threshold of one spike a
 cycle is least, near 5 Hz (SA-1), 34 Hz (FA-1) and 200 to 250 Hz (FA-2).
@@ -114,7 +114,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge phases and frequencies."""
-    found = []
+    judged = []
     fast, slow = (f"{ramp:g}" for ramp in (min(p["ramps_ms"]), max(p["ramps_ms"])))
     expected: dict[str, tuple[str, Callable[[list[int], list[int]], bool]]] = {
         "SA-1": ("all through the hold, faster while it begins", lambda q, s: min(q[2], s[2]) > 0 and s[4] == 0),
@@ -125,7 +125,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     for kind, one in summary.items():
         quick, gentle = one["phases"][fast], one["phases"][slow]
         says, holds = expected[kind]
-        found.append(
+        judged.append(
             Statement(
                 f"{kind} fires in {says} of a ramp-and-hold.",
                 "Johansson and Flanagan 2009; thesis 3.3",
@@ -148,7 +148,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         if kind == "FA-1":
             why += "; FA-1 of 5.1 to 5.5 never forgets a change, so that slow ones reach it as fast ones do, and "
             why += "its threshold, raised by each spike, sinks for hundreds of ms"
-        found.append(
+        judged.append(
             Statement(
                 f"The threshold of {kind} is least near {np.sqrt(low * high):.0f} Hz.",
                 f"{low:g} to {high:g} Hz",
@@ -157,7 +157,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:

@@ -1,8 +1,8 @@
 """Runs the realisations of a study: shows progress, resumes after a stop, uses processes here or a cluster.
 
-A study gives one pure function of parameters and seed, and the list of what to run. Each result is one JSON line, keyed by
-parameters, seed and a digest of the code, so a result that is there already is not computed again, and a stop (Ctrl-C,
-kill, power) loses no more than the realisations that are running.
+A study gives one pure function of parameters and seed, and the list of what to run. Each result is one JSON line, keyed
+by parameters, seed and a digest of the code, so a result that is there already is not computed again, and a stop
+(Ctrl-C, kill, power) loses no more than the realisations that are running.
 """
 
 from __future__ import annotations

@@ -183,7 +183,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     # Two standard deviations of a count of so many runs.
     give = 200 * np.sqrt(0.96 * 0.04 / summary["runs"])
     enough = p["parts"] * p["seconds"] >= 450 and summary["runs"] >= ENOUGH_RUNS
-    found = [
+    judged = [
         Statement(
             "A neuron finds the pattern: it meets over 98 % of the last 150 s, 10 ms from its start or sooner, and "
             "fires at nothing else.",
@@ -196,7 +196,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
     middle = summary["median"]
     if summary["good"]:
-        found.append(
+        judged.append(
             Statement(
                 "It is found within seconds.",
                 "13.5 s in the paper's example",
@@ -204,7 +204,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 middle["found_s"] < 60,
             )
         )
-        found.append(
+        judged.append(
             Statement(
                 "Strong weights are those of inputs that play the pattern.",
                 "all of them",
@@ -212,7 +212,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 middle["strong_in_pattern"] >= 0.99 * middle["strong"],
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:

@@ -129,11 +129,11 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 def latencies(times: NDArray[np.float64], contacts: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how long after each contact the first spike came that belongs to it, ms; infinite where none did."""
     touch = np.searchsorted(contacts, times + STAMP_MS, side="right") - 1
-    found = np.full(len(contacts), np.inf)
+    delays = np.full(len(contacts), np.inf)
     since = times - contacts[np.maximum(touch, 0)]
     mine = (touch >= 0) & (since < TOUCH_MS)
-    np.minimum.at(found, touch[mine], since[mine])
-    return found
+    np.minimum.at(delays, touch[mine], since[mine])
+    return delays
 
 
 def judged(times: NDArray[np.float64], play: Play, begin: float) -> dict[str, Any]:

@@ -136,7 +136,7 @@ def judged(times: NDArray[np.float64], foot: Piece, begin: float) -> dict[str, A
     }
 
 
-def found(one: Mapping[str, Any]) -> bool:
+def finds_stride(one: Mapping[str, Any]) -> bool:
     """Judge whether a neuron has found the stride."""
     return one["wanders_ms"] is not None and one["once"] >= ONCE and one["wanders_ms"] <= WANDERS_MS
 
@@ -148,7 +148,7 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
         {"foot": row.params["foot"], "chosen_on": k % CHOSEN_ON == 0, **row.result, "course": None}
         for k, row in enumerate(rows)
     ]
-    good = [row for row in rows if found(row.result["learnt"])]
+    good = [row for row in rows if finds_stride(row.result["learnt"])]
     shown = min(good, key=lambda row: float(row.result["learnt"]["wanders_ms"])) if good else rows[0]
     return {"feet": feet, "shown": shown.params["foot"], "course": shown.result["course"]}
 
@@ -157,7 +157,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge how many neurons have found the stride."""
     del p
     feet = [one for one in summary["feet"] if not one["chosen_on"]] or summary["feet"]
-    good, by_chance = ([one for one in feet if found(one[how])] for how in ("learnt", "untrained"))
+    good, by_chance = ([one for one in feet if finds_stride(one[how])] for how in ("learnt", "untrained"))
     wander = np.median([one["learnt"]["wanders_ms"] for one in good]) if good else float("nan")
     after = [one["learnt"]["phase_ms"] for one in good]
     near = sum(-WANDERS_MS <= t <= 2 * WANDERS_MS for t in after)

@@ -77,13 +77,13 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Compare the noted epochs with ours."""
     full = (p["inputs"], p["epochs"]) == (PARAMETERS["inputs"], PARAMETERS["epochs"])
-    found = []
+    judged = []
     for line in summary["lines"]:
         spread = f"{line['epochs'][0]} to {line['epochs'][-1]} epochs" if line["epochs"] else "none"
         ours = f"{line['solved']} of {line['runs']} solved: {spread}"
         if line["load"] in NOTED:
             low, high = NOTED[line["load"]]
-            found.append(
+            judged.append(
                 Statement(
                     f"At p / N = {line['load']:g} every task is solved.",
                     f"{low} to {high} epochs (2 to 3 seeds of throw-away code)",
@@ -93,12 +93,12 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 )
             )
         else:
-            found.append(
+            judged.append(
                 Statement(
                     f"At p / N = {line['load']:g} some tasks are solved.", "in part; capacity about 3", ours, None
                 )
             )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:

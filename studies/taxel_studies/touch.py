@@ -150,13 +150,13 @@ def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[
 def tasks(p: Parameters) -> list[Task]:
     """List the parts: other seeds, so other places, heights and foams, to learn from and to judge by."""
     shared = {k: p[k] for k in ("radii_mm", "drop_mm", "times_ms", "window_ms")}
-    found = []
+    listed = []
     for part in range(p["parts"]):
         seed = 100 * p["seed"] + 2 * part
-        found.append(Task({"question": "kind", "train": p["train"], "test": p["test"], **shared}, seed))
+        listed.append(Task({"question": "kind", "train": p["train"], "test": p["test"], **shared}, seed))
         sizes = {"train": p["train_contacts"], "test": p["test_contacts"]}
-        found.append(Task({"question": "contact", **sizes, **shared}, seed))
-    return found
+        listed.append(Task({"question": "contact", **sizes, **shared}, seed))
+    return listed
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -198,8 +198,8 @@ def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Drop], t
         name, by_rule = _best_rule(now, truths[0])
         names.append(name)
         answers_by = {"rule": by_rule}
-        for way, seen in (("numbers", _numbers), ("lda", _around)):
-            learnt, judged = (seen(pictures) for pictures in now)
+        for way, features in (("numbers", _numbers), ("lda", _around)):
+            learnt, judged = (features(pictures) for pictures in now)
             answers_by[way] = _lda(learnt, truths[0])(judged)
         for way, kinds in answers_by.items():
             shares[way].append(float(np.mean(kinds == truths[1])))
@@ -263,7 +263,7 @@ def _around(pictures: Iterable[Frames]) -> Floats:
     A touch is anywhere on the array, and weights learnt for the taxels of one place are of no use at another. Where
     nothing is loaded, the taxels are those in the middle of the array.
     """
-    found = []
+    regions = []
     for frames in pictures:
         values = frames.values.astype(np.float64)
         shape = values.shape[1:]
@@ -278,8 +278,8 @@ def _around(pictures: Iterable[Frames]) -> Floats:
             first = np.rint(middle).astype(np.int64) + AROUND - AROUND // 2
             index.append(first[:, None] + np.arange(AROUND))
         n, row, column = index
-        found.append(padded[n[:, None, None], row[:, :, None], column[:, None, :]].reshape(len(values), -1))
-    return np.concatenate(found)
+        regions.append(padded[n[:, None, None], row[:, :, None], column[:, None, :]].reshape(len(values), -1))
+    return np.concatenate(regions)
 
 
 def _lda(values: ArrayLike, classes: NDArray[Any]) -> Callable[[ArrayLike], NDArray[Any]]:
@@ -310,12 +310,12 @@ def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Drop]
     }
 
 
-def _tally(found: list[Detections], drops: list[Drop], window_ms: float) -> dict[str, Any]:
+def _tally(detections: list[Detections], drops: list[Drop], window_ms: float) -> dict[str, Any]:
     """Return found, missed, false, the error of its time, and its delay until it was known (ms)."""
     tallies: dict[str, Any] = {
         label: {"found": 0, "missed": 0, "false": 0, "error_ms": [], "later_ms": []} for label in EVENTS
     }
-    for detected, drop in zip(found, drops, strict=True):
+    for detected, drop in zip(detections, drops, strict=True):
         judged = score(detected, {label: drop.example.labels[label] for label in EVENTS}, window_ms).to_dict()[
             "by_label"
         ]
@@ -394,7 +394,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     best = max(shares, key=lambda way: shares[way])
     middle = "never" if summary["said_ms"] is None else f"{summary['said_ms'][1]:.1f} ms after contact (median)"
     ways = ", ".join(f"{WAYS[way]} {shares[way]:.1%}" for way in WAYS)
-    found = [
+    judged = [
         Statement(
             "Which of the two spheres of 5.6.2 fell is learnt from labels alone and detected within 10 ms of contact.",
             "95 % right or more (our goal)",
@@ -418,7 +418,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         listed = "; ".join(
             f"{WAYS[w]} {o['found']} found, {o['missed']} missed, {o['false']} false" for w, o in each.items()
         )
-        found.append(
+        judged.append(
             Statement(
                 f"{label.capitalize()} is learnt from labels alone as well as the best plain rule says it.",
                 "no more missed and false than the rule (our goal)",
@@ -427,7 +427,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"window {p['window_ms']:g} ms; the rule: {levels} or more taxels loaded",
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:

@@ -235,7 +235,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         ]
         for noise in noises
     }
-    found = []
+    results = []
     for setting in params["settings"]:
         cone = _fitted(params, setting, *training)
         neuron = cone.neuron_
@@ -246,8 +246,8 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
             ]
             for noise, tested in tests.items()
         }
-        found.append({"weights": [round(float(w), 6) for w in cone.weights_], "distance": distance})
-    return {"found": found}
+        results.append({"weights": [round(float(w), 6) for w in cone.weights_], "distance": distance})
+    return {"found": results}
 
 
 def _training(

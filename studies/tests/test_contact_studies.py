@@ -58,7 +58,7 @@ def test_deeper_is_faster_along_one_course(course):
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda c: SamplingGrid(taxels=0), "taxels"),
         (lambda c: SamplingGrid(pitch_mm=0), "pitch_mm is 0: must be above 0"),
@@ -71,8 +71,8 @@ def test_deeper_is_faster_along_one_course(course):
         (lambda c: SamplingGrid(quantity="log").draw(c, 0.5, 1.0, 2), 'must be "nominal"'),
     ],
 )
-def test_nonsense_is_one_clear_error(course, make, said):
-    with pytest.raises(ProblemError, match=said):
+def test_nonsense_is_one_clear_error(course, make, message):
+    with pytest.raises(ProblemError, match=message):
         make(course)
 
 
@@ -92,8 +92,8 @@ def test_rasters_are_the_encoders_spikes(tmp_path, course):
         spikes = encoder.encode(Frames(values[sample][:, None, :], t, unit="kPa"))
         wanted = np.zeros((50, 25))
         for taxel in range(25):
-            said = spikes.values[spikes.offsets[taxel] : spikes.offsets[taxel + 1]]
-            wanted[np.round(spikes[taxel] / 2.0).astype(int) - 1, taxel] = said
+            message = spikes.values[spikes.offsets[taxel] : spikes.offsets[taxel + 1]]
+            wanted[np.round(spikes[taxel] / 2.0).astype(int) - 1, taxel] = message
         np.testing.assert_array_equal(x[4 + sample].reshape(50, 25), wanted)
     assert np.abs(x).max() > 1
 
@@ -116,9 +116,9 @@ def test_a_course_without_equilibrium_is_said(tmp_path):
     one = {**p["drawn"], "fault": "stopped at 0.3 mm: no equilibrium", "asymmetry": 0.3, "unbalanced": 0.0}
     one |= {"factorisations": 40, "cuts": 9}
     drawn = {"times": [[1.0]], "least_change": 1.2}
-    told = contact.statements(p, {"paths": [one], "conditions": 2, "sampled": drawn})[0]
-    assert told.holds is False
-    assert "stopped at 0.3 mm" in told.why
+    statement = contact.statements(p, {"paths": [one], "conditions": 2, "sampled": drawn})[0]
+    assert statement.holds is False
+    assert "stopped at 0.3 mm" in statement.why
 
 
 def test_alpha_is_searched_at_long_periods_then_around_the_best_at_short_ones(tmp_path):
@@ -161,7 +161,7 @@ def test_fig5_7_with_one_bit_an_event_is_fig5_5(courses):
 
 
 def test_the_beginning_of_a_contact_is_told_as_of_the_whole_one(courses):
-    """Sampled until 20 ms only, or all along and looked at until then: bits are the same."""
+    """Bits until 20 ms are the same whether samples end there or go on."""
     p = load("fig5.5").set("toy")
     shared = indented.shared(p, rows_of(load("fig5.5"), p, courses))
     asked = {**shared, "period_ms": 5.0, "alpha": 0.7, "even_ms": 0.0, "samples": 12, "times_ms": [10.0, 20.0]}

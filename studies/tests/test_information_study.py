@@ -37,7 +37,7 @@ def data(tmp_path):
 def test_what_is_known_comes_out(data):
     common = {"slices": [1, 4], "draws": 1, "shuffles": 3, "most_trials": 0}
     hand = grasps.realise({"ask": "object", **common}, 1, data / "touch_icub_grasp")
-    assert hand["first"]["bits"] > 1.5  # the warning: drift alone names it
+    assert hand["first"]["bits"] > 1.5  # as the study warns, drift alone reveals the object
     assert hand["events"][0]["bits"] < 0.4  # nothing has changed yet
     assert hand["events"][1]["bits"] > 1.5
     assert hand["length"]["bits"] < 0.1

@@ -96,9 +96,9 @@ def test_a_figure_runs_the_study_that_holds_it_and_says_so(tmp_path: Path, capsy
     with pytest.raises(SystemExit) as ended:
         main(["study", "table6.1", "--size", "toy", "--report", str(tmp_path), "--json"])
     assert not ended.value.code
-    said = capsys.readouterr()
-    assert said.err == "table6.1 is held by the study fig6.1\n"
-    assert json.loads(said.out)["name"] == "fig6.1"
+    output = capsys.readouterr()
+    assert output.err == "table6.1 is held by the study fig6.1\n"
+    assert json.loads(output.out)["name"] == "fig6.1"
 
 
 def test_a_figure_that_is_a_drawing_says_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:

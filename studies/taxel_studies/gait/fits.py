@@ -264,9 +264,9 @@ def _rule(
     for numbers in rules.grid(rule, data.levels, channels, largest):
         times = [rules.detection_times(rule, numbers, p, event, **options) for p in learned]
         offset = _offset(times, learned, event)
-        found = [_scored(t, p, event, offset) for t, p in zip(times, learned, strict=True)]
-        wrong = sum(f["events"] - len(f["errors"]) + f["false"] for f in found)
-        errors = np.concatenate([np.empty(0), *(f["errors"] for f in found)])
+        scored = [_scored(t, p, event, offset) for t, p in zip(times, learned, strict=True)]
+        wrong = sum(f["events"] - len(f["errors"]) + f["false"] for f in scored)
+        errors = np.concatenate([np.empty(0), *(f["errors"] for f in scored)])
         quality = (float(wrong), float(np.sqrt(np.mean(errors**2))) if len(errors) else np.inf)
         if best is None or quality < best[0]:
             best = (quality, numbers, offset)

@@ -48,7 +48,7 @@ def stand_for(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.5.1 to 6.5.3 say, with chosen parameters and with those printed."""
     del p
-    found = [
+    judged = [
         Statement(
             "The insole has 92 taxels and makes 184 input neurons: each signal and its inverse.",
             "92, 184",
@@ -68,7 +68,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             error = row["error_ms"]
             ours = f"{error['mean']:+.1f} ± {error['sd']:.1f} ms, " if error else ""
             clean = row["missed"] == 0 and row["false"] == 0
-            found.append(
+            judged.append(
                 Statement(
                     f"One neuron finds {event} on a force plate, none missed, none false.",
                     f"{mean:+.1f} ± {sd:.1f} ms",
@@ -78,7 +78,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 )
             )
             continue
-        found += [
+        judged += [
             Statement(
                 f"On walking recordings it finds more than 95 % of {event}.",
                 "over 95 %",
@@ -94,7 +94,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             ),
         ]
-    return found
+    return judged
 
 
 #: How a table of figures is headed; "false a minute" only where there are minutes of walking.
@@ -120,11 +120,11 @@ _FLATTERED = (
 def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List the goals, every row by event, people and worst feet where they were asked for, the full search."""
     del p
-    found = [Table("What was run", ("", ""), _about(summary)), *_goals(summary)]
+    listed = [Table("What was run", ("", ""), _about(summary)), *_goals(summary)]
     for source in summary["sources"]:
         for protocol in source["protocols"]:
-            found += _of_protocol(source, protocol)
-    return [*found, *_full_search(summary)]
+            listed += _of_protocol(source, protocol)
+    return [*listed, *_full_search(summary)]
 
 
 def _about(summary: Summary) -> list[list[str]]:

@@ -228,7 +228,7 @@ def _full_search(plan: Plan, known: Known) -> Iterator[dict[str, Any]]:
             fitted = known[plan.task(scope, left_out, event, row)]
             point = fitted["point"]
             units = [_unit(name, unit) for group in fitted["tested"].values() for name, unit in group.items()]
-            found = figures(units)
+            result = figures(units)
             yield {
                 "event": event,
                 "all_else": row.removeprefix("528: "),
@@ -238,7 +238,7 @@ def _full_search(plan: Plan, known: Known) -> Iterator[dict[str, Any]]:
                 "lambda_1": point["learner"]["lambdas"][0],
                 "lambda_2": point["learner"]["lambdas"][1],
                 "inside": fitted["inside"],
-                **{name: found[name] for name in ("missed", "false", "error_ms")},
+                **{name: result[name] for name in ("missed", "false", "error_ms")},
             }
 
 
@@ -256,7 +256,7 @@ def _unit(name: str, unit: Mapping[str, Any]) -> Unit:
 
 
 def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
-    found: dict[tuple[str, str], Outcome] = {}
+    outcomes: dict[tuple[str, str], Outcome] = {}
     for scope, event, row in each(plan):
         units, points, tasks = [], [], []
         for left_out in plan.outer(scope):
@@ -266,8 +266,8 @@ def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
             tasks.append(task)
             for group in [TEST] if plan.testing else [str(g) for g in left_out]:
                 units += [_unit(name, unit) for name, unit in known[task]["tested"][group].items()]
-        before = found.get((event, row))
-        found[event, row] = Outcome(
+        before = outcomes.get((event, row))
+        outcomes[event, row] = Outcome(
             plan.source,
             plan.protocol.name,
             event,
@@ -276,7 +276,7 @@ def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
             [*(before.points if before else []), *points],
             (before.seconds if before else 0.0) + known.seconds(tasks),
         )
-    return list(found.values())
+    return list(outcomes.values())
 
 
 def _row(outcome: Outcome, protocol: Protocol, test: bool) -> dict[str, Any]:
@@ -341,10 +341,10 @@ def _names(units: Sequence[Unit]) -> list[str]:
     return list(dict.fromkeys(u.name for u in units))
 
 
-def _reaches(found: dict[str, Any], goal: dict[str, float]) -> bool:
+def _reaches(result: dict[str, Any], goal: dict[str, float]) -> bool:
     at_least = {"found_percent", "within_10_ms_percent"}
     for name, value in goal.items():
-        is_ = found["error_ms"] and found["error_ms"]["sd"] if name == "sd_ms" else found[name]
+        is_ = result["error_ms"] and result["error_ms"]["sd"] if name == "sd_ms" else result[name]
         if is_ is None or (is_ < value if name in at_least else is_ > value):
             return False
     return True

@@ -119,11 +119,11 @@ def unread(p: Parameters, data: Path) -> dict[str, str]:
     ------
     FormatError : none of the sources is there, or can be read
     """
-    found = sources.unread(data, p["sources"])
+    files = sources.unread(data, p["sources"])
     if p["test"]:
         other = Path(p["test"])
-        found |= {f"{other.name}/{file}": why for file, why in sources.unread(other, p["sources"]).items()}
-    return found
+        files |= {f"{other.name}/{file}": why for file, why in sources.unread(other, p["sources"]).items()}
+    return files
 
 
 def plans(p: Parameters, data: Path) -> list[Plan]:
@@ -177,13 +177,13 @@ def _plans(p: Parameters, name: str, folder: Path, other: Path) -> Iterator[Plan
 
 def tasks(p: Parameters, *, data: Path) -> list[Task]:
     """List the fits of every row in every fold, ordered so that one encoding serves many of them in turn."""
-    found = [
+    listed = [
         plan.task(scope, left_out, event, row)
         for plan in plans(p, data)
         for scope, event, row in each(plan)
         for left_out in plan.outer(scope)
     ]
-    return sorted({t.key(""): t for t in found}.values(), key=_by_encoder)
+    return sorted({t.key(""): t for t in listed}.values(), key=_by_encoder)
 
 
 def _by_encoder(task: Task) -> str:

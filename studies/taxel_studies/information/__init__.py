@@ -61,18 +61,18 @@ SIZES = {
 
 def tasks(p: Parameters, data: Path) -> list[Task]:
     """List one realisation a question, of the recordings that are there."""
-    found = []
+    listed = []
     for folder, module in ASKED.items():
         if (data / folder).is_dir():
             common = {name: p[name] for name in module.USES}
-            found += [Task({"folder": folder, "ask": ask, **common}, p["seed"]) for ask in module.ASKS]
-    return found
+            listed += [Task({"folder": folder, "ask": ask, **common}, p["seed"]) for ask in module.ASKS]
+    return listed
 
 
 def realise(params: dict[str, Any], seed: int, data: Path) -> dict[str, Any]:
     """Answer one question."""
-    found: dict[str, Any] = ASKED[params["folder"]].realise(params, seed, data / params["folder"])
-    return found
+    answer: dict[str, Any] = ASKED[params["folder"]].realise(params, seed, data / params["folder"])
+    return answer
 
 
 def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Summary:
@@ -86,14 +86,14 @@ def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Summary:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Compare the answers with those of an earlier trial with other code."""
-    return [one for folder, found in summary.items() for one in ASKED[folder].statements(p, found)]
+    return [one for folder, judged in summary.items() for one in ASKED[folder].statements(p, judged)]
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
     """Return a table for each set of recordings."""
-    return [one for folder, found in summary.items() for one in ASKED[folder].tables(p, found)]
+    return [one for folder, listed in summary.items() for one in ASKED[folder].tables(p, listed)]
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw each set of recordings."""
-    return [one for folder, found in summary.items() for one in ASKED[folder].draw(p, found)]
+    return [one for folder, answers in summary.items() for one in ASKED[folder].draw(p, answers)]

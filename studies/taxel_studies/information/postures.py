@@ -42,7 +42,7 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
         return estimate(y, answers, groups=poses, seed=seed).to_dict()
 
     random = np.random.default_rng(seed)
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "looks": len(y),
         "poses": len(set(groups)),
         "taxels": params["mat_taxels"],
@@ -55,10 +55,10 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
         ],
     }
     zero = zero_test(
-        lambda mixed: named(x, 0, mixed), y, found["all"]["bits"], groups=poses, shuffles=params["shuffles"], seed=seed
+        lambda mixed: named(x, 0, mixed), y, result["all"]["bits"], groups=poses, shuffles=params["shuffles"], seed=seed
     )
-    found["zero"] = {"level": zero.level, "p": zero.p}
-    return found
+    result["zero"] = {"level": zero.level, "p": zero.p}
+    return result
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:

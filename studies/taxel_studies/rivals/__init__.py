@@ -113,13 +113,13 @@ def _at_90(tried: Sequence[Sequence[float]], inputs: int) -> float | None:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Compare Gardner and Grüning's figures, and the loads that the thesis names, with ours."""
-    found = []
+    judged = []
     a = {line["rule"]: line for line in summary["lines"] if line["protocol"] == "a"}
     full = (p["runs_a"], p["epochs_a"]) == (PARAMETERS["runs_a"], PARAMETERS["epochs_a"])
     if "INST" in a:
         ours = dict(zip(a["INST"]["inputs"], a["INST"]["p"], strict=True))
         common = [n for n in INST_PATTERNS if n in ours]
-        found.append(
+        judged.append(
             Statement(
                 "INST learns so many patterns within 1 ms (Gardner and Grüning 2016).",
                 ", ".join(f"{v} at N = {n}" for n, v in INST_PATTERNS.items()),
@@ -133,7 +133,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         if crossings:
             mean = sum(crossings) / len(crossings)
             shown = ", ".join(f"{v:.3f} at {n}" for n, v in zip(a[rule]["inputs"], a[rule]["at_90"], strict=True) if v)
-            found.append(
+            judged.append(
                 Statement(
                     f"The capacity of {rule} within 1 ms (Gardner and Grüning 2016).",
                     f"{load:g}",
@@ -147,7 +147,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         best = max((line for line in lines if line["rule"] != "ConeX"), key=lambda line: line["load"][-1], default=None)
         cone = next((line for line in lines if line["rule"] == "ConeX"), None)
         if best is not None and cone is not None:
-            found.append(
+            judged.append(
                 Statement(
                     f"CONE-X learns more than any rule, in protocol {protocol}.",
                     "0.3 against " + ", ".join(f"{name} {load:g}" for name, load in PUBLISHED.items()),
@@ -156,7 +156,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     "published loads were got under other criteria; a run that ConeX proves infeasible counts as 0 %",
                 )
             )
-    return found
+    return judged
 
 
 def _loads(line: dict[str, Any]) -> str:
