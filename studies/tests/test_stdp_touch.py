@@ -1,4 +1,4 @@
-"""STDP on touches: what belongs to a touch, by hand; trains against the board's events; a neuron trained on a few touches."""
+"""STDP on touches: what belongs to a touch, by hand; trains against board events; a neuron trained on a few touches."""
 
 from __future__ import annotations
 

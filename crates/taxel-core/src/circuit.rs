@@ -1,9 +1,9 @@
 //! The array's circuit: from what each taxel conducts to the ticks of its counter (thesis 3.4.2, 4.3.2, Appendix 1).
 //!
-//! A [`fabric`] conducts more the harder it is pressed. All taxels share their lines, so the current of one is the
-//! others' too: [`grid`] solves that network exactly. A [`readout`] holds its lines, and by its amplifiers or resistors
-//! each sense line becomes a voltage; a [`converter`] multiplexes these onto its comparators, whose [`ramp`] turns them
-//! into ticks, and may be an [`adaptive`] one. [`chain`] is all of it, as an emulated board can have it.
+//! A [`fabric`] conducts more the harder it is pressed. All taxels share their lines, so that each current
+//! depends on all taxels: [`grid`] solves that network exactly. A [`readout`] drives its lines, and its amplifiers or
+//! resistors turn the current of each sense line into a voltage; a [`converter`] multiplexes these onto its comparators,
+//! whose [`ramp`] turns them into ticks, and may be an [`adaptive`] one. [`chain`] is the whole circuit.
 //!
 //! "Driven line" and "sense line" as for the board: columns are driven, one after the other, and all rows are read.
 

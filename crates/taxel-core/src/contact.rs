@@ -1,7 +1,7 @@
-//! Simulated touch: what a ball on foam does to the taxels beneath, frame by frame.
+//! Simulated touch: bodies on foam, and the readings of the taxels beneath, frame by frame.
 //!
-//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], `trajectory`, [`track`]), pushed back by a law that is tabulated once
-//! ([`push`]). The foam under them has one of two models, which a scene chooses: `layer`, foam bonded to the
+//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], `trajectory`, [`track`]), pushed
+//! back by a law that is tabulated once ([`push`]). The foam under them has one of two models, which a scene chooses: `layer`, foam bonded to the
 //! board, for any bodies ([`bonded`]); `columns`, independent columns whose pressure the layer smooths, for one ball that
 //! moves straight up and down on foam that hardly widens (Poisson ratio up to 0.1): there it lies within a few per cent
 //! of the layer, and is the fastest ([`foam`], [`footprint`]). Fabric, amplifier and ramp turn stress at the foam's base
