@@ -101,7 +101,7 @@ def test_rasters_are_the_encoders_spikes(tmp_path, course):
 def test_a_condition_that_was_not_reached_is_left_out_and_named(tmp_path):
     p = load("fig5.5").set("toy")
     rows = []
-    for k, task in enumerate(fig5_5.tasks(p, tmp_path)):
+    for k, task in enumerate(fig5_5.tasks(p)):
         result = {"reached_mm": 0.3 if k == 0 else 0.5, "fault": "stopped at 0.3 mm" if k == 0 else "", "most_kpa": 4.0}
         rows.append(Row(task.params, task.seed, result))
     shared = indented.shared(p, rows)
@@ -121,13 +121,13 @@ def test_a_course_without_equilibrium_is_said(tmp_path):
     assert "stopped at 0.3 mm" in statement.why
 
 
-def test_alpha_is_searched_at_long_periods_then_around_the_best_at_short_ones(tmp_path):
+def test_alpha_is_searched_at_long_periods_then_around_the_best_at_short_ones():
     """`then` is asked until it lists nothing new; here with results that put the best alpha at 0.4."""
     p = load("fig5.5").set()
-    rows = [Row(t.params, t.seed, {"reached_mm": 2.0, "fault": "", "most_kpa": 9.0}) for t in fig5_5.tasks(p, tmp_path)]
+    rows = [Row(t.params, t.seed, {"reached_mm": 2.0, "fault": "", "most_kpa": 9.0}) for t in fig5_5.tasks(p)]
     phases: list[list[Task]] = []
     known: set[str] = {Task(r.params, r.seed).key("") for r in rows}
-    while wanted := [t for t in fig5_5.then(p, rows, tmp_path) if t.key("") not in known]:
+    while wanted := [t for t in fig5_5.then(p, rows) if t.key("") not in known]:
         phases.append(wanted)
         for t in wanted:
             known.add(t.key(""))

@@ -149,13 +149,13 @@ def test_none_is_its_own_neighbour():
     assert not np.diag(distances).any()
 
 
-def test_search_first_then_details_at_each_periods_best(tmp_path):
+def test_search_first_then_details_at_each_periods_best():
     p = load("fig5.11").set("toy")
-    rows = [Row(t.params, t.seed, {}) for t in fig5_11.tasks(p, tmp_path)]
-    search = fig5_11.then(p, rows, tmp_path)
+    rows = [Row(t.params, t.seed, {}) for t in fig5_11.tasks(p)]
+    search = fig5_11.then(p, rows)
     assert [t.params["ask"] for t in search] == ["search"] * 4
     rows += [Row(t.params, t.seed, [2 - abs(t.params["tau_ms"] - 1.0)]) for t in search]
-    last = [t for t in fig5_11.then(p, rows, tmp_path) if t.params["ask"] != "search"]
+    last = [t for t in fig5_11.then(p, rows) if t.params["ask"] != "search"]
     assert [t.params["ask"] for t in last] == ["detail", "any phase", "detail", "any phase", "absolute"]
     assert {(t.params["tau_ms"], t.params["sigma_mm"]) for t in last} == {(1.0, 2.0)}
 
