@@ -152,7 +152,7 @@ def test_in_real_time_the_board_is_a_process_of_its_own_and_its_recording_says_t
     host, board = values["host"], values["board"]
     assert board["bytes"] == host["wire"]["bytes"]
     assert host["events"] == host["read_out"] + host["events_dropped"]
-    # On a machine that is busy, events come after the readout's time has moved on: then they are counted.
+    # On a busy machine, events arrive after the readout's time has passed them; these are counted as late.
     found = values["neuron"]["classes"]["first impact"]["contact"]["found"]
     assert (values["recording_agrees"] and found == 2) or host["late"] > 0, (found, host)
     shutil.rmtree(tmp_path / folder)

@@ -16,7 +16,7 @@ from taxel.simulate import Scene, Silence
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 
-#: Drops of a board in the shipped set, and of three boards.
+#: Number of drops for one board of the shipped set, and for three boards.
 BOARD, FOLD = naming._DROPS, 3 * naming._DROPS
 
 
@@ -97,7 +97,7 @@ def test_each_drop_of_a_play_is_named_and_judged(evaluation):
                 most = int(np.argmax(one["probable"]))
                 edges = [-1.0, *question.edges, np.inf]
                 assert one["right"] == (edges[most] < drop["true"][name] <= edges[most + 1])
-    # A stamp is its frame's start, which may lie before the touch.
+    # A stamp is the start of its frame, which may precede the touch.
     assert all(-to_ms(FRAME_US) < drop["felt_ms"] < 2 for drop in found["drops"])
 
 

@@ -32,7 +32,7 @@ def test_a_small_file_cut_at_every_byte_gives_what_is_left(small: Path, tmp_path
     for cut in range(len(whole), 0, -1):
         os.truncate(path, cut)
         if cut < header:
-            # Before the end of the first record there is nothing to read.
+            # Before the end of the first record no file is readable.
             with pytest.raises(FormatError, match=r"cut\.mcap"):
                 taxel.open(path)
             continue

@@ -59,7 +59,7 @@ def test_a_part_of_the_sensor_is_read_out_at_the_pace_of_the_whole(slow: taxel.R
         assert again.registers is not None
         assert (again.registers, again.registers.array) == (slow.registers, slow.array)
         assert known(again) == known(slow)
-    # The events alone know of no board.
+    # The events alone have no board.
     assert known(part.events) != known(part)  # type: ignore[arg-type]
 
 

@@ -46,9 +46,7 @@ class EmulateOptions:
         None, f"The registers: one of {QUOTED_PRESETS}. Default: the scene's, or those of the array at reset."
     )
     registers: Registers | None = None
-    tare_ms: float = option(
-        50.0, "How long the noise floor is 0 before the start marker, s. Default: 0.05, or the scene's."
-    )
+    tare_ms: float = 50.0
     array: Array | None = None
     sensor: Mapping[str, float] | None = None
     wire: Literal[1, 2] | None = option(None, "Version of the wire. Default: by the registers.", least=1, most=2)
