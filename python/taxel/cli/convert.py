@@ -40,7 +40,7 @@ def convert(
     from taxel._base.files import try_whole  # noqa: PLC0415
 
     try_whole(target, overwrite=overwrite)
-    # Shown on a terminal only, and gone when done.
+    # The status line is shown on a terminal only, and removed at the end.
     with Console(stderr=True).status(f"{source} to {target}"):
         recording = of_source(open_recording(source, array), part)
         lost = taxel.convert(recording, target, frames_hz=frames, compression=compression, overwrite=overwrite)
@@ -49,4 +49,4 @@ def convert(
         return
     typer.echo(f"written to {target}")
     for what in lost:
-        typer.echo(f"  not kept: {what}")
+        typer.echo(f"  lost: {what}")

@@ -48,4 +48,4 @@ def merge(
         return
     typer.echo(f"written to {out}: {merged!r}")
     for what in lost:
-        typer.echo(f"  not kept: {what}")
+        typer.echo(f"  lost: {what}")
