@@ -70,7 +70,7 @@ class LiveOptions:
     overwrite: bool = option(False, "Replace the file where it exists.")
     guard_frames: float = option(
         _DEFAULT.guard_frames,
-        "How far, in frames, a readout stays behind the host's clock while no events come.",
+        "How far, in frames, a readout stays behind the host's clock while no events arrive.",
         least=0.0,
     )
     gap_frames: float = option(
@@ -88,7 +88,7 @@ class LiveOptions:
     gro: bool | None = option(None, "Let the kernel hand over trains of datagrams in one piece.")
 
     def completed(self) -> LiveOptions:
-        """Return them with the sensor of the remote board or the readout; refuse what makes no sense."""
+        """Return the options with the sensor of the remote board or the readout; refuse options that make no sense."""
         readout, remote, array, registers, differences = (
             self.readout, self.remote, self.array, self.registers, self.differences,
         )  # fmt: skip
@@ -133,10 +133,10 @@ class LiveOptions:
     def for_rust(self, *, send: list[str], sources: list[tuple[str, str]]) -> dict[str, Any]:
         """Return the options that Rust reads; `send` and `sources` are those that it can open itself."""
         registers: object = self.registers
-        held = json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
+        contents = json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
         sizes = {name: getattr(self, name) for name in ("kernel_buffer_bytes", "queue_bytes", "readout_events")}
         return {
-            "registers": held,
+            "registers": contents,
             "differences": flag("differences", self.differences),
             "guard_frames": number("guard_frames", self.guard_frames),
             "gap_frames": number("gap_frames", self.gap_frames),

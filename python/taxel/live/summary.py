@@ -63,8 +63,8 @@ def summary_of(text: str) -> Summary:
     """Return the summary that Rust returns as JSON."""
     values = json.loads(text)
     path = None if values["path"] is None else Path(values["path"])
-    taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
-    return Summary(values["counters"], values["verdict"], path, taken)
+    tare = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
+    return Summary(values["counters"], values["verdict"], path, tare)
 
 
 def delays(measured: dict[str, Any]) -> str:
