@@ -28,12 +28,13 @@ module taxel_register_file
 );
 
   registers_t changed;
-  logic begun, checked;
+  logic begun, judged, checked;
   logic [2:0] n;
   logic [31:0] word_written;
   logic reserved;
+  logic [RULES-1:0] which;
   logic [3:0] rule;
-  logic reads, greets;
+  logic reads, greets, lacks;
 
   // What this build does not have: FA-1 and version 2 of the wire.
   function automatic logic lacking(registers_t r);
@@ -50,9 +51,12 @@ module taxel_register_file
     reserved     <= (value & ~mask(number)) != 0;
     reads        <= number == 3'd6 && value < 32'd8;
     greets       <= number == 3'd6 && value == 32'd8;
-    // What is wrong with them.
-    checked <= begun;
-    rule    <= reserved || lacking(changed) ? 4'd4 : refused(changed, STEPS, COLUMNS, ROWS, CHANNELS);
+    // What is wrong with them; which of that comes first.
+    judged  <= begun;
+    which   <= broken(changed, STEPS, COLUMNS, ROWS, CHANNELS);
+    lacks   <= reserved || lacking(changed);
+    checked <= judged;
+    rule    <= lacks ? 4'd4 : refused(which);
     // The answer.
     answer            <= checked;
     answered.number <= n;
@@ -69,7 +73,7 @@ module taxel_register_file
     end
     if (checked && !reads && !greets && rule == 4'd0) written <= changed;
     if (reset) begin
-      {begun, checked, answer, refused_full} <= '0;
+      {begun, judged, checked, answer, refused_full} <= '0;
       written <= AT_RESET;
     end
   end

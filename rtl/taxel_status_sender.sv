@@ -27,18 +27,26 @@ module taxel_status_sender
 
   // The counts, by fault: queue, comparator, command; and as they were given last.
   logic [COUNT_BITS-1:0] counts[3], given[3];
+  logic [2:0] more[3];
 
   always_ff @(posedge clk) begin
-    counts[0] <= counts[0] + COUNT_BITS'(queue_lost) + COUNT_BITS'(queue_lost_2);
-    counts[1] <= counts[1] + COUNT_BITS'(not_returned);
-    counts[2] <= counts[2] + COUNT_BITS'(skipped) + COUNT_BITS'(refused);
-    if (reset) for (int k = 0; k < 3; k++) counts[k] <= '0;
+    more[0] <= 3'(queue_lost) + 3'(queue_lost_2);
+    more[1] <= 3'(not_returned);
+    more[2] <= skipped + 3'(refused);
+    for (int k = 0; k < 3; k++) counts[k] <= counts[k] + COUNT_BITS'(more[k]);
+    if (reset) begin
+      for (int k = 0; k < 3; k++) begin
+        counts[k] <= '0;
+        more[k]   <= '0;
+      end
+    end
   end
 
   typedef enum logic [1:0] {
     IDLE,
     DIGITS,   // a count becomes digits, a bit a clock
-    SENDING
+    LETTER,   // a character is looked up
+    SENDING   // and waits for the serial line
   } state_t;
 
   state_t state;
@@ -85,8 +93,8 @@ module taxel_status_sender
   localparam logic [0:5][7:0] RULE = " rule ";
   localparam logic [0:5][7:0] FAULT = "fault ";
   localparam logic [0:2][0:10][7:0] NAMES = {"queue ", 40'd0, "comparator ", "command ", 24'd0};
-  logic [7:0] character;
-  logic last;
+  logic [7:0] character, letter;
+  logic last, letter_last;
   logic zeros;  // only zeros so far
 
   always_comb begin
@@ -137,8 +145,8 @@ module taxel_status_sender
     if (last) character = 8'h0A;
   end
 
-  assign valid = state == SENDING && character != 8'd0;
-  assign data  = character;
+  assign valid = state == SENDING && letter != 8'd0;
+  assign data  = letter;
   assign pop   = state == IDLE && greeted && ready;
 
   always_ff @(posedge clk) begin
@@ -151,10 +159,10 @@ module taxel_status_sender
         if (!greeted) begin
           greeted   <= 1'b1;
           line.kind <= ANSWER_GREETING;
-          state     <= SENDING;
+          state     <= LETTER;
         end else if (ready) begin
           line  <= oldest;
-          state <= SENDING;
+          state <= LETTER;
         end else if (look != 0) begin
           // One fault a clock.
           which <= look[0] ? 2'd0 : look[1] ? 2'd1 : 2'd2;
@@ -175,17 +183,22 @@ module taxel_status_sender
         digits    <= doubled(digits, bits[COUNT_BITS-1]);
         bits      <= bits << 1;
         bits_left <= bits_left - 6'd1;
-        if (bits_left == 6'd1) state <= SENDING;
+        if (bits_left == 6'd1) state <= LETTER;
+      end
+      LETTER: begin
+        letter      <= character;
+        letter_last <= last;
+        state       <= SENDING;
       end
       default: begin
-        if (taken || character == 8'd0) begin
-          at <= at + 6'd1;
+        if (taken || letter == 8'd0) begin
+          at    <= at + 6'd1;
+          state <= letter_last ? IDLE : LETTER;
           if (!fault && line.kind == ANSWER_OK && at >= 6'd10) line.value <= line.value << 4;
           if (fault && at >= 6'd17) begin
-            if (character != 8'd0) zeros <= 1'b0;
+            if (letter != 8'd0) zeros <= 1'b0;
             digits <= digits << 4;
           end
-          if (last) state <= IDLE;
         end
       end
     endcase

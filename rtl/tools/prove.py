@@ -36,11 +36,12 @@ PROOFS = (
         (FIFO,),
         "abc pdr",
         (
-            (FIFO, "waiting != 0 && (!fetched_valid || move)", "waiting != 0"),
-            (FIFO, "waiting != 0 && (!fetched_valid || move)", "waiting > 1 && (!fetched_valid || move)"),
+            (FIFO, "!none && (!fetched_valid || move)", "!none"),
+            (FIFO, "!none && (!fetched_valid || move)", "waiting > 1 && (!fetched_valid || move)"),
             (FIFO, "fetched_valid && (!ready || pop)", "fetched_valid"),
-            (FIFO, "(PLACES + 1)'(DEPTH);", "(PLACES + 1)'(DEPTH - 1);"),
-            (FIFO, "waiting == 0 && !fetched_valid && !ready", "waiting == 0 && !ready"),
+            (FIFO, "(PLACES + 1)'(DEPTH - 1);", "(PLACES + 1)'(DEPTH - 2);"),
+            (FIFO, "fetch && waiting ==", "waiting =="),
+            (FIFO, "none && !fetched_valid && !ready", "none && !ready"),
             (FIFO, "write == PLACES'(DEPTH - 1)", "write == PLACES'(DEPTH - 2)"),
             (
                 FIFO,
@@ -55,8 +56,8 @@ PROOFS = (
         ("taxel_types.sv", FIFO, PACKER),
         "abc pdr",
         (
-            (PACKER, "after + more > 9'(MOST)", "after + more > 9'(MOST + 1)"),
-            (PACKER, "oldest.frame != now.frame ||", ""),
+            (PACKER, "MOST - 1 : MOST - 2", "MOST : MOST - 1"),
+            (PACKER, "oldest.frame == now.frame &&", ""),
             (PACKER, "ready || over || (empty", "ready || (empty"),
             (PACKER, "{1'b1, now.more, second,", "{1'b1, now.more, !second,"),
             (PACKER, "{1'b0, field[13:7]}", "{1'b0, field[12:6]}"),
