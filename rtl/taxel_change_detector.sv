@@ -24,7 +24,9 @@ module taxel_change_detector
     output event_t                    found,
     input  logic                      full,
     output logic                      frame,         // of the events to come, alternating over frames that have any
-    output logic                      lost,          // an event found no room
+    output logic                      sent,          // a taxel's event found room
+    output logic                      lost,          // an event or a marker found none
+    output logic                      frame_over,    // all events of a frame but the first one were found
     output logic                      not_returned   // a comparator had tripped when its ramp began
 );
 
@@ -38,11 +40,11 @@ module taxel_change_detector
     logic tripped;
     logic first;
     logic [14:0] at;
-  } count_t;
+  } trip_t;
 
   // What the read was; then its counts.
   read_t ended, now;
-  count_t [CHANNELS-1:0] counts;
+  trip_t [CHANNELS-1:0] counts;
   logic [CHANNEL_BITS-1:0] channel;
   logic counting, busy;
   logic [2:0] markers;
@@ -63,7 +65,7 @@ module taxel_change_detector
       markers <= markers - 3'd1;
       starts  <= starts >> 1;
     end else if (counting) begin
-      counts  <= counts >> $bits(count_t);
+      counts  <= counts >> $bits(trip_t);
       channel <= channel + CHANNEL_BITS'(1);
       if (channel == CHANNEL_BITS'(CHANNELS - 1)) counting <= 1'b0;
     end
@@ -141,6 +143,8 @@ module taxel_change_detector
 
   assign changed = judged.valid && judged.exists && !judged.not_returned && !of_judged.initial_frame && beyond;
   assign push = (changed || (judged.valid && judged.marker)) && !full;
+  assign sent = changed && !full;
+  assign frame_over = judged.valid && judged.last && !of_judged.initial_frame;
   assign lost = (changed || (judged.valid && judged.marker)) && full;
   assign not_returned = judged.valid && judged.exists && judged.not_returned && !of_judged.initial_frame;
   assign store = judged.valid && judged.exists

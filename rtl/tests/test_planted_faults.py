@@ -9,6 +9,7 @@ from logic import RTL
 from pair import Pair, answers
 from taxel.simulate import NOT_RETURNED
 from taxel.wire import Command
+from test_totals import answered_and_counted
 
 #: File, what stands there, what stands there instead.
 FAULTS = [
@@ -27,16 +28,41 @@ FAULTS = [
 ]
 
 
+#: Those that only an answer with totals shows.
+TOTALS = [
+    ("taxel_totals.sv", "if (done) totals", "if (over) totals"),
+    ("taxel_totals.sv", "if (done) totals <=", "totals <="),
+    ("taxel_change_detector.sv", "judged.last && !of_judged.initial_frame", "judged.last"),
+    ("taxel_change_detector.sv", "assign sent = changed && !full;", "assign sent = push;"),
+    ("taxel_top.sv", "tvalid && tready && tlast", "tvalid && tlast"),
+    ("taxel_status_sender.sv", "{bits, rest} <= {rest, count_t'(0)};", "{bits, rest} <= totals;"),
+    ("taxel_status_sender.sv", "'0 : digits, bits", "digits : digits, bits"),
+]
+
+
+def plant(fault, to):
+    """Write the sources with one edit."""
+    file, there, instead = fault
+    for source in RTL.glob("*.sv"):
+        shutil.copy(source, to)
+    text = (to / file).read_text()
+    assert text.count(there) == 1
+    (to / file).write_text(text.replace(there, instead))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS, ids=[f"{file[6:-3]}-{k}" for k, (file, _, _) in enumerate(FAULTS)])
 def test_a_fault_is_seen(fault, tmp_path):
-    file, there, instead = fault
-    for source in RTL.glob("*.sv"):
-        shutil.copy(source, tmp_path)
-    text = (tmp_path / file).read_text()
-    assert text.count(there) == 1
-    (tmp_path / file).write_text(text.replace(there, instead))
+    plant(fault, tmp_path)
     assert differs(Pair(8, 8, source=tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", TOTALS, ids=range(len(TOTALS)))
+def test_a_fault_of_the_totals_is_seen(fault, tmp_path):
+    plant(fault, tmp_path)
+    answered, counted = answered_and_counted(Pair(8, 8, source=tmp_path, FAULT_CLOCKS=1 << 30), 8)
+    assert answered != counted
 
 
 def test_the_sources_without_a_fault_are_not_taken_for_one():
