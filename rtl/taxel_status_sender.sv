@@ -26,6 +26,7 @@ module taxel_status_sender
 
   // The counts of faults, and as they were given last.
   count_t counts[3], given[3];
+  logic [2:0] differs;  // from what was given, a clock ago
   assign counts = '{lost, faults, commands};
 
   typedef enum logic [1:0] {
@@ -140,6 +141,7 @@ module taxel_status_sender
 
   always_ff @(posedge clk) begin
     if (look_again) look <= 3'b111;
+    for (int k = 0; k < 3; k++) differs[k] <= counts[k] != given[k];
     case (state)
       IDLE: begin
         at        <= '0;
@@ -163,7 +165,7 @@ module taxel_status_sender
           part <= look[0] ? 3'd0 : look[1] ? 3'd1 : 3'd2;
           look <= look & (look - 3'd1);
           for (int k = 2; k >= 0; k--) begin
-            if (look[k] && (look & 3'((1 << k) - 1)) == 0 && counts[k] != given[k]) begin
+            if (look[k] && (look & 3'((1 << k) - 1)) == 0 && differs[k]) begin
               counting <= 1'b1;
               bits     <= counts[k];
               given[k] <= counts[k];

@@ -4,12 +4,12 @@ import shutil
 
 import numpy as np
 import pytest
+from test_totals import answered_and_counted
 
 from logic import RTL
 from pair import Pair, answers
 from taxel.simulate import NOT_RETURNED
 from taxel.wire import Command
-from test_totals import answered_and_counted
 
 #: File, what stands there, what stands there instead.
 FAULTS = [

@@ -30,7 +30,7 @@ class Proof:
 PROGRAMS = (("yosys", "yosys"), ("smtbmc", "yosys-smtbmc"), ("witness", "yosys-witness"))
 
 FIFO, PACKER, REGISTERS = "taxel_event_fifo.sv", "taxel_packer_v1.sv", "taxel_register_file.sv"
-PACKAGE = "taxel_registers.sv"
+PACKAGE, SELECT = "taxel_registers.sv", "taxel_line_select.sv"
 PROOFS = (
     Proof(
         "fifo_proof",
@@ -80,6 +80,20 @@ PROOFS = (
             (PACKAGE, "if (which[10]) return 4'd3;", ""),
             (PACKAGE, "(40'(r.step_read) << 1)", "(40'(r.step_read) << 2)"),
             (PACKAGE, "changed.step_read = value[31:16];", "changed.step_read = value[15:0];"),
+        ),
+    ),
+    Proof(
+        "select_proof",
+        (SELECT,),
+        "abc pdr",
+        (
+            (SELECT, "out > in ? out : in", "in"),
+            (SELECT, "lines + 8'd1 - 8'(at)", "lines - 8'(at)"),
+            (SELECT, "unknown || lines > known", "unknown"),
+            (SELECT, "8'(line - at)", "8'(line - at) + 8'd1"),
+            (SELECT, "!all && later ? 8'd0", "later ? 8'd0"),
+            (SELECT, "pulses == insert && !csel_din", "pulses == insert"),
+            (SELECT, "if (pulses == insert && !csel_din) csel_din <= 1'b1;\n        else csel_clk <= 1'b1;", "csel_din <= pulses == insert;\n        csel_clk <= 1'b1;"),
         ),
     ),
 )

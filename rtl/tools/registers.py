@@ -47,12 +47,12 @@ def arithmetic(node: ast.expr, fields: dict[str, Table]) -> str:
             return f"({wide} + {WIDTH}'d{offset})" if offset else wide
         case ast.Name(id=name):
             return f"{WIDTH}'({name})"
-        case ast.Constant(value=number):
+        case ast.Constant(value=int(number)):
             return f"{WIDTH}'d{number}"
-        case ast.BinOp(left=ast.Constant(value=number), op=ast.Mult(), right=right):
+        case ast.BinOp(left=ast.Constant(value=int(number)), op=ast.Mult(), right=right):
             # Shifts and a sum, as a multiplier was the longest path of the logic.
             factor = arithmetic(right, fields)
-            places = [k for k in range(int(number).bit_length()) if int(number) >> k & 1]
+            places = [k for k in range(number.bit_length()) if number >> k & 1]
             return "(" + " + ".join(f"({factor} << {k})" if k else factor for k in places) + ")"
         case ast.BinOp(left=left, op=op, right=right):
             return f"({arithmetic(left, fields)} {OPERATOR[type(op)]} {arithmetic(right, fields)})"
