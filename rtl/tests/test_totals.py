@@ -26,7 +26,8 @@ def answered_and_counted(pair: Pair, frames: int) -> tuple[list[tuple[int, ...]]
         ticks = rng.integers(0, 150, pair.array.shape).astype(np.uint16) * np.uint16(frame % 4 > 1)
         ticks[-1, -1] = 50 + frame
         ticks[rng.random(ticks.shape) < 0.05] = NOT_RETURNED
-        pair.frame(ticks)
+        # A marker of a recording is no event.
+        pair.frame(ticks, Command(7, frame % 2 << 16).to_bytes(), 900)
         # One answer a frame: a line takes longer on the serial line than a frame does.
         still = ticks.copy()
         while not (pair.serial[len(text) :].endswith("\n") and pair.serial.count("status") == len(counted)):
