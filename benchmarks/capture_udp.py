@@ -6,6 +6,9 @@ faery's receiver gets its own format ("t64_x16_y16_on8", 111 events a datagram),
 
 Latency: ours from the kernel's stamp to the end of decoding, a datagram each; faery's from its sender's clock before
 the send to the packet in the reader's hands (it has no other stamp), which adds the sending.
+
+Peer: faery's UDP receiver. Unit: us from arrival to decoded; cores; datagrams lost. Goal: 21.3 million events/s without
+a loss in .15 core (receiving alone .05), p50 below 50 us, p99 below 1 ms.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 The peer without wire resistance writes down all 128 lines' balances and calls ``numpy.linalg.solve`` with a right-hand
 side a read column; with it (8192 voltages) the peer is ``scipy.sparse.linalg.splu`` of the same matrix. Voltages are
 compared. All in one thread.
+
+Peer: `numpy.linalg.solve`, and SciPy's `splu`. Unit: CPU seconds a frame. Goal: not slower than either.
 """
 
 import numpy as np

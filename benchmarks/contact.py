@@ -8,6 +8,9 @@ nothing. Each has its own tolerances: `furthest off` is the worst pressure off o
 The base stress, which ContactMechanics does not know, is in our time. Scenes are played whole, board and decoding too:
 how many times faster than the board's clock, one thread. A foot's is with the layer solved every fourth frame, as
 `play` does above 600 taxels.
+
+Peer: ContactMechanics. Unit: CPU seconds a frame; scenes in times the board's clock. Goal: a frame of a footprint 100
+times as fast as the peer.
 """
 
 from __future__ import annotations

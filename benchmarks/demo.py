@@ -1,4 +1,8 @@
-"""Does the main job reach its goals over 100 scenes without the clock? Peer: the plain rule, two loaded taxels."""
+"""How many touches the main job finds over 100 scenes without the clock, and how soon.
+
+Peer: the plain rule, two loaded taxels. Unit: touches found; ms from the touch to `known`. Goal: first impacts within
+1 ms of the contact and 1.5 ms of the lift, as `taxel demo` states.
+"""
 
 from __future__ import annotations
 

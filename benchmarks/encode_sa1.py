@@ -1,4 +1,7 @@
-"""How many times faster than real time the SA-1 afferents of 64 x 64 taxels are, beside the obvious NumPy."""
+"""How many times faster than real time the SA-1 afferents of 64 x 64 taxels are, beside the obvious NumPy.
+
+Peer: the obvious NumPy. Unit: times real time, on one core. Goal: 20.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 64 x 64 taxels of 2.67 mm at 5208 Hz bear 4096 afferents in the fingertip's mixture (70 : 140 : 6 : 25), thinner than a
 fingertip has them. On the board's events, and on frames whose every taxel changes all the time. The NumPy version
 weighs the fields alone: a dense product a frame.
+
+Peer: NumPy's dense product of the fields. Unit: times real time, on one core. Goal: 20.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """How many times faster than real time pairs of Izhikevich neurons are, beside the obvious NumPy.
 
 92 channels at 500 Hz, 184 neurons, steps of 0.1 ms, all of which the baseline takes as one vector.
+
+Peer: the obvious NumPy. Unit: times real time, on one core. Goal: 100.
 """
 
 from __future__ import annotations

@@ -13,7 +13,10 @@ Callback is what `Live(say=...)` calls, in Python, from the thread that made the
 - from the first event's stamp: of the touch;
 - from the touch: from the simulated moment.
 
-Loaded: a busy process for each processor. Peer: wire version 1, which promises nothing, so that silence is guessed.
+Loaded: a busy process for each processor. Version 1 promises nothing, so that silence is guessed.
+
+Peer: wire version 1. Unit: us, medians and 99th percentiles. Goal: at rest p50 from the last byte 60 us at 5.2 kHz, 150
+us on 128 x 128, 300 us with a tenth moving, 1 ms with all.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ Shortest weights on the grid, one thread. Each peer is handed the whole problem 
 broken, from our sweep, with its warm dual simplex) in a process of its own, and stopped after a minute of CPU; 15
 with ``taxel bench --peers``, which keeps the times that need more than one. HiGHS decides feasibility alone, which is
 easier. CPU time of the process, the statement of the rows not counted; for ConeX it is the whole `fit`.
+
+Peer: Clarabel, CVXPY, HiGHS and PIQP. Unit: CPU seconds a fit. Goal: not slower than the fastest of them.
 """
 
 import argparse

@@ -2,6 +2,9 @@
 
 The stream: footfalls of the plate's people (TAXEL_DATA, or ../shared/data beside the checkout), as an insole feels
 them, by the recipes of the trials for contact and foot-off; drawn footfalls where there are no recordings. CPU time.
+
+Peer: `ConeR` on the same window, from nothing. Unit: CPU seconds a footfall. Goal: cheaper than the fit from nothing,
+with the same objective.
 """
 
 import os

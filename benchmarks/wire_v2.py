@@ -13,6 +13,9 @@ and again; beside it into new memory each time, where the kernel's first touch o
 events. Heartbeats, which version 1 does not know, are left out of what is decoded (in the drop 94 of 100 datagrams
 are empty): their numbers are then missing, which costs version 2 something, most in the drop. What they cost is stated
 beside.
+
+Peer: wire version 1. Unit: bytes an event; events/s. Goal: bytes .21, .75 and 1.05 of version 1 (full, footfall, drop),
+by datagrams 1.5 times its speed.
 """
 
 from __future__ import annotations

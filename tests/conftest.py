@@ -10,5 +10,5 @@ settings.load_profile("taxel")
 # A shell that starts the tests in the background makes them ignore Ctrl-C, which some tests send.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-#: Scripts that made kept data, or that other programs run, are no tests: they need what is not here.
+#: Scripts that made kept data or that other programs run: not tests, and they need packages that are not installed.
 collect_ignore_glob = ["data/*", "simulate/press_by_*.py"]

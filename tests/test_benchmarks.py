@@ -1,5 +1,6 @@
 """Benchmarks load where no peer is installed, and leave it out."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -40,6 +41,12 @@ def test_a_benchmark_loads_where_no_peer_is_installed(path: Path) -> None:
     script = f"{WITHOUT}\nimport sys; sys.path.insert(0, 'benchmarks'); import {path.stem}; {path.stem}.run"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("path", BENCHMARKS, ids=lambda path: path.stem)
+def test_a_benchmark_states_its_peer_unit_and_goal(path: Path) -> None:
+    stated = ast.get_docstring(ast.parse(path.read_text())) or ""
+    assert re.search(r"^Peer: .+\. Unit: .+\. Goal: .+\.$", stated, re.MULTILINE | re.DOTALL)
 
 
 @pytest.mark.slow

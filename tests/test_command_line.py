@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import call
 
 import taxel
-from taxel.cli import main
 from taxel.live import send
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -23,13 +23,6 @@ FOREIGN = (
     r"invalid type|unable to parse|invalid value|expected|`|Traceback|_core|overwrite=|NoneType|Input should be|"
     r"taxel\.[A-Z]"
 )
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        main([str(a) for a in arguments])
-    said = capsys.readouterr()
-    return int(ended.value.code or 0), said.out, said.err
 
 
 @pytest.fixture
@@ -175,7 +168,7 @@ def test_ctrl_c_while_it_starts_ends_quietly(after_s: float) -> None:
         port = str(link.getsockname()[1])
     arguments = [program, "emulate", "--port", port, "--scenes", "3", "--json"]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        # Not before Python itself has begun: taxel is loading now.
+        # After Python itself has started: the process is importing taxel now.
         until = time.monotonic() + 60
         while "numpy" not in _maps(process.pid):
             assert time.monotonic() < until

@@ -65,7 +65,7 @@ def faults_of_parameters(name: str, value: Any) -> list[str]:
     if not takes(value):
         return []
     parameters = [p for p in inspect.signature(value).parameters.values() if p.name not in ("self", "cls")]
-    # What a user only gets, a result, may describe its fields as attributes.
+    # A result type, which users receive but do not construct, may describe its fields as attributes.
     written = entries(
         sections(value).get("Parameters") or (sections(value).get("Attributes", []) if inspect.isclass(value) else [])
     )

@@ -24,7 +24,7 @@ from taxel import _core
 
 mpl.use("Agg")
 
-#: How parsers speak, and no error of taxel's.
+#: Phrases of parsers that must not occur in taxel's errors.
 PARSERS = r"invalid (type|value|length)|(unknown|missing|duplicate) (variant|field)|, expected |did not match|`"
 
 NONSENSE: dict[str, Any] = {
@@ -66,7 +66,7 @@ NONSENSE: dict[str, Any] = {
 }
 NONSENSE["a list that holds itself"].append(NONSENSE["a list that holds itself"])
 
-#: Functions to be called: a function of another kind is the caller's to blame, and its own error comes out.
+#: Parameters that are callbacks: an error raised in a callback belongs to the caller, and is passed through.
 CALLED = {"answer", "begun", "progress", "say", "touched", "watch"}
 
 

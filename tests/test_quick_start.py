@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-#: What takes a tenth of a second and more to load, or more memory than all else.
+#: Modules that take a tenth of a second or more to import, or most of the memory.
 SLOW = {"dask", "h5py", "jinja2", "joblib", "matplotlib", "pandas", "ray", "rich", "scipy", "sklearn", "typer"}
 
 

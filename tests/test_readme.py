@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 import typer
-from live.boards import LOOPBACK, free_port
+from live.boards import LOOPBACK
+from loopback import free_port
 from typer.core import TyperCommand, TyperGroup
 
 from taxel.cli import app

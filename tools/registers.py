@@ -9,29 +9,14 @@ import ast
 import json
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
-from typing import Any
+
+from registers_source import OPERATOR, Table, parsed, read
 
 HEAD = "Made from registers.toml by tools/registers.py (`make registers`): edit that."
 OPPOSITE = {ast.LtE: ">", ast.Lt: ">=", ast.GtE: "<", ast.Gt: "<=", ast.Eq: "!=", ast.NotEq: "=="}
-OPERATOR = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
 #: What a rule may name beside the fields, and its unit.
 OF_THE_ARRAY = {"steps": "number", "driven_lines": "number", "sense_lines": "number"}
-
-Table = dict[str, Any]
-
-
-def read(path: Path) -> Table:
-    """Return the source with every value filled in."""
-    source = tomllib.loads(path.read_text())
-    for field in source["field"]:
-        field.setdefault("offset", 0)
-        field.setdefault("least", field["offset"])
-        field.setdefault("greatest", 2 ** field["bits"] - 1 + field["offset"])
-    for rule in source["rule"]:
-        rule.setdefault("warns", False)
-    return source
 
 
 def rust_type(field: Table) -> str:
@@ -68,11 +53,6 @@ def broken(node: ast.expr, *, inner: bool = False, equal: str = "==") -> str:
             sign = {"==": equal, "!=": equal.replace("==", "!=")}.get(sign, sign) if equal != "==" else sign
             return f"{value(left)} {sign} {value(right)}"
     raise ValueError(f"registers.toml: {ast.unparse(node)} is no comparison")
-
-
-def parsed(text: str) -> ast.expr:
-    """Read one expression."""
-    return ast.parse(text, mode="eval").body
 
 
 def names(text: str) -> set[str]:
@@ -225,20 +205,20 @@ def rust_table(source: Table) -> str:
     newline = "\n"
     return as_formatted(f"""use serde::{{Deserialize, Serialize}};
 
-/// What the registers hold, in the registers' own units (Table 5.5).
+/// The values of the registers, in the registers' own units (Table 5.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Registers {{
 {newline.join(struct)}
 }}
 
-/// What fields that older files lack hold at reset.
+/// Values at reset of the fields that older files lack.
 mod at_reset {{
 {newline.join(defaults)}
 }}
 
 impl Registers {{
-    /// Register `n` as the board holds it; 0 where it has no such register.
+    /// The word of register `n`; 0 if there is no such register.
     #[must_use]
     pub fn word(&self, n: u8) -> u32 {{
         match n {{
@@ -247,7 +227,7 @@ impl Registers {{
         }}
     }}
 
-    /// Which bits register `n` has; the others are reserved and must be 0.
+    /// Mask of the bits of register `n`; the others are reserved and must be 0.
     #[must_use]
     pub fn mask(n: u8) -> u32 {{
         match n {{
@@ -256,7 +236,7 @@ impl Registers {{
         }}
     }}
 
-    /// Sets a register's fields, whatever the rules say.
+    /// Sets a register's fields without checking the rules.
     pub(super) fn store(&mut self, register: u8, value: u32) {{
         match register {{
 {newline.join(stores)}
@@ -284,18 +264,18 @@ def rust_presets(source: Table) -> str:
     newline = "\n"
     return as_formatted(f"""use super::table::Registers;
 
-/// A set of registers by name.
+/// A named set of register values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Preset {{
-    /// What it is called.
+    /// Name of the preset.
     pub name: &'static str,
-    /// For how many sense lines it is made.
+    /// Number of sense lines of the boards for which it is made.
     pub sense_lines: u16,
-    /// What the registers hold.
+    /// The values of the registers.
     pub registers: Registers,
 }}
 
-/// The presets, in the order of the reference; the first for an array's size is what its board holds at reset.
+/// The presets, in the order of the reference; a board's registers at reset are the first preset for its array's size.
 pub const PRESETS: [Preset; {len(source["preset"])}] = [
 {newline.join(rust_preset(source, preset) for preset in source["preset"])}
 ];
@@ -328,10 +308,10 @@ def rust_power_law(source: Table) -> str:
     """Write the power law as the logic looks it up."""
     law = power_law(source)
     table = "\n".join("    " + " ".join(f"{entry}," for entry in law[k : k + 12]) for k in range(0, len(law), 12))
-    return as_formatted(f"""/// Bits behind the point of [`POWER_LAW`].
+    return as_formatted(f"""/// Number of fractional bits of [`POWER_LAW`].
 pub const POWER_LAW_FRACTION: u32 = {source["power_law"]["fraction_bits"]};
 
-/// Ticks to the power of {source["power_law"]["exponent"]} (5.1), in fixed point, as the logic looks it up.
+/// Ticks to the power of {source["power_law"]["exponent"]} (5.1), in fixed point: the lookup table of the logic.
 pub const POWER_LAW: [u32; {len(law)}] = [
 {table}
 ];

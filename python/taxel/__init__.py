@@ -95,9 +95,9 @@ def __getattr__(name: str) -> Any:
         return import_module(f"taxel.{name}")
     if name in _ELSEWHERE:
         place, inside = _ELSEWHERE[name]
-        found = getattr(import_module(place), inside)
-        globals()[name] = found
-        return found
+        value = getattr(import_module(place), inside)
+        globals()[name] = value
+        return value
     if name == "Label":  # its name until version 0.1
         return import_module("taxel.labels")._label
     raise AttributeError(f"module 'taxel' has no attribute {name!r}")

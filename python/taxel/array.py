@@ -72,9 +72,9 @@ class Array:
         return cls(64, 64, 2.67, name="thesis 64x64")
 
     @classmethod
-    def _of(cls, given: object) -> Array:
+    def _of(cls, array: object) -> Array:
         """Return the array that was given; the thesis' where none was."""
-        return cls.thesis() if given is None else instance("array", given, cls)
+        return cls.thesis() if array is None else instance("array", array, cls)
 
     @property
     def shape(self) -> tuple[int, int]:

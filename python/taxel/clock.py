@@ -121,13 +121,13 @@ class Clock:
         >>> Clock(np.array([0, 1000]), np.array([10**15, 10**15 + 10**6])).board_us_at([10**15 + 500_000])
         array([500])
         """
-        wanted = _whole("host_ns", host_ns, "ns")
+        target = _whole("host_ns", host_ns, "ns")
         own, host = self._knots
-        t = own[0] + (wanted - host[0]) // 1000
+        t = own[0] + (target - host[0]) // 1000
         for _ in range(4):
             # What is off shrinks by the drift each time, 1e-4 or less.
-            t = t + np.rint((wanted - self.host_ns(t)) / 1000.0).astype(np.int64)
-        return t if np.ndim(wanted) else int(t)
+            t = t + np.rint((target - self.host_ns(t)) / 1000.0).astype(np.int64)
+        return t if np.ndim(target) else int(t)
 
     @property
     def delay_us(self) -> NDArray[np.float64]:
@@ -142,14 +142,14 @@ class Clock:
         return f"Clock(drift {self.drift_ppm:+.1f} ppm, delays {late[0]:.0f} us median, {late[1]:.0f} us 99 %)"
 
 
-def _whole(name: str, given: Any, unit: str) -> NDArray[np.int64]:
+def _whole(name: str, values: Any, unit: str) -> NDArray[np.int64]:
     """Return one time or several as int64; refuse what is no whole number."""
     try:
-        times = np.asarray(given)
+        times = np.asarray(values)
     except (ValueError, TypeError, OverflowError):
         times = np.array(None)
     if times.size and (times.dtype.kind not in "iu" or times.max() > np.iinfo(np.int64).max):
-        raise ProblemError(f"{name} is {shown(given)}: must be whole {unit}")
+        raise ProblemError(f"{name} is {shown(values)}: must be whole {unit}")
     return times.astype(np.int64)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import bare, column, fields, nth, shown, window
 from taxel._base.arguments import path as checked_path
-from taxel._base.columns import Columns, frozen, kept, own
+from taxel._base.columns import Columns, frozen, own, own_column
 from taxel._base.drawing import draw
 from taxel._base.files import write_whole
 from taxel._base.header_table import HeaderTable, text_of
@@ -132,9 +132,9 @@ class Detections(Columns):
         repaired: ArrayLike | None = None,
     ) -> Self:
         """Build from columns whose slope may be NaN, where a detection has none."""
-        found = cls.__new__(cls)
-        found._hold(label, t, known, slope, said, repaired)
-        return found
+        detections = cls.__new__(cls)
+        detections._hold(label, t, known, slope, said, repaired)
+        return detections
 
     def _hold(
         self,
@@ -153,15 +153,15 @@ class Detections(Columns):
         if labels.ndim != 1 or labels.dtype.kind != "U":
             raise ProblemError(f"label is {shown(label)}: must be a list of texts")
         self.label: NDArray[np.str_] = own(labels, label)
-        self.t: NDArray[np.int64] = kept("t", t, np.int64, "us")
-        self.known: NDArray[np.int64] = kept("known", known, np.int64, "us")
+        self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
+        self.known: NDArray[np.int64] = own_column("known", known, np.int64, "us")
         slopes = frozen(np.full(len(labels), np.nan)) if slope is None else slope
-        self.slope: NDArray[np.float64] = kept("slope", slopes, np.float64)
-        self.said: NDArray[np.int64] | None = None if said is None else kept("said", said, np.int64, "us")
+        self.slope: NDArray[np.float64] = own_column("slope", slopes, np.float64)
+        self.said: NDArray[np.int64] | None = None if said is None else own_column("said", said, np.int64, "us")
         if self.said is not None and len(self.said) != len(labels):
             raise ProblemError(f"said has {len(self.said)} entries: must be {len(labels)}, one a detection")
         marks = frozen(np.zeros(len(labels), np.bool_)) if repaired is None else repaired
-        self.repaired: NDArray[np.bool_] = kept("repaired", marks, np.bool_)
+        self.repaired: NDArray[np.bool_] = own_column("repaired", marks, np.bool_)
         _core.check_detections(self._parts())
 
     def __len__(self) -> int:

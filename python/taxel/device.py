@@ -96,8 +96,8 @@ def ports() -> list[Port]:
     >>> all(port.place for port in ports())
     True
     """
-    found = json.loads(_core.serial_ports())
-    return [Port(**{**port, "usb": None if port["usb"] is None else tuple(port["usb"])}) for port in found]
+    records = json.loads(_core.serial_ports())
+    return [Port(**{**port, "usb": None if port["usb"] is None else tuple(port["usb"])}) for port in records]
 
 
 @dataclass(frozen=True)
@@ -466,7 +466,7 @@ class Device:
         timeout: float = 1.0,
         patience: float = 2.0,
     ) -> None:
-        given = None if array is None else instance("array", array, Array)
+        checked = None if array is None else instance("array", array, Array)
         self.patience = number("patience", patience)
         self.reconnects = 0
         self._set: Registers | None = None
@@ -476,7 +476,7 @@ class Device:
             size = (self.greeting.rows, self.greeting.columns)
             thesis = Array.thesis()
             reported = thesis if thesis.shape == size else Array(*size, pitch_mm=thesis.pitch_mm)
-            self.array = reported if given is None else given
+            self.array = reported if checked is None else checked
             if self.array.shape != size:
                 raise DeviceError(f"{place}: the board has {size[0]} x {size[1]} taxels, the array {self.array!r}")
         except BaseException:
@@ -610,15 +610,15 @@ class Device:
         except DeviceError as error:
             if "hung up" not in str(error):
                 raise
-        found = self.cable.reopen(self.patience)
+        greeting = self.cable.reopen(self.patience)
         self.reconnects += 1
-        if (found.rows, found.columns, found.channels) != (
+        if (greeting.rows, greeting.columns, greeting.channels) != (
             self.greeting.rows,
             self.greeting.columns,
             self.greeting.channels,
         ):
-            raise DeviceError(f"{self.cable.place}: another board is there now: {found}")
-        self.greeting = found
+            raise DeviceError(f"{self.cable.place}: another board is there now: {greeting}")
+        self.greeting = greeting
         if self._set is not None:
             self._write(self._set)
         return work()

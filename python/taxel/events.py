@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, fields, instance, nth, rows, shown, window
-from taxel._base.columns import Columns, frozen, kept
+from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -102,22 +103,22 @@ class Events(Columns):
         markers: Sequence[tuple[int, bool]] = (),
     ) -> None:
         self.array = instance("array", array, Array)
-        self.t: NDArray[np.int64] = kept("t", t, np.int64, "us")
-        self.x: NDArray[np.uint16] = kept("x", x, np.uint16)
-        self.y: NDArray[np.uint16] = kept("y", y, np.uint16)
-        self.p: NDArray[np.bool_] = kept("p", p, np.bool_)
+        self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
+        self.x: NDArray[np.uint16] = own_column("x", x, np.uint16)
+        self.y: NDArray[np.uint16] = own_column("y", y, np.uint16)
+        self.p: NDArray[np.bool_] = own_column("p", p, np.bool_)
         self.intensity: NDArray[np.uint16] | None = None
         self.present: NDArray[np.bool_] | None = None
         if intensity is not None:
-            self.intensity = kept("intensity", intensity, np.uint16)
+            self.intensity = own_column("intensity", intensity, np.uint16)
             all_of_them = np.ones(len(self.intensity), np.bool_)
-            self.present = frozen(all_of_them) if present is None else kept("present", present, np.bool_)
+            self.present = frozen(all_of_them) if present is None else own_column("present", present, np.bool_)
             if len(self.present) == len(self.intensity) and self.intensity[~self.present].any():
                 # What did not come has no value, so equal events have equal columns.
                 self.intensity = frozen(np.where(self.present, self.intensity, np.uint16(0)))
         elif present is not None:
             raise ProblemError("present without intensity: give both or neither")
-        self.repaired = None if repaired is None else _where_any(kept("repaired", repaired, np.bool_))
+        self.repaired = None if repaired is None else _where_any(own_column("repaired", repaired, np.bool_))
         self.markers = _markers(markers)
         _core.check_events(self._parts())
 
@@ -147,9 +148,9 @@ class Events(Columns):
         array([192])
         """
         start, stop = window("us", start, stop)
-        kept = self[(self.t >= start) & (self.t < stop)]
-        kept.markers = tuple(m for m in self.markers if start <= m[0] < stop)
-        return kept
+        selected = self[(self.t >= start) & (self.t < stop)]
+        selected.markers = tuple(m for m in self.markers if start <= m[0] < stop)
+        return selected
 
     def region(self, x: slice, y: slice) -> Events:
         """Return the events of a rectangle of columns `x` and rows `y` (slices without a step); the array stays.
@@ -178,9 +179,9 @@ class Events(Columns):
 
         Encoders and readouts take a whole recording in order, with up to 0.1 s of datagrams that overtook each other.
         """
-        kept = self[np.argsort(self.t, kind="stable")]
-        kept.markers = tuple(sorted(self.markers, key=lambda marker: marker[0]))
-        return kept
+        ordered = self[np.argsort(self.t, kind="stable")]
+        ordered.markers = tuple(sorted(self.markers, key=lambda marker: marker[0]))
+        return ordered
 
     def __iter__(self) -> Iterator[Event]:
         ticks: list[int | None] = [None] * len(self)
@@ -442,10 +443,12 @@ class Events(Columns):
 
     def __repr__(self) -> str:
         time = f"{int(self.t.min())} to {int(self.t.max())} us" if len(self) else "no time"
-        said = "no intensities" if self.present is None else f"{int(self.present.sum())} intensities"
+        count = None if self.present is None else int(self.present.sum())
+        intensities = "no intensities" if count is None else counted(count, "intensity", "intensities")
         marks = "" if self.repaired is None else f", {int(self.repaired.sum())} repaired"
-        marks += f", {len(self.markers)} markers" if self.markers else ""
-        return f"Events({len(self)} events, {time}, {self.array.rows} x {self.array.columns} taxels, {said}{marks})"
+        marks += f", {counted(len(self.markers), 'marker')}" if self.markers else ""
+        size = f"{self.array.rows} x {self.array.columns} taxels"
+        return f"Events({counted(len(self), 'event')}, {time}, {size}, {intensities}{marks})"
 
 
 def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...]:

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import instance, number, shown, text, whole, window
-from taxel._base.columns import Columns, frozen, kept, kept_numbers
+from taxel._base.columns import Columns, frozen, own_column, own_numbers
 from taxel._base.drawing import draw
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -54,8 +55,8 @@ class Frames(Columns):
     """
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
-        self.values: NDArray[np.float32] = kept_numbers("values", values, np.float32)
-        self.t: NDArray[np.int64] = kept("t", t, np.int64, "us")
+        self.values: NDArray[np.float32] = own_numbers("values", values, np.float32)
+        self.t: NDArray[np.int64] = own_column("t", t, np.int64, "us")
         if self.values.ndim != 3:
             raise ProblemError(f"values have {self.values.ndim} dimensions: must have three (n, rows, columns)")
         if len(self.t) != len(self.values):
@@ -123,7 +124,7 @@ class Frames(Columns):
                 f"shorter stretch or a period longer than {period} us"
             )
         t = np.arange(pictures, dtype=np.int64) * period + first
-        begins = None if held is None else kept_numbers("held", held, np.float32)
+        begins = None if held is None else own_numbers("held", held, np.float32)
         if begins is not None and begins.shape != array.shape:
             raise ProblemError(f"held has shape {begins.shape}: must have the array's, {array.shape}")
         values = _core.HeldValues(events._parts(), None, None if begins is None else begins.reshape(-1)).at(t)
@@ -295,4 +296,5 @@ class Frames(Columns):
 
     def __repr__(self) -> str:
         time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
-        return f"Frames({len(self)} pictures of {self.array.rows} x {self.array.columns} taxels, {time}, {self.unit})"
+        size = f"{self.array.rows} x {self.array.columns} taxels"
+        return f"Frames({counted(len(self), 'picture')} of {size}, {time}, {self.unit})"

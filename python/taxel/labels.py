@@ -17,6 +17,7 @@ from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown
 from taxel._base.files import whole_file
 from taxel._base.header_table import HeaderTable, text_of
+from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
@@ -161,14 +162,15 @@ class Labels:
         name = self.named(path)
         rows = [row for row in self.rows if row.recording == name]
         clock = clock_of() if any(row.at_ns for row in rows) else None
-        found: dict[str, list[int]] = {}
+        by_label: dict[str, list[int]] = {}
         for row in rows:
             ahead = ahead_us(row, path, clock, self.path)
-            found.setdefault(row.text, []).append((row.t or 0) - ahead)
-        return {label: np.sort(np.array(times, np.int64)) for label, times in found.items()}
+            by_label.setdefault(row.text, []).append((row.t or 0) - ahead)
+        return {label: np.sort(np.array(times, np.int64)) for label, times in by_label.items()}
 
     def __repr__(self) -> str:
-        return f"Labels({len(self.rows)} events of {', '.join(self.recordings) or 'one recording'}, {self.path})"
+        recordings = ", ".join(self.recordings) or "one recording"
+        return f"Labels({counted(len(self.rows), 'event')} of {recordings}, {self.path})"
 
 
 def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> int:
@@ -227,13 +229,13 @@ def _row(place: str, cells: Mapping[str, str]) -> Note:
     values = {name: cell.strip() for name, cell in cells.items()}
     times: dict[str, int] = {}
     for name in ("t_us", "host_ns"):
-        said = values.get(name, "")
-        if not said and name == "host_ns":
+        written = values.get(name, "")
+        if not written and name == "host_ns":
             continue
         try:
-            times[name] = int(said)
+            times[name] = int(written)
         except ValueError:
-            raise FormatError(f"{place}: {name} is {shown(said)}; must be whole {name[-2:]}") from None
+            raise FormatError(f"{place}: {name} is {shown(written)}; must be whole {name[-2:]}") from None
     if not values["label"] or not -(2**52) <= times["t_us"] <= 2**52:
         raise FormatError(f"{place}: must name a label, and a time within 2^52 us")
     if not 0 <= times.get("host_ns", 0) < 2**63:

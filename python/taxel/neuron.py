@@ -152,9 +152,9 @@ class Neuron(Value):
         >>> [train.round(3).tolist() for train in fired]
         [[3.366], [], [1.795]]
         """
-        given = np.asarray(weights) if isinstance(weights, np.ndarray) else weights
-        single = isinstance(given, np.ndarray) and given.dtype == np.float32
-        matrix = numbers("weights", given, np.float32 if single else np.float64)
+        source = np.asarray(weights) if isinstance(weights, np.ndarray) else weights
+        single = isinstance(source, np.ndarray) and source.dtype == np.float32
+        matrix = numbers("weights", source, np.float32 if single else np.float64)
         if matrix.ndim != 2:
             raise ProblemError(f"weights has {matrix.ndim} dimensions: must have two, neurons and trains")
         if matrix.shape[1] != len(_trains(trains)):

@@ -10,7 +10,7 @@ from typing import Any
 from taxel import _core, wire
 from taxel.array import Array
 from taxel.events import Events
-from taxel.wire.given import given_bytes
+from taxel.wire.buffer import buffer_bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +38,10 @@ def _decode(
     data: Any, *, array: Array | None = None, columns: wire.Columns | None = None
 ) -> tuple[Events, wire.Counts, int]:
     """Decode a stream of datagrams (now `taxel.wire.decode(data, version=2)`); return events, counts, bytes skipped."""
-    sensor, stream = Array._of(array), given_bytes(data)
-    room, own = wire.Columns._asked_for(columns, _core.wire_rows(2, len(stream)))
+    sensor, stream = Array._of(array), buffer_bytes(data)
+    room, own = wire.Columns._or_fresh(columns, _core.wire_rows(2, len(stream)))
     filled, counts, skipped = _core.decode_datagrams(stream, sensor._parts(), room._parts())
-    return (room._given if own else room._first)(sensor, *filled), wire.Counts(**json.loads(counts)), skipped
+    return (room._owning if own else room._first)(sensor, *filled), wire.Counts(**json.loads(counts)), skipped
 
 
 #: By old name: what it was, and what to use.

@@ -93,7 +93,11 @@ PROOFS = (
             (SELECT, "8'(line - at)", "8'(line - at) + 8'd1"),
             (SELECT, "!all && later ? 8'd0", "later ? 8'd0"),
             (SELECT, "pulses == insert && !csel_din", "pulses == insert"),
-            (SELECT, "if (pulses == insert && !csel_din) csel_din <= 1'b1;\n        else csel_clk <= 1'b1;", "csel_din <= pulses == insert;\n        csel_clk <= 1'b1;"),
+            (
+                SELECT,
+                "if (pulses == insert && !csel_din) csel_din <= 1'b1;\n        else csel_clk <= 1'b1;",
+                "csel_din <= pulses == insert;\n        csel_clk <= 1'b1;",
+            ),
         ),
     ),
 )

@@ -7,30 +7,17 @@ from __future__ import annotations
 
 import ast
 import sys
-import tomllib
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "tools"))
+
+from registers_source import OPERATOR, Table, parsed, read  # noqa: E402
+
 HEAD = "// Made from registers.toml by rtl/tools/registers.py (`make rtl-registers`): edit that.\n"
 #: Bits of the arithmetic in rules: 8 steps of 16 bits, and counts of 32 bits, fit.
 WIDTH = 40
 COMPARED = {ast.LtE: "<=", ast.Lt: "<", ast.GtE: ">=", ast.Gt: ">", ast.Eq: "==", ast.NotEq: "!="}
-OPERATOR = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
-
-Table = dict[str, Any]
-
-
-def read(path: Path) -> Table:
-    """Return the source with every value filled in."""
-    source = tomllib.loads(path.read_text())
-    for field in source["field"]:
-        field.setdefault("offset", 0)
-        field.setdefault("least", field["offset"])
-        field.setdefault("greatest", 2 ** field["bits"] - 1 + field["offset"])
-    for rule in source["rule"]:
-        rule.setdefault("warns", False)
-    return source
 
 
 def held(source: Table) -> list[Table]:
@@ -142,7 +129,7 @@ def rules(source: Table) -> str:
             kinds.append((4, f"{arithmetic(ast.Name(name), fields)} > {WIDTH}'d{f['greatest']}"))
     for rule in source["rule"]:
         if not rule["warns"]:
-            demanded = condition(ast.parse(rule["holds"], mode="eval").body, fields)
+            demanded = condition(parsed(rule["holds"]), fields)
             kinds.append((rule["number"], f"!{demanded}"))
     conditions = "\n".join(f"    which[{k}] = {broken};" for k, (_, broken) in enumerate(kinds))
     numbers = "\n".join(f"    if (which[{k}]) return 4'd{number};" for k, (number, _) in enumerate(kinds))

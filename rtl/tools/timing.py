@@ -9,13 +9,16 @@ import json
 import os
 import subprocess
 import sys
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 RTL = Path(__file__).parents[1]
 ROOT = RTL.parent
+sys.path.append(str(ROOT / "tools"))
+
+from registers_source import read  # noqa: E402
+
 TOOLS = ROOT / ".venv-rtl" / "bin"
 WORK = RTL / "build" / "timing"
 #: What each clock must reach, MHz: the scan's, and the converter's, whose tick is half a clock.
@@ -92,7 +95,7 @@ def reached(report: dict[str, Any]) -> dict[str, float]:
 
 def resolution() -> None:
     """Print how many ticks of 1/300 us a ramp can last in each preset: the values that a taxel can have."""
-    source = tomllib.loads((ROOT / "registers.toml").read_text())
+    source = read(ROOT / "registers.toml")
     defaults = {field["name"]: field["default"] for field in source["field"] if "default" in field}
     for preset in source["preset"]:
         registers = defaults | preset["values"]

@@ -1,7 +1,7 @@
-"""Studies: a protocol, its parameters, the published values as data, and a runner that gives all of them the rest.
+"""Studies: modules with a protocol, its parameters and the published values as data, which one runner runs.
 
-A study is a file of this folder whose `STUDY` is a `taxel_studies.study.Study`, and a line in
-`STUDIES`.
+A study is a module of this package, with the constants and functions that `taxel_studies.study.Study` lists, and a line
+in `STUDIES`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 __all__ = ["DRAWN", "FIGURES", "STUDIES", "load"]
 
-#: One line on every study, by name, in the order of the page; "fig6.1" lies in ``fig6_1.py``. They load when asked for.
+#: The title of every study by its name, in the order of the page. The module of "fig6.1" is ``fig6_1.py``.
 STUDIES = {
     "fig3.3": "the fabric array's readout, thresholded, as spikes of Izhikevich pairs: one a rise, one a fall",
     "fig3.5": "two spheres told apart by a Tempotron from first spikes of the fabric array",
@@ -59,7 +59,7 @@ STUDIES = {
 }
 
 
-#: The study that holds each figure and table of the thesis which is no study's name.
+#: The study that shows each figure and table of the thesis after which no study is named.
 FIGURES = {
     "fig3.6": "fig3.5",
     "fig4.10": "fig4.8",
@@ -72,7 +72,7 @@ FIGURES = {
     "table7.1": "asynchronous",
 }
 
-#: Where the others are: drawings, and tables of words.
+#: The pages that show the other figures and tables: drawings, and tables of words.
 DRAWN = {
     "fig4.1": "docs/sensor.md",
     "fig4.2": "docs/sensor.md",
@@ -86,5 +86,6 @@ DRAWN = {
 
 def load(name: str) -> Study:
     """Return a study by its name in `STUDIES`."""
-    study: Study = import_module(f"taxel_studies.{name.replace('.', '_')}").STUDY
-    return study
+    from taxel_studies.study import Study  # noqa: PLC0415  matplotlib loads slowly
+
+    return Study.of(name, STUDIES[name], import_module(f"taxel_studies.{name.replace('.', '_')}"))

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.3.2"
+PROTOCOL = (
+    "64 columns and four rows of one channel, read by ramps of five lengths, or by one that adapts between 38 and "
+    "510 ticks: so long that the fastest taxel moves by four of its ticks in a frame. A taxel and its neighbours "
+    "are pressed slowly and held (fine control), then tapped for 6 ms (gross movement); lines are ideal, "
+    "comparators without hysteresis, no noise but that of whole ticks. The thesis states neither a rule nor a gain."
+)
 
 PARAMETERS: dict[str, Any] = {
     "ramps": [38, 75, 150, 300, 510],
@@ -31,7 +35,8 @@ PARAMETERS: dict[str, Any] = {
     "fine_ms": 500.0,
     "realisations": 10,
 }
-#: A tap counts as seen from this rise on, V (the least load that the thesis resolves, 4.4.1).
+SIZES = {"toy": {"realisations": 2, "ramps": [38, 150, 510], "period_us": 40.0, "fine_ms": 200.0}}
+#: A tap counts as detected once the reading has risen by this much, V (the least load that the thesis resolves, 4.4.1).
 SEEN_V = 0.1
 #: Silence before the first tap and between two, ms.
 APART_MS = 40.0
@@ -65,25 +70,25 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Convert a touch; tell what a host that holds the last reading is wrong by, by phase, and when it sees taps."""
+    """Convert a touch; return the error of the last reading by phase, and when each tap shows in the readings."""
     rng = np.random.default_rng([seed, 432])
     loads, taps = force(params, rng)
     rows, columns, every = params["rows"], params["columns"], params["period_us"]
     away = np.hypot(*np.meshgrid(np.arange(columns) - columns / 2, np.arange(rows) - rows / 2))
     share = np.exp(-((away / 3.0) ** 2)) * np.exp(0.2 * rng.standard_normal(away.shape))
     volts = VirtualGround().volts_alone(Fabric().conductance(loads[:, None, None] * share))
-    # Each taxel's rest is its own, so that no two quantise alike.
+    # Each taxel has its own rest, so that quantisation errors differ between taxels.
     volts += 0.02 * rng.standard_normal(share.shape)
     converter = Converter(hysteresis_v=0.0)
     fixed = params["ramp"]
     ramp = AdaptiveRamp(converter=converter)
     if fixed is not None:
         ramp = AdaptiveRamp(converter=converter, steepest=fixed, gentlest=fixed)
-    seen = ramp.convert(volts, period_us=every)
-    line_us = converter.line_us + converter.steps * (seen.ramp.astype(float) - converter.ramp) / 300.0
+    scans = ramp.convert(volts, period_us=every)
+    line_us = converter.line_us + converter.steps * (scans.ramp.astype(float) - converter.ramp) / 300.0
     loaded = np.argwhere(share > 0.2)
     ends = every * int(1e3 * params["fine_ms"] / every)
-    # What the host holds at each time: the last reading that was taken before.
+    # The host's value at each time is the last reading before it.
     t = every * np.arange(len(loads))
     squares = {phase: [0.0, 0] for phase in PHASES}
     late: list[float] = []
@@ -91,39 +96,39 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     for tap in taps:
         tapped |= (t >= tap) & (t < tap + 1e3 * params["tap_ms"])
     for y, x in loaded.tolist():
-        sampled_us = seen.t_us + x * line_us
+        sampled_us = scans.t_us + x * line_us
         last = np.searchsorted(sampled_us, t, side="right") - 1
         known = last >= 0
-        wrong = seen.volts[last[known], y, x] - volts[known, y, x]
+        wrong = scans.volts[last[known], y, x] - volts[known, y, x]
         for phase, when in (("fine", t[known] < ends), ("gross", tapped[known])):
             squares[phase][0] += float((wrong[when] ** 2).sum())
             squares[phase][1] += int(when.sum())
     y, x = loaded[np.argmax(share[loaded[:, 0], loaded[:, 1]])].tolist()
-    sampled_us = seen.t_us + x * line_us
+    sampled_us = scans.t_us + x * line_us
     for tap in taps:
-        before = seen.volts[max(0, int(np.searchsorted(sampled_us, tap)) - 1), y, x]
-        after = np.flatnonzero((sampled_us >= tap) & (seen.volts[:, y, x] > before + SEEN_V))
+        before = scans.volts[max(0, int(np.searchsorted(sampled_us, tap)) - 1), y, x]
+        after = np.flatnonzero((sampled_us >= tap) & (scans.volts[:, y, x] > before + SEEN_V))
         late.append(float(sampled_us[after[0]] - tap) if len(after) else float("nan"))
     result: dict[str, Any] = {
         "rms_mv": {phase: 1e3 * float(np.sqrt(s / max(1, n))) for phase, (s, n) in squares.items()},
         "late_us": late,
         "frames_a_s": {
-            "fine": float((seen.t_us < ends).sum() / (1e-6 * ends)),
-            "gross": float(np.median(1e6 / (columns * line_us[np.searchsorted(seen.t_us, taps + 2e3)]))),
+            "fine": float((scans.t_us < ends).sum() / (1e-6 * ends)),
+            "gross": float(np.median(1e6 / (columns * line_us[np.searchsorted(scans.t_us, taps + 2e3)]))),
         },
     }
     if seed == 0:
-        near = (seen.t_us > taps[0] - 2e3) & (seen.t_us < taps[0] + 1e3 * params["tap_ms"] + 6e3)
+        near = (scans.t_us > taps[0] - 2e3) & (scans.t_us < taps[0] + 1e3 * params["tap_ms"] + 6e3)
         result["course"] = {
             "t_ms": (1e-3 * (sampled_us[near] - taps[0])).round(4).tolist(),
-            "volts": seen.volts[near, y, x].round(5).tolist(),
-            "ramp": seen.ramp[near].tolist(),
+            "volts": scans.volts[near, y, x].round(5).tolist(),
+            "ramp": scans.ramp[near].tolist(),
         }
     return result
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Return of each converter how wrong it is in each phase, how late it sees a tap, and how often it scans."""
+    """Return each converter's error in each phase, its delay until a tap shows, and its scan rate."""
     del p
     summary: Summary = {"ramps": {}}
     for name in dict.fromkeys(row.params["ramp"] for row in rows):
@@ -149,7 +154,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         return float(one["rms_mv"][phase])
 
     def whole(one: dict[str, Any]) -> float:
-        """How much worse it is than the best fixed ramp of each phase, at its worst."""
+        """Return the largest ratio, over the phases, of a converter's error to that of the best fixed ramp."""
         return max(wrong(one, phase) / min(wrong(other, phase) for other in ramps.values()) for phase in PHASES)
 
     best = min(ramps, key=lambda name: whole(ramps[name]))
@@ -217,8 +222,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the two errors against each other, and a tap as the adaptive ramp and the gentlest read it."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     for name, one in summary["ramps"].items():
@@ -244,24 +247,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     right.step(course["t_ms"], course["ramp"], where="post", color="C3")
     right.set(xlabel="time since a tap, ms", ylabel="ramp, ticks")
     return figure
-
-
-STUDY = Study(
-    name="adaptive_ramp",
-    title="a ramp that adapts to the signal: steep in gross movement, gentle in fine control",
-    where="thesis 4.3.2",
-    protocol=(
-        "64 columns and four rows of one channel, read by ramps of five lengths, or by one that adapts between 38 and "
-        "510 ticks: so long that the fastest taxel moves by four of its ticks in a frame. A taxel and its neighbours "
-        "are pressed slowly and held (fine control), then tapped for 6 ms (gross movement); lines are ideal, "
-        "comparators without hysteresis, no noise but that of whole ticks. The thesis states neither a rule nor a gain."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"realisations": 2, "ramps": [38, 150, 510], "period_us": 40.0, "fine_ms": 200.0}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-)

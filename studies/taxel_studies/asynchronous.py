@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel import information
 from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
+from taxel_studies.codes import drop_tasks, kinds_of
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.5, 7.2 and Table 7.1"
+PROTOCOL = (
+    "Balls of three radii fall from three heights, 30 times each, on the emulated board, its taxels and the ball's "
+    "place drawn anew each time; once its lines are scanned at 5208 frames/s, once each taxel compares by itself "
+    "with what it sent last and stamps are of 1 us. Who listens takes each taxel's first rise after contact; linear"
+    " discriminants name ball and height from these latencies. Between two frames of the simulation a taxel's "
+    "reading lies on a straight line, noise and all: a comparator's own faster noise is not simulated."
+)
 
 PARAMETERS: dict[str, Any] = {
     "radii_mm": [25.0, 30.0, 35.0],
@@ -28,12 +34,13 @@ PARAMETERS: dict[str, Any] = {
     "place_mm": 2.67,
     "seed": 1,
 }
-#: Taxels of a side under the impact; address and sign of an event among 64 x 64, in bits.
+SIZES = {"toy": {"radii_mm": [25.0, 35.0], "drops_mm": [200.0], "trials": 6, "windows_ms": [0.7, 2.0]}}
+#: Taxels along a side of the region under the impact; bits of the address (64 x 64) and sign of an event.
 SIDE, EVENT_BITS = 20, 13
-#: Before a scene, ms: nothing is tared, since only changes are looked at.
+#: Silence before a scene, ms. The board is not tared, since only changes count.
 BEFORE_MS = 5.0
 ARRAYS = ("scanned", "asynchronous")
-#: What an array costs, in the words of its table.
+#: The costs of an array, as the table names them.
 COSTS = {
     "events": "events a touch",
     "events_a_s": "events/s",
@@ -45,13 +52,7 @@ COSTS = {
 
 def tasks(p: Parameters) -> list[Task]:
     """List one drop a task."""
-    shared = {"listen_ms": max(p["windows_ms"]), "preset": p["preset"], "place_mm": p["place_mm"]}
-    return [
-        Task({**shared, "radius_mm": r, "drop_mm": d}, 10_000 * p["seed"] + 1000 * (3 * i + j) + k)
-        for i, r in enumerate(p["radii_mm"])
-        for j, d in enumerate(p["drops_mm"])
-        for k in range(p["trials"])
-    ]
+    return drop_tasks(p, apart=1000, preset=p["preset"], place_mm=p["place_mm"])
 
 
 def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[float]]:
@@ -59,7 +60,7 @@ def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[flo
     low = events.array.columns // 2 - SIDE // 2
     x, y = events.x.astype(int) - low, events.y.astype(int) - low
     since = to_ms(events.t - contact_us)
-    # A frame's stamp is its beginning: it may lie before what it shows.
+    # The stamp of a frame is its beginning, which may lie before the contact that the frame shows.
     inside = events.p & (x >= 0) & (x < SIDE) & (y >= 0) & (y < SIDE) & (since > -0.5) & (since < listen_ms)
     first = np.full(SIDE * SIDE, np.inf)
     np.minimum.at(first, SIDE * y[inside] + x[inside], np.maximum(since[inside], 0.0))
@@ -67,7 +68,7 @@ def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[flo
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Drop a ball on one board that scans and on one that does not; tell first rises, events and bytes."""
+    """Drop a ball on one board that scans and on one that does not; return first rises, events and bytes."""
     random = np.random.default_rng([seed, 71])
     x, y = (32 * 2.67 + random.uniform(-params["place_mm"], params["place_mm"], 2)).tolist()
     ball: dict[str, Any] = {"shape": {"sphere": {"radius_mm": params["radius_mm"]}}, "x_mm": x, "y_mm": y}
@@ -86,7 +87,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         }
         played = play(acts, **board)
         length_us = played.events.markers[-1][0]
-        # The same board untouched for as long: noise, headers, promises.
+        # The bytes of the same board untouched for as long: noise, headers and promises.
         rest = play([Silence(to_ms(length_us))], **board).bytes
         touched = np.zeros(len(played.events), bool)
         for c in contacts:
@@ -101,8 +102,8 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Estimate the bits of first-spike and relative latencies by window, and tell what the arrays cost."""
-    labels = [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
+    """Estimate the bits of first-spike and relative latencies by window, and the costs of both arrays."""
+    labels = kinds_of(rows)
     summary: Summary = {"most": float(np.log2(len(set(labels)))), "bits": {}, "costs": {}}
     longest = max(p["windows_ms"])
     for array in ARRAYS:
@@ -113,8 +114,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
                 "first": information.FirstSpikeLatency(window_ms=window),
                 "relative": information.RelativeLatency(window_ms=window),
             }
-            found = information.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
-            summary["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
+            bits = information.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
+            summary["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in bits.items()}
         results = [r.result[array] for r in rows]
         touched_s = np.array([1e-3 * r.result["touched_ms"] for r in rows])
         events = np.array([one["events"] for one in results])
@@ -130,7 +131,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Judge what 4.5 and Table 7.1 hope of an asynchronous array."""
+    """Judge what 4.5 and Table 7.1 expect of an asynchronous array."""
     bits, costs = summary["bits"], summary["costs"]
     scanned, alone = (costs[array] for array in ARRAYS)
     soon, late = (f"{w:g}" for w in (min(p["windows_ms"]), max(p["windows_ms"])))
@@ -212,8 +213,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the bits over time since contact, of both arrays."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     figure = Figure(figsize=(9, 3.8), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
@@ -222,35 +221,13 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     ):
         for array, colour, beside in zip(ARRAYS, ("C0", "C3"), (0.98, 1.02), strict=True):
             windows = [float(w) for w in summary["bits"][array]]
-            found = np.array([one[code] for one in summary["bits"][array].values()])
-            off = np.abs(found[:, 1:] - found[:, :1]).T
-            # A little apart, so that neither interval hides the other.
-            ax.errorbar(np.multiply(windows, beside), found[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
+            bits = np.array([one[code] for one in summary["bits"][array].values()])
+            off = np.abs(bits[:, 1:] - bits[:, :1]).T
+            # The two curves are drawn a little apart, so that neither interval hides the other.
+            ax.errorbar(np.multiply(windows, beside), bits[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
         ax.axhline(summary["most"], color="0.6", ls=":", label="ceiling")
         ax.set(xlabel="time since contact, ms", title=title)
         logarithmic(ax, x=windows)
     axes[0].set_ylabel("bits")
     axes[0].legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="asynchronous",
-    title="an array whose taxels compare by themselves: bits of a touch, and what they cost",
-    where="thesis 4.5, 7.2 and Table 7.1",
-    protocol=(
-        "Balls of three radii fall from three heights, 30 times each, on the emulated board, its taxels and the ball's "
-        "place drawn anew each time; once its lines are scanned at 5208 frames/s, once each taxel compares by itself "
-        "with what it sent last and stamps are of 1 us. Who listens takes each taxel's first rise after contact; linear"
-        " discriminants name ball and height from these latencies. Between two frames of the simulation a taxel's "
-        "reading lies on a straight line, noise and all: a comparator's own faster noise is not simulated."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"radii_mm": [25.0, 35.0], "drops_mm": [200.0], "trials": 6, "windows_ms": [0.7, 2.0]}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-)

@@ -1,8 +1,8 @@
-"""How many patterns a neuron can learn (thesis 6.4.4): what figure 6.7 and the study of exactness share.
+"""How many patterns a neuron can learn (thesis 6.4.4): what figure 6.7, exactness, delays and rivals share.
 
 A realisation draws its patterns one after the other, and a load takes the first p of them. So what is infeasible at one
 load stays so at every higher one, and the published search (from 0.2 N up while all realisations are feasible, down if
-not) ends where the realisation ends that holds least: one solve at that load for each of the others is enough.
+not) ends at the largest load of the weakest realisation: one solve at that load for each of the others is enough.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
 
-__all__ = ["DURATION_MS", "feasible", "largest", "patterns", "realise", "satisfied", "weakest"]
+__all__ = ["DURATION_MS", "PUBLISHED", "feasible", "largest", "patterns", "realise", "satisfied", "weakest"]
 
 DURATION_MS = 200.0
-#: Where rounding keeps the solver from a proof either way, rows met to this count as met, mV.
+#: Where rounding prevents a proof either way, rows that hold to within this count as satisfied, mV.
 MET_TO = 1e-9
+#: Loads that others published for one spike a pattern, each under criteria of its own (thesis 6.4.4).
+PUBLISHED = {"E-learning": 0.22, "PSD": 0.144, "SPAN": 0.075, "ReSuMe": 0.04, "I-learning": 0.02}
 
 
 def patterns(seed: int, inputs: int, count: int, classes: int) -> tuple[list[SpikeTrains], list[list[float]]]:
@@ -62,7 +64,7 @@ def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
 
 
 def satisfied(cone: ConeX) -> bool:
-    """Return whether a fit found weights; where rounding forbids a proof either way, rows met to 1e-9 mV decide."""
+    """Return whether a fit found weights; where rounding forbids a proof, rows satisfied to 1e-9 mV decide."""
     return bool(cone.status_ == "solved" or (cone.status_ == "stopped" and cone.violation_ <= MET_TO))
 
 
@@ -72,11 +74,11 @@ def largest(holds: Callable[[int], bool], start: int, step: int, most: int | Non
     Parameters
     ----------
     holds : function of int
-        Once false it stays false.
+        Monotone: once false it stays false.
     start, step : int
-        Where to look first, and the grain.
+        Where the search begins, and its step.
     most : int, optional
-        Not looked for above it.
+        The search ends there.
     """
     low, high, stride = 0, None if most is None else most + step, step
     at = start
@@ -100,12 +102,12 @@ def largest(holds: Callable[[int], bool], start: int, step: int, most: int | Non
 
 
 def weakest(bears: Callable[[int, int], bool], params: dict[str, Any], seed: int) -> list[list[int]]:
-    """Search the largest load that all realisations bear, from 0.2 N on.
+    """Search the largest load at which all realisations are feasible, from 0.2 N on.
 
     Parameters
     ----------
     bears : function of (seed, p)
-        Whether a realisation bears a load.
+        Whether a realisation is feasible at a load.
     params : dict
         ``inputs``, ``classes``, ``realisations``.
     seed : int
@@ -114,7 +116,7 @@ def weakest(bears: Callable[[int, int], bool], params: dict[str, Any], seed: int
     Returns
     -------
     list of [seed, p]
-        Of each realisation that bore less than those before it; the last p is what all of them bear.
+        Of each realisation whose largest load is below those before it; at the last p all of them are feasible.
     """
     step = params["classes"]
     most = largest(partial(bears, seed), max(round(0.2 * params["inputs"] / step), 1) * step, step)
@@ -127,7 +129,7 @@ def weakest(bears: Callable[[int, int], bool], params: dict[str, Any], seed: int
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Search the largest load that all realisations bear.
+    """Search the largest load at which all realisations are feasible.
 
     Parameters
     ----------
@@ -139,7 +141,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``p``, ``load`` (p by inputs), ``limits`` (seed and p of each realisation that bore less than those before it),
+        ``p``, ``load`` (p by inputs), ``limits`` (seed and p of each realisation below those before it),
         ``solves``.
     """
     solves = 0

@@ -70,13 +70,13 @@ def _root(
     if stale:
         from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
 
-        found = stale_figures(figures)
-        for name, parts in found.items():
+        outdated = stale_figures(figures)
+        for name, parts in outdated.items():
             more = f" and {len(parts) - MOST_NAMED} more" if len(parts) > MOST_NAMED else ""
             typer.echo(f"{name}: {', '.join(parts[:MOST_NAMED])}{more}")
         typer.echo(
-            f"{len(found)} kept figures are stale; taxel study NAME --confirm, or run them again"
-            if found
+            f"{len(outdated)} kept figures are stale; taxel study NAME --confirm, or run them again"
+            if outdated
             else "no kept figure is stale"
         )
     elif context.invoked_subcommand is None:
@@ -139,7 +139,7 @@ def every(
                 quiet=as_json,
             )
     finally:
-        # Whatever stopped it: the page shows what was run, and names the rest.
+        # The page is written however the run ends: it shows what was run, and names the rest.
         page = _page(report)
     if as_json:
         typer.echo(json.dumps(sections))

@@ -1,12 +1,15 @@
-"""Figures 5.1 to 5.4: a half disc pressed on silicone, what the base feels, how it is sampled, and the spikes."""
+"""Figures 5.1 to 5.4: a half disc pressed on silicone, the pressure at its base, how it is sampled, and the spikes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.encode import FA1
@@ -14,14 +17,18 @@ from taxel.frames import Frames
 from taxel.simulate.fem import Course, KeptCourses, SamplingGrid, Yeoh, bodies
 from taxel.simulate.fem.solids import Solids
 from taxel_studies import indented
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2"
+PROTOCOL = (
+    "Finite elements of our own: plane stress, incompressible Yeoh (Table 5.2), bilinear quadrilaterals, contact "
+    "with friction 0.7, quasi-static. The block is 16 mm wide and 5 mm high and its base is held; the half disc's "
+    "flat top is moved along the path. 75 paths serve the 300 conditions, as each depth is reached in 100 ms. "
+    "Pressure is the normal traction at the base. What the thesis leaves open stands on the page Readings, and how "
+    "much each choice matters in the study contact_choices. Courses are kept beside the report and shared by "
+    "figures 5.5 to 5.8."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -30,25 +37,26 @@ PARAMETERS: dict[str, Any] = {
     "alpha": 0.7,
     "seed": 1,
 }
+SIZES = {
+    "coarse": indented.COARSE,
+    "toy": {**indented.TOY, "drawn": {"diameter_mm": 2.0, "modulus_kpa": 50.0, "angle_deg": 10.0, "depth_mm": 0.5}},
+}
 #: A force on the base counts as equal to the one on the disc within this share of it.
 ROUNDING = 1e-8
 #: Samples of figure 5.3's picture, ms and mm (the thesis recorded every 0.2 ms), and its grids.
 PICTURE_MS, PICTURE_MM, GRIDS = 0.4, 0.1, 3
-#: What the pictures' grids are drawn with.
+#: Colours of the sampling grids in the picture.
 COLOURS = ("C3", "C1", "C9")
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one course a path."""
-    del courses
-    return indented.course_tasks(list(indented.courses_of(p).values()))
+tasks = indented.tasks
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Press once, and tell whether all is in balance."""
+    """Press once, and return how well the forces balance."""
     del seed
     course = indented.make(params, courses)
-    assert course is not None  # it has no other realisations
+    assert course is not None  # every realisation of this study makes a course
     most = max(float(np.abs(course.reaction).max()), 1e-300)
     mirrored = course.pressure_kpa - course.pressure_kpa[:, ::-1]
     return {
@@ -62,7 +70,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
-    """List the courses; keep what the pictures show of one of them."""
+    """List the courses, and what the pictures show of one of them."""
     paths = [{**row.params["course"], **row.result} for row in rows]
     wanted = p["drawn"]
     asked = indented.courses_of(p)
@@ -141,7 +149,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     short = [one for one in paths if one["fault"]]
     slanted = [one["asymmetry"] for one in paths if one["angle_deg"]]
     straight = [one["asymmetry"] for one in paths if not one["angle_deg"]]
-    found = [
+    judged = [
         Statement(
             "Table 5.1: every combination of diameter, modulus, depth and angle is simulated.",
             "300 conditions",
@@ -161,7 +169,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         ),
     ]
     if slanted and straight:
-        found.append(
+        judged.append(
             Statement(
                 "Figure 5.2b: a contact under a slant deforms the sensor asymmetrically.",
                 "the picture, 10 degrees",
@@ -173,7 +181,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         )
     drawn = summary["sampled"]
     count = sum(map(len, drawn["times"]))
-    found.append(
+    judged.append(
         Statement(
             "Figure 5.4: spikes are discharged only when a pressure change above the threshold is sensed.",
             "the picture",
@@ -182,7 +190,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             f"one sample path at {p['period_ms']:g} ms",
         )
     )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
@@ -191,9 +199,6 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
 
 
 def _draw_model(p: Parameters, model: dict[str, Any]) -> Figure:
-    from matplotlib.collections import PolyCollection  # noqa: PLC0415  loads slowly
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
     figure = Figure(figsize=(8, 7), layout="constrained")
     axes: Sequence[Axes] = figure.subplots(2, 1, sharex=True)
     quads, drawn = np.array(model["quads"]), p["drawn"]
@@ -232,8 +237,6 @@ def _draw_model(p: Parameters, model: dict[str, Any]) -> Figure:
 
 
 def _draw_spikes(sampled: dict[str, Any], p: Parameters) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 4), layout="constrained")
     ax = figure.subplots()
     rho, period = np.array(sampled["rho"]), p["period_ms"]
@@ -251,8 +254,6 @@ def _draw_spikes(sampled: dict[str, Any], p: Parameters) -> Figure:
 
 
 def _draw_grid(sampled: dict[str, Any]) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 4), layout="constrained")
     ax = figure.subplots()
     picture = np.array(sampled["picture"])
@@ -267,29 +268,3 @@ def _draw_grid(sampled: dict[str, Any]) -> Figure:
     ax.set_ylabel("place at the base, mm")
     ax.set_title("three draws of the sub-sampling grid (here every 5 ms) over one course")
     return figure
-
-
-STUDY = Study(
-    name="contact",
-    title="a half disc pressed on silicone, sampled by taxels at its base (5.1 to 5.4)",
-    where="thesis 5.4.1 and 5.4.2, figures 5.1 to 5.4, tables 5.1 and 5.2",
-    protocol=(
-        "Finite elements of our own: plane stress, incompressible Yeoh (Table 5.2), bilinear quadrilaterals, contact "
-        "with friction 0.7, quasi-static. The block is 16 mm wide and 5 mm high and its base is held; the half disc's "
-        "flat top is moved along the path. 75 paths serve the 300 conditions, as each depth is reached in 100 ms. "
-        "Pressure is the normal traction at the base. What the thesis leaves open stands on the page Readings, and how "
-        "much each choice matters in the study contact_choices. Courses are kept beside the report and shared by "
-        "figures 5.5 to 5.8."
-    ),
-    parameters=PARAMETERS,
-    sizes={
-        "coarse": indented.COARSE,
-        "toy": {**indented.TOY, "drawn": {"diameter_mm": 2.0, "modulus_kpa": 50.0, "angle_deg": 10.0, "depth_mm": 0.5}},
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    courses=True,
-)

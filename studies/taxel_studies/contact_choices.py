@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from taxel.encode import FA1
 from taxel.simulate.fem import DRAGON_SKIN_10, Indentation, SamplingGrid, Yeoh
 from taxel_studies import indented
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+__all__ = ["CHOICES", "courses_under"]
 
-__all__ = ["CHOICES", "STUDY", "courses_under"]
+WHERE = "beside thesis 5.4 and 5.5"
+PROTOCOL = (
+    "As fig5.5 on part of Table 5.1 (diameters 2, 3, 4 mm; moduli 50, 250 kPa; all depths; 0, 10, 20 degrees), "
+    "with Table 5.3's alpha, one choice changed at a time; theta_0 follows each choice's own largest pressure."
+)
+COURSES = True
 
 #: What is changed: of the indentation, of the sampling grid, of the encoder. The first changes nothing.
 CHOICES: dict[str, dict[str, dict[str, Any]]] = {
@@ -49,6 +55,7 @@ TOY: dict[str, Any] = {
     "samples": 12,
     "periods_ms": [10.0, 20.0],
 }
+SIZES = {"coarse": indented.COARSE, "toy": TOY}
 
 
 def courses_under(p: Parameters, choice: str) -> dict[tuple[float, float, float], Indentation]:
@@ -60,16 +67,14 @@ def courses_under(p: Parameters, choice: str) -> dict[tuple[float, float, float]
     return indented.courses_of(p, **changed)
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
+def tasks(p: Parameters) -> list[Task]:
     """List the courses of every choice, those that several share once."""
-    del courses
     asked = {i: None for choice in p["choices"] for i in courses_under(p, choice).values()}
     return indented.course_tasks(list(asked))
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List one realisation a choice and period."""
-    del courses
     listed = []
     for choice in p["choices"]:
         own = [i.to_dict() for i in courses_under(p, choice).values()]
@@ -82,7 +87,7 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Press once; or sample all contacts under one choice, and see what discriminants make of the spikes."""
+    """Press once; or sample all contacts under one choice, and return the bits of the discriminants' answers."""
     course = indented.make(params, courses)
     if course is not None:
         return indented.course_summary(course)
@@ -104,11 +109,11 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by choice and period."""
     del courses
-    found = {(r.params["choice"], r.params["period_ms"]): r.result["bits"] for r in rows if "choice" in r.params}
+    bits = {(r.params["choice"], r.params["period_ms"]): r.result["bits"] for r in rows if "choice" in r.params}
     periods = sorted(p["periods_ms"])
     return {
         "periods_ms": periods,
-        "lines": [{"choice": c, "bits": [found[c, t] for t in periods]} for c in p["choices"]],
+        "lines": [{"choice": c, "bits": [bits[c, t] for t in periods]} for c in p["choices"]],
         "conditions": len(indented.table_of(p).conditions()),
     }
 
@@ -144,7 +149,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """Return each choice's bits as they differ from the first's."""
+    """Return each choice's bits less those of the first."""
     del p
     first, *others = summary["lines"]
     rows = [
@@ -162,8 +167,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the curve of 5.5 under each choice."""
     del p
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(8, 4.5), layout="constrained")
     ax = figure.subplots()
     for k, line in enumerate(summary["lines"]):
@@ -181,24 +184,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     ax.set_ylabel("bits")
     ax.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
-
-
-STUDY = Study(
-    name="contact_choices",
-    title="how much each choice that the thesis leaves open moves the bits of an indentation",
-    where="beside thesis 5.4 and 5.5",
-    protocol=(
-        "As fig5.5 on part of Table 5.1 (diameters 2, 3, 4 mm; moduli 50, 250 kPa; all depths; 0, 10, 20 degrees), "
-        "with Table 5.3's alpha, one choice changed at a time; theta_0 follows each choice's own largest pressure."
-    ),
-    parameters=PARAMETERS,
-    sizes={"coarse": indented.COARSE, "toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    tables=tables,
-    draw=draw,
-    courses=True,
-)

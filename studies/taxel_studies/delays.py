@@ -1,11 +1,12 @@
-"""What delays that are learnt buy: copies of every input, chosen from by l1, beside one random delay an input."""
+"""The gain of learnt delays: copies of every input, chosen from by l1, beside one random delay an input."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.learn import ConeX
 from taxel.neuron import Neuron
@@ -13,12 +14,17 @@ from taxel.spikes import SpikeTrains
 from taxel_studies.capacity import DURATION_MS, patterns, satisfied, weakest
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "ours; the thesis has no delays"
+PROTOCOL = (
+    "Patterns and targets of 6.4.4: one spike an input on a random whole ms from 1 to 200, class c of C shall fire "
+    "once at 200 c / (C + 1) ms. Each input arrives as it is; or put off by one random delay of its own; or "
+    "several times, at delays spaced evenly from 0 to the longest, each copy with a weight. Load: the largest p, a "
+    "multiple of C, at which all realisations are feasible, p over inputs. Selection: at given loads the weights "
+    "of least l1 norm; p over the weights that are not 0. Table 6.1, bounds ±0.3 mV a copy, silence at every "
+    "instant from 0 to 200 ms."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 30,
@@ -30,9 +36,10 @@ PARAMETERS: dict[str, Any] = {
     "time": "continuous",
 }
 TOY: dict[str, Any] = {"realisations": 2, "inputs": [40], "copies": [3], "shares": [0.1]}
-#: A weight below it is none, mV: a millionth of the bound.
+SIZES = {"toy": TOY}
+#: A weight below this counts as 0, mV: a millionth of the bound.
 NONE = 3e-7
-#: On gait, where nothing selects: feet off of gaitndd within 10 ms, % (the notes to the gait study).
+#: Of gaitndd's foot-offs, the share within 10 ms, %, without selection of delays (notes to the gait study).
 GAIT = {"without": 82, "with copies from 0 to 50 ms": 57}
 
 
@@ -44,14 +51,14 @@ def arms(p: Parameters) -> list[str]:
 def tasks(p: Parameters) -> list[Task]:
     """List one search an arm and N, and one selection an arm, N, load and realisation; the longest first."""
     shared = {"classes": p["classes"], "longest_ms": p["longest_ms"], "time": p["time"]}
-    found = []
+    listed = []
     for inputs in sorted(p["inputs"], reverse=True):
         for arm in reversed(arms(p)):
             one = {**shared, "inputs": inputs, "arm": arm}
-            found.append(Task({**one, "asks": "capacity", "realisations": p["realisations"]}))
+            listed.append(Task({**one, "asks": "capacity", "realisations": p["realisations"]}))
             for share in p["shares"]:
-                found += [Task({**one, "asks": "weights", "share": share}, seed) for seed in range(p["realisations"])]
-    return found
+                listed += [Task({**one, "asks": "weights", "share": share}, seed) for seed in range(p["realisations"])]
+    return listed
 
 
 def delayed(params: dict[str, Any], drawn: Sequence[SpikeTrains], seed: int) -> list[SpikeTrains]:
@@ -77,7 +84,7 @@ def fit(params: dict[str, Any], count: int, seed: int, lambdas: tuple[float, flo
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Search the largest load that all realisations bear, or select weights by l1 at a given one.
+    """Search the largest load at which all realisations are feasible, or select weights by l1 at a given one.
 
     Returns
     -------
@@ -104,8 +111,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
         here = [r for r in rows if r.params["arm"] == arm]
         line: dict[str, Any] = {"arm": arm, "inputs": list(p["inputs"]), "load": [], "selected": []}
         for inputs in p["inputs"]:
-            (found,) = (r.result["p"] for r in here if _of(r, inputs, "capacity"))
-            line["load"].append(round(found / inputs, 4))
+            (largest,) = (r.result["p"] for r in here if _of(r, inputs, "capacity"))
+            line["load"].append(round(largest / inputs, 4))
         for share in p["shares"]:
             for inputs in p["inputs"]:
                 some = [r.result for r in here if _of(r, inputs, "weights") and r.params["share"] == share]
@@ -139,7 +146,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     plain, random, copied = (lines[arm]["load"][last] for arm in ("none", "random", most))
     loads = ", ".join(f"{arm} {line['load'][last]:g}" for arm, line in lines.items())
     at = f"N = {p['inputs'][last]}"
-    found = [
+    judged = [
         Statement(
             "Copies at several delays let a neuron learn more patterns an input.",
             "not in the thesis",
@@ -165,7 +172,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         known = {arm: s for arm, s in here.items() if s is not None}
         if {"none", most} <= set(known):
             by_arm = ", ".join(f"{arm} {s['by_weight']:.2f} ({s['weights']:.0f} weights)" for arm, s in known.items())
-            found.append(
+            judged.append(
                 Statement(
                     f"At a load of {share:g}, l1 over all copies learns with fewer weights than over the inputs alone.",
                     "not in the thesis",
@@ -174,7 +181,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     "so what the copies buy is the choice of delays, and not the number of weights alone",
                 )
             )
-    found.append(
+    judged.append(
         Statement(
             "Delays found by a linear programme are not new.",
             "Rostro-Gonzalez, Vasquez, Cessac and Viéville 2010 (hal inria-00455415): weights at each delay, "
@@ -183,7 +190,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             None,
         )
     )
-    found.append(
+    judged.append(
         Statement(
             "Copies without selection hurt on recordings.",
             "not in the thesis",
@@ -192,13 +199,11 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "measured once with CONE-R and l2 when the gait recipes were sought; not rerun here",
         )
     )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw loads by inputs, and patterns a weight by load."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     for line in summary["lines"]:
@@ -211,25 +216,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     )
     left.legend(fontsize="small", title="delays")
     return figure
-
-
-STUDY = Study(
-    name="delays",
-    title="what learnt delays buy: copies of every input, chosen from by l1",
-    where="ours; the thesis has no delays",
-    protocol=(
-        "Patterns and targets of 6.4.4: one spike an input on a random whole ms from 1 to 200, class c of C shall fire "
-        "once at 200 c / (C + 1) ms. Each input arrives as it is; or put off by one random delay of its own; or "
-        "several times, at delays spaced evenly from 0 to the longest, each copy with a weight. Load: the largest p, a "
-        "multiple of C, at which all realisations are feasible, p over inputs. Selection: at given loads the weights "
-        "of least l1 norm; p over the weights that are not 0. Table 6.1, bounds ±0.3 mV a copy, silence at every "
-        "instant from 0 to 200 ms."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -43,14 +43,14 @@ __all__ = [
     "named",
     "named_by_neighbours",
     "pictures",
-    "play_tasks",
     "played",
     "sampled",
     "smoothed",
     "spatial_grams",
+    "tasks",
 ]
 
-#: 5.6.2's experiment: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
+#: The experiment of 5.6.2: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
 TABLE: dict[str, Any] = {
     "balls_mm": [50.0, 70.0],
     "heights_mm": [100.0, 150.0, 200.0],
@@ -62,9 +62,9 @@ TABLE: dict[str, Any] = {
     "place_sd_mm": 5.0,
     "board": 56,
 }
-#: Seconds.
+#: The experiment of 5.6.2 at a size that takes seconds.
 TOY: dict[str, Any] = {"heights_mm": [100.0, 200.0], "slants_deg": [0.0], "drops": 8}
-#: 4.4.2's: a tennis ball from two heights at two slants, 100 trials each; again it is a guess how trials differ.
+#: The experiment of 4.4.2: a tennis ball from two heights at two slants, 100 trials each; how trials differ is a guess.
 TENNIS_TABLE: dict[str, Any] = {
     "balls_mm": [65.0],
     "heights_mm": [400.0, 800.0],
@@ -76,52 +76,52 @@ TENNIS_TABLE: dict[str, Any] = {
     "place_sd_mm": 5.0,
     "board": 44,
 }
-#: Seconds.
+#: The experiment of 4.4.2 at a size that takes seconds.
 TENNIS_TOY: dict[str, Any] = {"drops": 8}
-#: Taxels along a side of the region around the impact, and how long it is looked at, ms.
+#: Taxels along a side of the region around the impact, and how long it is recorded, ms.
 REGION, LENGTH_MS = 16, 50.0
 #: Frames in that time.
 FRAMES = int(LENGTH_MS / to_ms(FRAME_US))
-#: So many taxels that rise in one frame are an impact; one alone may be noise.
+#: An impact is a frame in which this many taxels rise; a single one may be noise.
 ANSWERED = 3
-#: Ticks: a change above it is an event, as in the board's fast presets.
+#: A change by more than this is an event, ticks, as in the board's fast presets.
 NOISE_FLOOR = 3.0
-#: Silence before the first drop: the tare, and some.
+#: Silence before the first drop, ms: longer than the tare.
 _BEFORE_MS = 60.0
-#: How long the ball is in the air again before a hand takes it, ms after the impact, and how fast the hand goes, mm/s.
+#: When a hand catches the ball after the impact, ms, and how fast the hand lifts it, mm/s.
 _AFTER_MS, _HAND_MM_S = 15.0, 500.0
-#: Whoever lets go does so at no moment of the board's: within so many ms.
+#: The ball is released at a random time within this many ms, as nothing synchronises it with the board.
 _LEAD_MS = 20.0
 
 
 class Rig(NamedTuple):
-    """What an experiment is done with, and what is kept of it."""
+    """The board and ball of an experiment, and the region and time that are recorded."""
 
     preset: str
-    """Of the board."""
+    """Preset of the board."""
     region: int
-    """Taxels along a side of what is kept."""
+    """Taxels along a side of the region."""
     length_ms: float
-    """How long a drop is looked at."""
+    """How long a drop is recorded."""
     around: str
     """The region's middle: of the taxels that answer in the impact's first frame the "mean", or the "first"."""
     stiffness_n_mm: float | None = None
-    """Of a ball that gives."""
+    """Stiffness of a ball that is not rigid."""
 
     @property
     def frame_us(self) -> float:
-        """From one frame to the next."""
+        """Time from one frame to the next."""
         return Registers.preset(self.preset).frame_us
 
     @property
     def frames(self) -> int:
-        """How many are looked at."""
+        """Number of frames of a drop."""
         return int(self.length_ms / to_ms(self.frame_us))
 
 
-#: 5.6.2's.
+#: The rig of 5.6.2.
 IMPACTS = Rig("5.2 kHz", REGION, LENGTH_MS, "mean")
-#: 4.4.2's: 4.10 looks at 40 ms. A tennis ball gives by some 25 N/mm.
+#: The rig of 4.4.2: figure 4.10 shows 40 ms. A tennis ball gives by some 25 N/mm.
 TENNIS = Rig("2 kHz", 17, 40.0, "first", stiffness_n_mm=25.0)
 
 
@@ -142,11 +142,11 @@ class Drops(NamedTuple):
     events: NDArray[np.int64]
     """How many change events the region gave in that time, by drop."""
     lasted_us: NDArray[np.float64]
-    """From the first of these to the last."""
+    """Time from the first of these events to the last, by drop."""
 
 
 def named(p: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those of a study's parameters that the drops hang on."""
+    """Return those of a study's parameters that the drops depend on."""
     return {name: p[name] for name in TABLE}
 
 
@@ -155,13 +155,13 @@ def conditions(p: Mapping[str, Any]) -> list[Condition]:
     return [Condition(*one) for one in product(p["balls_mm"], p["heights_mm"], p["slants_deg"])]
 
 
-def play_tasks(p: Mapping[str, Any]) -> list[Task]:
+def tasks(p: Mapping[str, Any]) -> list[Task]:
     """List one realisation a condition: all its drops."""
     return [Task({**named(p), "condition": list(one)}, p["seed"]) for one in conditions(p)]
 
 
 def played_summary(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
-    """Return the events and contact times of the drops of a realisation of `play_tasks`; None for another one."""
+    """Return the events and contact times of the drops of a realisation of `tasks`; None for another one."""
     if "condition" not in params:
         return None
     drops = played(params, Condition(*params["condition"]), seed, folder, rig)
@@ -199,7 +199,7 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator,
     gives = {} if rig.stiffness_n_mm is None else {"stiffness_n_mm": rig.stiffness_n_mm}
     return Scene(
         {
-            # One surface for all: else how it is reckoned would tell a slant.
+            # All slants use one model of the surface: otherwise its numerical error would reveal the slant.
             "surface": "layer",
             "foam": {},
             "bodies": [
@@ -229,7 +229,7 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator,
 
 
 def _around(events: Events, impacts: Sequence[float], rig: Rig) -> Drops:
-    """Cut out what the host holds of the region around each impact (4.4.2, 5.6.2).
+    """Cut the readings of the region around each impact out of a recording (4.4.2, 5.6.2).
 
     Raises
     ------
@@ -276,7 +276,7 @@ def _corner(places: NDArray[Any], size: int, region: int) -> int:
 
 
 def sampled(drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Return the change events of drops that are looked at every so often, (drops, samples, ON and OFF, taxels).
+    """Return the change events of drops that are sampled at a period, (drops, samples, ON and OFF, taxels).
 
     Parameters
     ----------
@@ -298,17 +298,17 @@ def sampled(drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.flo
     drop, sample = train // taxels, np.round(spikes.times).astype(np.int64) - 1
     first = np.full(len(drops), count)
     np.minimum.at(first, drop, sample)
-    found = np.zeros((len(drops), count, 2, taxels), np.uint8)
-    found[drop, sample - first[drop], (spikes.values < 0).astype(int), train % taxels] = 1
-    return found
+    counts = np.zeros((len(drops), count, 2, taxels), np.uint8)
+    counts[drop, sample - first[drop], (spikes.values < 0).astype(int), train % taxels] = 1
+    return counts
 
 
 def pictures(
     drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.float64], rig: Rig, length_ms: float
 ) -> NDArray[np.float64]:
-    """Return how far taxels are from where they were before the impact, every so often, (drops, samples, taxels).
+    """Return each taxel's reading less that before the impact, sampled at a period, (drops, samples, taxels).
 
-    Parameters are those of `sampled`, the drops' rig, and how long they are looked at, ms.
+    Parameters are those of `sampled`, the drops' rig, and how long they are recorded, ms.
     """
     values = _looked_at(drops, period_ms, late_ms, rig, length_ms).astype(np.float64)
     return values[:, 1:] - values[:, :1]
@@ -317,7 +317,7 @@ def pictures(
 def _looked_at(
     drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.float64], rig: Rig, length_ms: float
 ) -> NDArray[np.uint16]:
-    """Return what the host holds before the impact, and then every so often, (drops, 1 + samples, taxels)."""
+    """Return the readings before the impact and then at every sample, (drops, 1 + samples, taxels)."""
     step = late_ms[:, None] + period_ms * np.arange(int(length_ms / period_ms + 1e-9))
     frame = np.minimum((step / to_ms(rig.frame_us) + 1e-9).astype(np.int64), rig.frames - 1) + 1
     frame = np.concatenate([np.zeros((len(drops), 1), np.int64), frame], axis=1)
@@ -365,17 +365,17 @@ def spatial_grams(
     decay = np.float32(np.exp(-period_ms / tau))
     passed = -np.expm1(-2 * period_ms / tau)
     totals = [np.zeros((count, count)) for _ in kernels]
-    found: list[list[NDArray[np.float64]]] = [[] for _ in kernels]
+    grams: list[list[NDArray[np.float64]]] = [[] for _ in kernels]
     for k in range(ends[-1]):
         state *= decay
         state += spikes[:, k]
         for n, kernel in enumerate(kernels):
-            seen = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
-            here = seen @ seen.T
+            smooth = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
+            here = smooth @ smooth.T
             if k + 1 in ends:
-                found[n].append((totals[n] + here) * (tau / 2))
+                grams[n].append((totals[n] + here) * (tau / 2))
             totals[n] += passed * here
-    return found
+    return grams
 
 
 def absolute_distances(
@@ -393,13 +393,13 @@ def absolute_distances(
     for k in range(samples):
         state *= decay
         state += spikes[:, k]
-        seen = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
-        total += cdist(seen, seen, "cityblock")
+        smooth = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
+        total += cdist(smooth, smooth, "cityblock")
     return total
 
 
 def named_by_neighbours(distances: NDArray[np.float64], y: NDArray[np.int64], neighbours: int) -> NDArray[np.int64]:
-    """Return what each pattern's nearest others say that it is: none is its own neighbour."""
+    """Return the class that each pattern's nearest neighbours vote for; no pattern is its own neighbour."""
     apart = distances.copy()
     np.fill_diagonal(apart, np.inf)
     return np.asarray(NearestNeighbours(neighbours=neighbours).fit(distances, y).predict(apart))

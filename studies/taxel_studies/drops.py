@@ -4,23 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 from taxel_studies import dropped
 from taxel_studies.dropped import FRAMES, REGION, Condition
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 5.6.2 and 5.7, figures 5.10 and 5.14"
+PROTOCOL = (
+    "Spheres of 5 and 7 cm and 36 g (within 1 g) fall from 10, 15 and 20 cm on the emulated board at 5208 frames/s "
+    f"under 10 mm of foam, 100 times each, without a rest between drops; {REGION} x {REGION} taxels around those "
+    f"that answered first, {FRAMES} frames. Their mean place is the region's middle, as in the thesis, so a taxel "
+    "of noise among them moves it: by more than 1.5 taxels in some 2 % of the drops. One board: the same taxels in "
+    "all drops, each drop with its own noise. "
+    "By guess, heights vary by 2 mm and places by 5 mm (standard deviations), as drops are by hand. The sensor is "
+    "tilted by 0, 15 or 30 degrees, always the same way: the ball meets it by v cos(slant), keeps the rest of its "
+    "speed, and friction (0.6 of the force, a guess) makes it roll. The foam is a layer bonded to the board."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {**dropped.TABLE, "drawn": [50.0, 100.0, 0.0], "seed": 1}
+SIZES = {"toy": {**dropped.TOY, "drawn": [50.0, 100.0, 0.0]}}
 #: Bits of an event (address and sign), of a taxel's intensity, and of its change, in 5.7's three codes.
 EVENT_BITS, INTENSITY_BITS, CHANGE_BITS = 9, 10, 2
 #: The largest rate of events in 5.7, kbit/s, and how much less it is than that of intensities.
@@ -29,10 +38,7 @@ PRINTED_KBIT_S, PRINTED_LESS = 659.0, 20.0
 PICTURES_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one realisation a condition."""
-    del courses
-    return dropped.play_tasks(p)
+tasks = dropped.tasks
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any] | None:
@@ -100,8 +106,6 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
 
 
 def _draw_one(p: Parameters, one: dict[str, Any]) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots(2, 3, sharex=True, sharey=True).ravel()
     t, taxel, rise = (np.array(one[name]) for name in ("t_ms", "taxel", "rise"))
@@ -127,8 +131,6 @@ def _draw_one(p: Parameters, one: dict[str, Any]) -> Figure:
 
 
 def _draw_rates(summary: Summary) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(7, 3.5), layout="constrained")
     ax = figure.subplots()
     rates = np.array(summary["rates_kbit_s"])
@@ -143,28 +145,3 @@ def _draw_rates(summary: Summary) -> Figure:
     ax.set_title(f"figure 5.14: {len(rates)} drops")
     ax.legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="drops",
-    title="a ball dropped on the array, and what its events and frames cost (5.10, 5.14)",
-    where="thesis 5.6.2 and 5.7, figures 5.10 and 5.14",
-    protocol=(
-        "Spheres of 5 and 7 cm and 36 g (within 1 g) fall from 10, 15 and 20 cm on the emulated board at 5208 frames/s "
-        f"under 10 mm of foam, 100 times each, without a rest between drops; {REGION} x {REGION} taxels around those "
-        f"that answered first, {FRAMES} frames. Their mean place is the region's middle, as in the thesis, so a taxel "
-        "of noise among them moves it: by more than 1.5 taxels in some 2 % of the drops. One board: the same taxels in "
-        "all drops, each drop with its own noise. "
-        "By guess, heights vary by 2 mm and places by 5 mm (standard deviations), as drops are by hand. The sensor is "
-        "tilted by 0, 15 or 30 degrees, always the same way: the ball meets it by v cos(slant), keeps the rest of its "
-        "speed, and friction (0.6 of the force, a guess) makes it roll. The foam is a layer bonded to the board."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {**dropped.TOY, "drawn": [50.0, 100.0, 0.0]}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    courses=True,
-)

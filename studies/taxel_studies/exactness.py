@@ -1,11 +1,12 @@
-"""What exactness costs and buys: slope at the targets against clocked steps, and against capacity (ours)."""
+"""The cost and the benefit of exactness: slope at the targets against clocked steps, and against capacity (ours)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.learn import ConeX
@@ -13,12 +14,15 @@ from taxel.neuron import Neuron
 from taxel_studies import capacity, mapping
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "ours; beside thesis 6.4.4"
+PROTOCOL = (
+    "Poisson inputs of 5 to 25 Hz over 200 ms, random targets at least 12 ms apart, CONE-X (l2, continuous time) "
+    "with margin m0 mV and slope m0 mV/ms. Each solution runs freely on clocks of 1, 10 and 100 us steps, that is "
+    "with the threshold's recovery from its own spikes. Beside it the search of figure 6.7 (C = 3, 30 "
+    "realisations) on the grid and at every instant, by margin."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 100,
@@ -38,6 +42,7 @@ TOY: dict[str, Any] = {
     "margins": [1e-3, 1e-2],
     "capacity": {"inputs": [60], "classes": 3, "realisations": 2, "margins": [1e-3]},
 }
+SIZES = {"toy": TOY}
 #: Targets lie at least so far apart, and from both ends, ms.
 APART_MS = 12.0
 
@@ -163,7 +168,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     exact, solved = sum(c["exact"] for c in cases), sum(c["solved"] for c in cases)
     shares = [_share(c, fine) for c in hard]
     listed = ", ".join(f"{s:.0%} at {c['margin']:g}" for s, c in zip(shares, hard, strict=True))
-    found = [
+    judged = [
         Statement(
             "Every solved problem is exact in continuous time (ours).",
             "none",
@@ -198,7 +203,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     small = [
         c["p"] / grid[c["inputs"]]["p"] for c in summary["loads"] if 0 < c["margin"] <= 1e-3 and grid[c["inputs"]]["p"]
     ]
-    found.append(
+    judged.append(
         Statement(
             "Silence at every instant costs little capacity while margin and slope are 1e-3 or less (ours).",
             "none; 0 to 10 % in trials",
@@ -207,7 +212,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "margin in mV and slope in mV/ms alike",
         )
     )
-    return found
+    return judged
 
 
 def _share(case: dict[str, Any], step: float) -> float:
@@ -217,15 +222,13 @@ def _share(case: dict[str, Any], step: float) -> float:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw the share within one step by slope, and the load by margin."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(13, 4), layout="constrained")
     within, late, load = figure.subplots(1, 3)
     for number, (count, rise) in enumerate((c, r) for c in p["counts"] for r in p["theta_plus"]):
         here = [c for c in summary["cases"] if (c["count"], c["theta_plus"]) == (count, rise)]
         label = f"{count} target{'s' if count > 1 else ''}, theta+ {rise:g}"
         for k, step in enumerate(p["steps_ms"]):
-            # What comes first is drawn broader: at 100 % lines lie on each other.
+            # Earlier lines are drawn broader, since lines at 100 % overlap.
             style = {"color": f"C{number}", "ls": ("-", "--", ":")[k % 3], "marker": ".", "lw": max(4.5 - number, 1.2)}
             shares = [100 * _share(c, step) for c in here]
             within.plot(p["margins"], shares, **style, label=f"{label}" if k == 0 else None)
@@ -253,23 +256,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     load.set_title("dashed: silence at the points of a 1 ms grid alone", fontsize="small")
     load.legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="exactness",
-    title="what slope at the targets buys on a clock, and what exactness and slope cost in capacity",
-    where="ours; beside thesis 6.4.4",
-    protocol=(
-        "Poisson inputs of 5 to 25 Hz over 200 ms, random targets at least 12 ms apart, CONE-X (l2, continuous time) "
-        "with margin m0 mV and slope m0 mV/ms. Each solution runs freely on clocks of 1, 10 and 100 us steps, that is "
-        "with the threshold's recovery from its own spikes. Beside it the search of figure 6.7 (C = 3, 30 "
-        "realisations) on the grid and at every instant, by margin."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

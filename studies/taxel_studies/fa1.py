@@ -7,22 +7,26 @@ everything: adapting threshold, polarity, power law, and a spread of their thres
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel import information
 from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
-from taxel_studies.codes import PERIOD_US, SIDE, drop, since_contact
+from taxel_studies.codes import PERIOD_US, SIDE, drop, drop_tasks, kinds_of, since_contact
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 7.2, which asks it"
+PROTOCOL = (
+    "The drops of the study codes. FA-1 (Table 5.3), one sample a frame of 192 us, thresholds spread by a "
+    "factor with the log-sd given, drawn once. Taken away: the threshold's rise and decay (A and B 0), the sign of "
+    "spikes, the power law (alpha 1), the spread. Discriminants on counts and on first-spike latencies, 10 folds; the "
+    "more telling of the two; bits corrected, 95 % intervals over trials."
+)
 
 PARAMETERS: dict[str, Any] = {
     "radii_mm": [25.0, 30.0, 35.0],
@@ -31,6 +35,10 @@ PARAMETERS: dict[str, Any] = {
     "windows_ms": [2.0, 5.0, 20.0],
     "spread": 0.3,
     "seed": 1,
+}
+SIZES = {
+    "quick": {"trials": 10},
+    "toy": {"trials": 3, "drops_mm": [100.0, 200.0], "radii_mm": [25.0, 35.0], "windows_ms": [5.0]},
 }
 
 #: What is taken away, in the words of the page.
@@ -41,7 +49,7 @@ VARIANTS = {
     "power": "power law",
     "spread": "spread of thresholds",
 }
-#: Of the thresholds of one skin, the same in all trials.
+#: Seed of the spread of thresholds, the same in all trials.
 SKIN = 52
 
 
@@ -63,16 +71,7 @@ def spikes(frames: Frames, without: str, spread: float) -> SpikeTrains:
 
 def tasks(p: Parameters) -> list[Task]:
     """List one drop a task."""
-    listen = max(p["windows_ms"])
-    return [
-        Task(
-            {"radius_mm": r, "drop_mm": d, "listen_ms": listen, "spread": p["spread"]},
-            10_000 * p["seed"] + 100 * (3 * i + j) + k,
-        )
-        for i, r in enumerate(p["radii_mm"])
-        for j, d in enumerate(p["drops_mm"])
-        for k in range(p["trials"])
-    ]
+    return drop_tasks(p, spread=p["spread"])
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, list[list[float]]]:
@@ -86,7 +85,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, list[list[float]]]:
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Estimate bits and count events by what was taken away and by window."""
-    labels = [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
+    labels = kinds_of(rows)
     folds, resolution = min(10, p["trials"]), PERIOD_US * 1e-3
     summary: Summary = {"most": float(np.log2(len(set(labels)))), "bits": {}, "events": {}}
     for without in VARIANTS:
@@ -97,10 +96,10 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
                 "rate": information.RateCode(window_ms=window, most_hz=1e6 / PERIOD_US),
                 "first": information.FirstSpikeLatency(window_ms=window, resolution_ms=resolution),
             }
-            found = information.compare_codes(
+            bits = information.compare_codes(
                 trials, labels, codes, onsets_ms=np.zeros(len(rows)), folds=folds, seed=p["seed"]
             )
-            best = max(found.values(), key=lambda one: one.bits)
+            best = max(bits.values(), key=lambda one: one.bits)
             summary["bits"][without][f"{window:g}"] = [best.bits, *best.interval]
             events = [np.count_nonzero(one.times < window) for one in trials]
             summary["events"][without][f"{window:g}"] = float(np.mean(events))
@@ -112,11 +111,11 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     late = f"{max(p['windows_ms']):g}"
     whole, bottom, top = summary["bits"]["all"][late]
     events = summary["events"]["all"][late]
-    found = []
+    judged = []
     for without, name in list(VARIANTS.items())[1:]:
         bits, low, high = summary["bits"][without][late]
         cost = summary["events"][without][late] / max(events, 1e-9)
-        found.append(
+        judged.append(
             Statement(
                 f"It is to be found out whether FA-1's {name} is worth keeping.",
                 "asked in 7.2, not answered",
@@ -126,7 +125,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 + "; of two codes, counts and first spikes, the one with more bits",
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
@@ -147,8 +146,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw bits over events."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     figure = Figure(figsize=(6.5, 4), layout="constrained")
     axes = figure.subplots()
@@ -162,25 +159,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     axes.set(xscale="log", xlabel="events of a touch, in windows of rising length", ylabel="bits")
     axes.legend(loc="lower right")
     return figure
-
-
-STUDY = Study(
-    name="fa1",
-    title="which properties of FA-1 are worth keeping, in bits and in events",
-    where="thesis 7.2, which asks it",
-    protocol="The drops of the study codes. FA-1 (Table 5.3), one sample a frame of 192 us, thresholds spread by a "
-    "factor with the log-sd given, drawn once. Taken away: the threshold's rise and decay (A and B 0), the sign of "
-    "spikes, the power law (alpha 1), the spread. Discriminants on counts and on first-spike latencies, 10 folds; the "
-    "more telling of the two; bits corrected, 95 % intervals over trials.",
-    parameters=PARAMETERS,
-    sizes={
-        "quick": {"trials": 10},
-        "toy": {"trials": 3, "drops_mm": [100.0, 200.0], "radii_mm": [25.0, 35.0], "windows_ms": [5.0]},
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    tables=tables,
-    draw=draw,
-)

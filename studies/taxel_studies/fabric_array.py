@@ -1,4 +1,4 @@
-"""The 8 x 8 fabric array of chapter 3 on its foam, a sphere pressed into it, what its dividers read (thesis 3.4)."""
+"""The 8 x 8 fabric array of chapter 3 on its foam, a sphere pressed into it, and the voltages of its dividers (3.4)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SENSOR: dict[str, Any] = {
 }
 #: The 10 kHz of 3.4.2.
 PERIOD_US = 100
-#: Points of foam a taxel and side, depths of a course; the side of the taxel that the fabric's law is stated for, mm.
+#: Points of foam along a taxel, depths of a course; the side of the taxel that the fabric's law is stated for, mm.
 _FINE, _STEPS, _STATED_MM = 4, 16, 2.29
 
 

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.encode import ThresholdIzhikevich
 from taxel_studies.fabric_array import ARRAY, PERIOD_US, SENSOR, depth_of, pressed, read
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, one_task_per_seed
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 3.4.3, figure 3.3"
+PROTOCOL = (
+    "A sphere of 65 mm pressed three times to 4 N into 10 mm of foam under the 8 x 8 array, at ten places; "
+    "dividers of 10 kOhm at 5 V sampled at 10 kHz, a threshold of 0.25 V (foam, resistor, threshold, speed: ours); "
+    "a .02, b .25, c -65, d 6, gain .5, Euler steps of 0.1 ms, neurons settled at the start."
+)
 
 PARAMETERS: dict[str, Any] = {
     **SENSOR,
@@ -26,13 +28,12 @@ PARAMETERS: dict[str, Any] = {
     "presses": 3,
     "realisations": 10,
 }
+SIZES = {"toy": {"realisations": 2, "presses": 2}}
 #: How long a state must last for the neurons, ms (a step shows after some 20 ms).
 STEADY_MS = 60.0
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List one task a place of the sphere."""
-    return [Task({k: v for k, v in p.items() if k != "realisations"}, seed) for seed in range(p["realisations"])]
+tasks = one_task_per_seed
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -119,36 +120,15 @@ def statements(_p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 3.3: analog, digital, spikes, of the twelve taxels that are on for longest."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 3.6), layout="constrained")
     left, middle, right = figure.subplots(1, 3, sharey=True)
-    seen = summary["drawn"]
-    t = np.array(seen["t_ms"])
-    for row, (volts, digital, spikes) in enumerate(zip(seen["volts"], seen["digital"], seen["spikes"], strict=True)):
-        left.plot(t, row + 0.8 * np.array(volts) / max(map(max, seen["volts"])), color="C0", lw=0.8)
+    shown = summary["drawn"]
+    t = np.array(shown["t_ms"])
+    for row, (volts, digital, spikes) in enumerate(zip(shown["volts"], shown["digital"], shown["spikes"], strict=True)):
+        left.plot(t, row + 0.8 * np.array(volts) / max(map(max, shown["volts"])), color="C0", lw=0.8)
         middle.step(t, row + 0.8 * np.array(digital), color="C2", lw=0.8, where="post")
         right.vlines(spikes, row, row + 0.8, color="k", lw=0.9)
     for ax, title in ((left, "analog readout"), (middle, f"above {p['threshold_v']:g} V"), (right, "spikes")):
         ax.set(xlabel="time, ms", title=title, xlim=(0, t[-1]))
     left.set_ylabel("taxel")
     return figure
-
-
-STUDY = Study(
-    name="fig3.3",
-    title="the fabric array's readout, thresholded, as spikes of Izhikevich pairs: one a rise, one a fall",
-    where="thesis 3.4.3, figure 3.3",
-    protocol=(
-        "A sphere of 65 mm pressed three times to 4 N into 10 mm of foam under the 8 x 8 array, at ten places; "
-        "dividers of 10 kOhm at 5 V sampled at 10 kHz, a threshold of 0.25 V (foam, resistor, threshold, speed: ours); "
-        "a .02, b .25, c -65, d 6, gain .5, Euler steps of 0.1 ms, neurons settled at the start."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"realisations": 2, "presses": 2}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

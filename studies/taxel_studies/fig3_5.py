@@ -5,21 +5,26 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.encode import ThresholdIzhikevich
 from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
 from taxel_studies.fabric_array import PERIOD_US, SENSOR, depth_of, pressed, read
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 3.5 and 3.6.1, figures 3.5 and 3.6"
+PROTOCOL = (
+    "Spheres of 65 and 105 mm pressed to the depths of 1 N and 4 N into 10 mm of foam under the 8 x 8 array, 200 "
+    "trials each, at 10 mm/s; dividers at 10 kHz, threshold, Izhikevich pairs; Tempotron (tau 25 and 6.25 ms, rate "
+    "1e-4, threshold 1, no momentum) that is to fire for the larger, half of the trials for training, 10 splits, "
+    "at most 200 epochs. Trials differ in place (0.5 mm), depth (0.03 mm), speed (5 %), begin and noise (ours). "
+    "Beside it, other values of what the thesis leaves open: a faster press and softer foam."
+)
 
 PARAMETERS: dict[str, Any] = {
     **SENSOR,
@@ -43,6 +48,15 @@ PARAMETERS: dict[str, Any] = {
         "100 mm/s, foam of 30 kPa": {"speed_mm_s": 100.0, "foam_kpa": 30.0},
     },
 }
+SIZES = {
+    "toy": {
+        "trials": 12,
+        "realisations": 2,
+        "epochs": 40,
+        "forces_n": [1.0],
+        "others": {"foam of 30 kPa": {"foam_kpa": 30.0}},
+    }
+}
 #: Accuracy and its standard deviation by force, % (3.6.1).
 PUBLISHED = {1.0: (99.65, 0.41), 4.0: (99.1, 1.41)}
 #: Training error of figure 3.6, and within how many epochs it is reached: "tens".
@@ -64,7 +78,7 @@ def tasks(p: Parameters) -> list[Task]:
 def _trials(text: str) -> list[SpikeTrains]:
     """Return the recordings of one force, sphere after sphere."""
     p = json.loads(text)
-    found = []
+    trials = []
     for sphere, diameter in enumerate(p["diameters_mm"]):
         depth = depth_of(diameter, p["force_n"], p["foam_kpa"], p["foam_mm"])
         for trial in range(p["trials"]):
@@ -77,8 +91,8 @@ def _trials(text: str) -> list[SpikeTrains]:
             course = np.clip((t - began) / 1000 * speed, 0.0, deep)
             frames = read(p, *pressed(p, diameter, deep, x, y), course, int(random.integers(2**31)))
             spikes = ThresholdIzhikevich([p["threshold_v"]], published="3.4.3").encode(frames)
-            found.append(spikes.split_by_sign())
-    return found
+            trials.append(spikes.split_by_sign())
+    return trials
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -118,7 +132,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 def _line(rows: Sequence[Row], force: float) -> dict[str, Any]:
     here = [r.result for r in rows if r.params["force_n"] == force]
     longest = max(len(r["error"]) for r in here)
-    # Training stops when an epoch had no error: from there on there is none.
+    # Training stops after an epoch without an error: from there on the error is 0.
     errors = np.array([r["error"] + [r["error"][-1]] * (longest - len(r["error"])) for r in here])
     mean = errors.mean(axis=0)
     below = np.flatnonzero(mean < ERROR)
@@ -138,13 +152,13 @@ def _line(rows: Sequence[Row], force: float) -> dict[str, Any]:
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 3.6.1 says."""
     full = p["realisations"] >= PARAMETERS["realisations"] and p["trials"] >= PARAMETERS["trials"]
-    found = []
+    judged = []
     for line in summary["forces"]:
         force = line["force_n"]
         if force not in PUBLISHED:
             continue
         mean, sd = PUBLISHED[force]
-        found.append(
+        judged.append(
             Statement(
                 f"Two spheres are told apart at {force:g} N.",
                 f"{mean:g} +- {sd:g} %",
@@ -157,7 +171,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     for line in _best(summary["others"]):
         if line["force_n"] in PUBLISHED:
             mean, sd = PUBLISHED[line["force_n"]]
-            found.append(
+            judged.append(
                 Statement(
                     f"The same at {line['force_n']:g} N with other values: {line['reading']}.",
                     f"{mean:g} +- {sd:g} %; below 5 % of error in training within tens of epochs",
@@ -167,7 +181,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     "neuron's 25 ms, and on hard foam 1 N touches few taxels",
                 )
             )
-    found += [
+    judged += [
         Statement(
             f"Training error falls below 5 % within tens of epochs ({line['force_n']:g} N).",
             "tens of epochs",
@@ -177,7 +191,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         )
         for line in summary["forces"]
     ]
-    return found
+    return judged
 
 
 def _best(others: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -215,15 +229,13 @@ def tables(_p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw 3.5, accuracy by force, and 3.6, training error over epochs."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     accuracy, curves = (Figure(figsize=(6, 3.6), layout="constrained") for _ in range(2))
     ax = accuracy.subplots()
     lines = [{**line, "reading": "ours"} for line in summary["forces"]] + summary["others"]
     readings = list(dict.fromkeys(line["reading"] for line in lines))
     for k, force in enumerate(p["forces_n"]):
         here = [line for line in lines if line["force_n"] == force]
-        # Points, beside each other: bars would have to begin at 0, and what matters lies above chance.
+        # Points beside each other: bars would have to begin at 0, but the differences lie above chance.
         at = np.arange(len(readings)) + (k - (len(p["forces_n"]) - 1) / 2) * 0.2
         ax.errorbar(
             at,
@@ -249,33 +261,3 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
     ax.set(xlabel="epoch", ylabel="training error, %")
     ax.legend(fontsize="small")
     return [accuracy, curves]
-
-
-STUDY = Study(
-    name="fig3.5",
-    title="two spheres told apart by a Tempotron from first spikes of the fabric array",
-    where="thesis 3.5 and 3.6.1, figures 3.5 and 3.6",
-    protocol=(
-        "Spheres of 65 and 105 mm pressed to the depths of 1 N and 4 N into 10 mm of foam under the 8 x 8 array, 200 "
-        "trials each, at 10 mm/s; dividers at 10 kHz, threshold, Izhikevich pairs; Tempotron (tau 25 and 6.25 ms, rate "
-        "1e-4, threshold 1, no momentum) that is to fire for the larger, half of the trials for training, 10 splits, "
-        "at most 200 epochs. Trials differ in place (0.5 mm), depth (0.03 mm), speed (5 %), begin and noise (ours). "
-        "Beside it, other values of what the thesis leaves open: a faster press and softer foam."
-    ),
-    parameters=PARAMETERS,
-    sizes={
-        "toy": {
-            "trials": 12,
-            "realisations": 2,
-            "epochs": 40,
-            "forces_n": [1.0],
-            "others": {"foam of 30 kPa": {"foam_kpa": 30.0}},
-        }
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-)

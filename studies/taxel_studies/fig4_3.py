@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.3.2, figure 4.3"
+PROTOCOL = (
+    "One comparator with 0.1 V of hysteresis, a ramp of 150 ticks of 1/300 us that ends at 3 V: the board's RC "
+    "curve towards 5 V, and a straight one. Inputs from 0.5 to 3.4 V, each settled."
+)
 
 PARAMETERS: dict[str, Any] = {
     "shapes": ["rc", "linear"],
@@ -24,6 +26,7 @@ PARAMETERS: dict[str, Any] = {
     "points": 291,
     "drawn_v": 2.0,
 }
+SIZES = {"toy": {"points": 59}}
 #: Ticks of the counter in 1 us.
 TICKS_A_US = 300.0
 
@@ -34,26 +37,26 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Convert a row of inputs, each settled; and watch one conversion."""
+    """Convert a row of inputs, each settled, and trace one conversion."""
     del seed
     converter = Converter(shape=params["shape"], ramp=params["ramp"], steps=1)
     volts = np.linspace(params["least_v"], params["most_v"], params["points"])
     ticks = np.array([converter.ticks([[v]]) for v in volts]).ravel()
-    seen = converter.trace([params["drawn_v"]], every_us=0.005, stop_us=0.75)
+    trace = converter.trace([params["drawn_v"]], every_us=0.005, stop_us=0.75)
     return {
         "volts": volts.round(6).tolist(),
         "elapsed_us": (ticks / TICKS_A_US).round(9).tolist(),
         "trace": {
-            "t_us": seen.t_us.round(6).tolist(),
-            "input_v": seen.input_v.round(6).tolist(),
-            "ramp_v": seen.ramp_v.round(6).tolist(),
-            "high": seen.high.astype(int).tolist(),
+            "t_us": trace.t_us.round(6).tolist(),
+            "input_v": trace.input_v.round(6).tolist(),
+            "ramp_v": trace.ramp_v.round(6).tolist(),
+            "high": trace.high.astype(int).tolist(),
         },
     }
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Return of each shape whether the time grows, up to which input, and how far it is from straight."""
+    """Return for each shape whether the time grows, up to which input, and how far it is from a straight line."""
     summary: Summary = {"shapes": {}}
     for row in rows:
         volts, elapsed = np.array(row.result["volts"]), np.array(row.result["elapsed_us"])
@@ -71,10 +74,10 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.3.2 says."""
-    found = []
+    judged = []
     for shape, one in summary["shapes"].items():
         name = "the board's RC ramp" if shape == "rc" else "a linear ramp"
-        found.append(
+        judged.append(
             Statement(
                 f"t_elapsed grows with V_in ({name}).",
                 "grows",
@@ -84,7 +87,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         )
     for shape, one in summary["shapes"].items():
         straight = one["bent_us"] < 1e-3
-        found.append(
+        judged.append(
             Statement(
                 f"The duration of t_elapsed is proportional to the magnitude of V_in ({shape} ramp).",
                 "proportional",
@@ -95,19 +98,17 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 else "an RC ramp flattens: later voltages are resolved more finely (Appendix 1, 2.2.3 has the RC)",
             )
         )
-    return found
+    return judged
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw one conversion as 4.3 does, and the time against the input for both ramps."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
-    seen = next(iter(summary["shapes"].values()))["trace"]
-    left.plot(seen["t_us"], seen["ramp_v"], color="C3", label="V_ramp")
-    left.plot(seen["t_us"], seen["input_v"], color="C2", label="V_in")
-    left.step(seen["t_us"], seen["high"], color="C0", where="post", label="V_comp (high: 1)")
+    trace = next(iter(summary["shapes"].values()))["trace"]
+    left.plot(trace["t_us"], trace["ramp_v"], color="C3", label="V_ramp")
+    left.plot(trace["t_us"], trace["input_v"], color="C2", label="V_in")
+    left.step(trace["t_us"], trace["high"], color="C0", where="post", label="V_comp (high: 1)")
     left.set(xlabel="time, us", ylabel="V")
     left.legend(fontsize="small", loc="upper right")
     for number, (shape, one) in enumerate(summary["shapes"].items()):
@@ -115,21 +116,3 @@ def draw(_p: Parameters, summary: Summary) -> Figure:
     right.set(xlabel="V_in, V", ylabel="t_elapsed, us")
     right.legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="fig4.3",
-    title="single-slope conversion: the time until the ramp passes grows with the input",
-    where="thesis 4.3.2, figure 4.3",
-    protocol=(
-        "One comparator with 0.1 V of hysteresis, a ramp of 150 ticks of 1/300 us that ends at 3 V: the board's RC "
-        "curve towards 5 V, and a straight one. Inputs from 0.5 to 3.4 V, each settled."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"points": 59}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

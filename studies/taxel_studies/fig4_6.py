@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel.wire import Registers
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.4.1, figure 4.6"
+PROTOCOL = (
+    "One taxel of 64 x 64 loaded, all others at rest, R_f 47 kOhm, through the exact network (switches of 2.5 ohm, "
+    "amplifiers of gain 1e5) and an RC ramp of 150 ticks. The fabric: G0 + k F^0.7, with 1.64 uS at 0.02 N; taxels "
+    "differ by 20 % in k (all guesses). The first is the law itself."
+)
 
 PARAMETERS: dict[str, Any] = {
     "v_trans": [1.3, 0.5],
@@ -29,6 +32,7 @@ PARAMETERS: dict[str, Any] = {
     "gain_spread": 0.2,
     "realisations": 100,
 }
+SIZES = {"toy": {"realisations": 4, "size": 8, "at": [3, 4], "loads": 24}}
 #: The load that the thesis says is detected, N.
 SEEN_N = 0.02
 
@@ -46,7 +50,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     gain = float(np.exp(params["gain_spread"] * random.standard_normal())) if seed else 1.0
     fabric = Fabric(touch_us=law.touch_us * gain, exponent=params["exponent"])
     loads = np.geomspace(params["least_n"], params["most_n"], params["loads"])
-    # The load that is seen stands among them.
+    # One of the loads is exactly the one that the thesis detects.
     loads[np.abs(np.log(loads / SEEN_N)).argmin()] = SEEN_N
     loads = np.concatenate([[0.0], loads])
     x, y = params["at"]
@@ -65,7 +69,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Return of each voltage: the law's curve, which taxels see 0.02 N, where the ramp and the amplifier end."""
+    """Return for each voltage the law's curve, the taxels that detect 0.02 N, and where ramp and amplifier saturate."""
     floor, ramp = Registers().noise_floor, Registers().ramp
     summary: Summary = {"floor": floor, "ramp": ramp, "lines": []}
     for v_trans in p["v_trans"]:
@@ -141,8 +145,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 4.6: V_in over load, semi-log; 90 % of taxels in the band."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6.5, 4.2), layout="constrained")
     ax = figure.subplots()
     for line, colour in zip(summary["lines"], ("C0", "C3", "C2", "C1"), strict=False):
@@ -154,22 +156,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     ax.set(xlabel="load on one taxel, N", ylabel="V_in, V")
     ax.legend(fontsize="small", loc="upper left")
     return figure
-
-
-STUDY = Study(
-    name="fig4.6",
-    title="a taxel's voltage against its load at two line voltages: sensitivity against range",
-    where="thesis 4.4.1, figure 4.6",
-    protocol=(
-        "One taxel of 64 x 64 loaded, all others at rest, R_f 47 kOhm, through the exact network (switches of 2.5 ohm, "
-        "amplifiers of gain 1e5) and an RC ramp of 150 ticks. The fabric: G0 + k F^0.7, with 1.64 uS at 0.02 N; taxels "
-        "differ by 20 % in k (all guesses). The first is the law itself."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"realisations": 4, "size": 8, "at": [3, 4], "loads": 24}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -1,20 +1,23 @@
-"""Figure 4.7: how soon the transducer answers, and how soon the input settles while four channels are multiplexed."""
+"""Figure 4.7: how soon the transducer responds, and how soon the input settles while four channels are multiplexed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.4.1, figure 4.7"
+PROTOCOL = (
+    "(a) 0.5 N within 5 us on one taxel whose fabric answers 50 us late. (b) One comparator reads four lines, "
+    "loaded by 0.02, 0.6, 0.1 and 0.3 N, 0.75 us each, at 3 us a column; settled is within 2 % of the step. Then "
+    "the same with amplifiers of 47 kOhm x 15 pF, and a column at rest behind the loaded one."
+)
 
 PARAMETERS: dict[str, Any] = {
     "delay_us": 50.0,
@@ -25,6 +28,7 @@ PARAMETERS: dict[str, Any] = {
     "every_us": 0.002,
     "settled": 0.02,
 }
+SIZES = {"toy": {"every_us": 0.01}}
 #: When the thesis' input has settled, us.
 SETTLED_US = 0.2
 
@@ -37,7 +41,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Play the impact, or watch a comparator for a column."""
+    """Simulate the impact, or trace a comparator over a column."""
     del seed
     return _impact(params) if "impact_n" in params else _scan(params)
 
@@ -55,28 +59,28 @@ def _scan(params: dict[str, Any]) -> dict[str, Any]:
     """Read four lines of one channel; then two columns of which the first was pressed and the second was not."""
     converter = Converter(amplifier_us=params["amplifier_us"])
     lines = VirtualGround().volts(Fabric().conductance(np.array(params["forces_n"]))[:, None]).ravel()
-    seen = converter.trace(lines.tolist(), every_us=params["every_us"], stop_us=2 * converter.line_us)
-    second = seen.t_us >= converter.line_us
-    took = []
+    trace = converter.trace(lines.tolist(), every_us=params["every_us"], stop_us=2 * converter.line_us)
+    second = trace.t_us >= converter.line_us
+    settling_us = []
     for step in range(converter.steps):
         begins = converter.line_us + step * converter.step_us
-        here = second & (seen.t_us >= begins) & (seen.t_us < begins + converter.step_us)
-        off = np.abs(seen.input_v - seen.line_v)[here]
+        here = second & (trace.t_us >= begins) & (trace.t_us < begins + converter.step_us)
+        off = np.abs(trace.input_v - trace.line_v)[here]
         last = np.flatnonzero(off > params["settled"] * off[0])
-        took.append(float(seen.t_us[here][last[-1]] - begins) if len(last) else 0.0)
+        settling_us.append(float(trace.t_us[here][last[-1]] - begins) if len(last) else 0.0)
     pressed = np.stack([lines, np.full(len(lines), VirtualGround().v_trans)], axis=1)
     plain = Converter().ticks(np.stack([pressed[:, 1:]] * 2))[1].ravel()
     left = converter.ticks(np.stack([pressed] * 2))[1][:, 1]
     return {
-        "trace": {name: getattr(seen, name)[second].round(6).tolist() for name in ("t_us", "input_v", "ramp_v")}
-        | {"high": seen.high[second].astype(int).tolist()},
-        "settles_us": np.round(took, 4).tolist(),
+        "trace": {name: getattr(trace, name)[second].round(6).tolist() for name in ("t_us", "input_v", "ramp_v")}
+        | {"high": trace.high[second].astype(int).tolist()},
+        "settles_us": np.round(settling_us, 4).tolist(),
         "left_ticks": np.round(left - plain, 3).tolist(),
     }
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Keep the impact and the scans by time constant."""
+    """List the impact, and the scans by time constant."""
     (impact,) = [r.result for r in rows if "impact_n" in r.params]
     scans = [{"amplifier_us": tau, **r.result} for tau in p["amplifiers_us"] for r in _of(rows, tau)]
     return {"impact": impact, "scans": scans}
@@ -88,7 +92,7 @@ def _of(rows: Sequence[Row], tau: float) -> list[Row]:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 4.4.1 says."""
-    found = [
+    judged = [
         Statement(
             "The sensor responds at approximately 50 us.",
             "50 us",
@@ -100,7 +104,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     for scan in summary["scans"]:
         worst = max(scan["settles_us"])
         if scan["amplifier_us"] == 0:
-            found.append(
+            judged.append(
                 Statement(
                     "V_in settles within 0.2 us while 4 channels are multiplexed at 3 us a column.",
                     f"{SETTLED_US:g} us",
@@ -110,7 +114,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 )
             )
         else:
-            found.append(
+            judged.append(
                 Statement(
                     f"The same, were the board's 15 pF to lie across R_f ({scan['amplifier_us']:g} us).",
                     "no word of a column's traces in the next",
@@ -121,42 +125,21 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     "what a lab can measure: none if the capacitors lie elsewhere",
                 )
             )
-    return found
+    return judged
 
 
 def draw(_p: Parameters, summary: Summary) -> Figure:
     """Draw 4.7: the impact, and one comparator's input, ramp and output over a column."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=[1, 1.6])
     left.plot(summary["impact"]["t_us"], summary["impact"]["volts"], color="C2")
     left.axvline(0.0, color="k", ls=":", lw=0.9)
     left.set(xlabel="time since the impact, us", ylabel="V_in, V", title="(a)")
-    seen = summary["scans"][0]["trace"]
-    t = np.array(seen["t_us"]) - seen["t_us"][0]
-    right.plot(t, seen["ramp_v"], color="C3", label="V_ramp")
-    right.plot(t, seen["input_v"], color="C2", label="V_in")
-    right.step(t, seen["high"], color="C0", where="post", label="V_comp (high: 1)")
+    trace = summary["scans"][0]["trace"]
+    t = np.array(trace["t_us"]) - trace["t_us"][0]
+    right.plot(t, trace["ramp_v"], color="C3", label="V_ramp")
+    right.plot(t, trace["input_v"], color="C2", label="V_in")
+    right.step(t, trace["high"], color="C0", where="post", label="V_comp (high: 1)")
     right.set(xlabel="time since the column's change, us", ylabel="V", title="(b)")
     right.legend(fontsize="small", loc="upper right")
     return figure
-
-
-STUDY = Study(
-    name="fig4.7",
-    title="the transducer's answer to an impact, and settling while four channels are multiplexed",
-    where="thesis 4.4.1, figure 4.7",
-    protocol=(
-        "(a) 0.5 N within 5 us on one taxel whose fabric answers 50 us late. (b) One comparator reads four lines, "
-        "loaded by 0.02, 0.6, 0.1 and 0.3 N, 0.75 us each, at 3 us a column; settled is within 2 % of the step. Then "
-        "the same with amplifiers of 47 kOhm x 15 pF, and a column at rest behind the loaded one."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"every_us": 0.01}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

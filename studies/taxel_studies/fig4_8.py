@@ -4,21 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.information import confusion_matrix, nested_predictions, panzeri_treves
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.4.2, figures 4.8 and 4.10"
+PROTOCOL = (
+    "A tennis ball (65 mm, 56 g) falls from 40 and 80 cm on the emulated board at 2 kHz, level and tilted by 30 "
+    "degrees, 100 times each, under the 10 mm of foam of 4.3.1; it gives by a spring of 25 N/mm, as a rigid one "
+    "would crush the foam. By guess, heights and places vary by 5 mm (standard deviations). 17 x 17 taxels around "
+    "the first that answered, 40 ms from the impact's first frame on (the first in which three taxels rise: one "
+    "alone may be noise), as ticks above those before it. Slower sampling: what the host holds is looked at every "
+    "so often, from that frame on, as the thesis resampled its films; beside it, from any phase on. Linear "
+    "discriminants of the pictures, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
+    "by Panzeri and Treves."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TENNIS_TABLE,
@@ -27,6 +36,7 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 TOY: dict[str, Any] = {**dropped.TENNIS_TOY, "periods_ms": [2.0, 40.0]}
+SIZES = {"toy": TOY}
 #: Figure 4.8: pictures a ms, so many.
 PICTURE_MS, PICTURES = 1.0, 8
 #: 100 Hz, which 4.4.2 names.
@@ -35,19 +45,16 @@ SLOW_MS = 10.0
 LITTLE, MARKED = 0.5, 0.5
 #: How far from the region's middle the middle of the pressure may lie to be around the first taxel, taxels.
 AROUND = 3.0
-#: Of the first moment, which comes at any phase of a slow sampler.
+#: Seed of the phase at which a slow sampler takes its first picture.
 PHASES = 410
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one realisation a condition."""
-    del courses
-    return dropped.play_tasks(p)
+tasks = dropped.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List one realisation a period: sampled from the impact on, and from any phase on."""
-    del rows, courses
+    del rows
     return [
         Task({**dropped.named(p), "period_ms": period, "aligned": aligned}, p["seed"])
         for period in sorted(p["periods_ms"])
@@ -56,7 +63,7 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Drop the ball so many times; or see what discriminants make of all films at a period."""
+    """Drop the ball as often as asked; or return the bits of discriminants on all drops at a period."""
     drops = dropped.played_summary(params, seed, courses, TENNIS)
     if drops is not None:
         return drops
@@ -72,7 +79,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 def sampled_drops(
     p: Parameters, seed: int, courses: Path, period_ms: float, length_ms: float, *, aligned: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return all drops' films at a period, one a row, and the number of each one's condition."""
+    """Return the pictures of all drops at a period, one drop a row, and the number of each drop's condition."""
     rng = np.random.default_rng([seed, PHASES])
     parts = []
     for condition in dropped.conditions(p):
@@ -84,7 +91,7 @@ def sampled_drops(
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
-    """List the bits by period; keep one drop's pictures."""
+    """List the bits by period, and one drop's pictures."""
     asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
     one = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses, TENNIS).ticks[:1]
     frame_ms = TENNIS.frame_us / 1000
@@ -120,7 +127,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     at, over = float(total[total[:, 1].argmax(), 0]), total[:, 1] < 0.1 * total[:, 1].max()
     ended = next((t for (t, _), low in zip(summary["sum"], over, strict=True) if low and t > at), float("inf"))
     apart = float(np.hypot(*summary["middle"]))
-    found = [
+    judged = [
         Statement(
             "Figure 4.8: pressure grows and decays around the taxel that answered first.",
             "the picture, 8 ms",
@@ -135,7 +142,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     if slow and fast:
         least, best = max(line["bits"] for line in slow), max(line["bits"] for line in fast)
         phased = max(line["any_phase_bits"] for line in slow)
-        found += [
+        judged += [
             Statement(
                 "Figure 4.10: below 100 Hz little is known of the impact.",
                 "insufficient",
@@ -151,7 +158,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"marked: half a bit or more; simulated drops vary as we guess; {size}",
             ),
         ]
-    return found
+    return judged
 
 
 def _from_100_hz(lines: list[dict[str, Any]], best: float) -> str:
@@ -173,8 +180,6 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
 
 
 def _draw_pictures(p: Parameters, summary: Summary) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(9, 5), layout="constrained")
     axes = figure.subplots(2, PICTURES // 2).ravel()
     pictures = np.array(summary["pictures"])[1:].reshape(PICTURES, TENNIS.region, TENNIS.region)
@@ -190,8 +195,6 @@ def _draw_pictures(p: Parameters, summary: Summary) -> Figure:
 
 
 def _draw_bits(summary: Summary) -> Figure:
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6, 4), layout="constrained")
     ax = figure.subplots()
     rates = [1000 / line["period_ms"] for line in summary["lines"]]
@@ -206,29 +209,3 @@ def _draw_bits(summary: Summary) -> Figure:
     ax.set_title("figure 4.10")
     ax.legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="fig4.8",
-    title="a tennis ball dropped on the array: its pictures, and its bits by sampling rate (4.8, 4.10)",
-    where="thesis 4.4.2, figures 4.8 and 4.10",
-    protocol=(
-        "A tennis ball (65 mm, 56 g) falls from 40 and 80 cm on the emulated board at 2 kHz, level and tilted by 30 "
-        "degrees, 100 times each, under the 10 mm of foam of 4.3.1; it gives by a spring of 25 N/mm, as a rigid one "
-        "would crush the foam. By guess, heights and places vary by 5 mm (standard deviations). 17 x 17 taxels around "
-        "the first that answered, 40 ms from the impact's first frame on (the first in which three taxels rise: one "
-        "alone may be noise), as ticks above those before it. Slower sampling: what the host holds is looked at every "
-        "so often, from that frame on, as the thesis resampled its films; beside it, from any phase on. Linear "
-        "discriminants of the pictures, 10 folds, the ridge chosen inside them; bits of the answers (4.1), corrected "
-        "by Panzeri and Treves."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    courses=True,
-)

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel_studies import dropped, fig4_8
 from taxel_studies.dropped import TENNIS
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 4.4.2, figure 4.9"
+PROTOCOL = (
+    "The drops of the study fig4.8, the first 20 ms of each drop, at the rates of the picture's panels by guess. "
+    "t-SNE of scikit-learn on all pictures of a drop, begun at its principal components; beside each map, how many "
+    "of a drop's 10 nearest neighbours in it are of its own class; and the same of drops sampled from any phase on."
+)
+COURSES = True
+NEEDS = ("sklearn",)
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TENNIS_TABLE,
@@ -26,23 +31,21 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 TOY: dict[str, Any] = {**dropped.TENNIS_TOY, "rates_hz": [100.0, 1000.0], "perplexity": 5.0}
+SIZES = {"toy": TOY}
 #: How long the pictures of a drop last, ms.
 LENGTH_MS = 20.0
 #: From here on the classes lie clearly apart, Hz.
 CLEAR_HZ = 500.0
-#: How many nearest neighbours in the map are asked, and what share of one's own class counts as clearly apart.
+#: How many nearest neighbours in the map count, and what share of one's own class counts as clearly apart.
 NEIGHBOURS, CLEAR = 10, 0.95
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one realisation a condition."""
-    del courses
-    return dropped.play_tasks(p)
+tasks = dropped.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List one map a rate."""
-    del rows, courses
+    del rows
     return [
         Task({**dropped.named(p), "rate_hz": rate, "perplexity": p["perplexity"]}, p["seed"])
         for rate in sorted(p["rates_hz"])
@@ -50,20 +53,20 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Drop the ball so many times; or lay all films at a rate out on a plane, and look at each one's neighbours."""
+    """Drop the ball as often as asked; or map all drops at a rate onto a plane, and classify each by its neighbours."""
     drops = dropped.played_summary(params, seed, courses, TENNIS)
     if drops is not None:
         return drops
     from sklearn.manifold import TSNE  # noqa: PLC0415  an extra
 
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for how, aligned in (("", True), ("any_phase_", False)):
         x, y = fig4_8.sampled_drops(params, seed, courses, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
         laid = TSNE(perplexity=params["perplexity"], init="pca", random_state=seed).fit_transform(x)
-        found[f"{how}own"] = round(own_neighbours(np.asarray(laid, np.float64), y), 4)
+        result[f"{how}own"] = round(own_neighbours(np.asarray(laid, np.float64), y), 4)
         if aligned:
-            found["map"] = [[round(float(a), 1), round(float(b), 1)] for a, b in laid]
-    return found
+            result["map"] = [[round(float(a), 1), round(float(b), 1)] for a, b in laid]
+    return result
 
 
 def own_neighbours(places: NDArray[np.float64], y: NDArray[np.int64]) -> float:
@@ -107,8 +110,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw a map a rate."""
     del p
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     lines = summary["lines"]
     columns = min(3, len(lines))
     figure = Figure(figsize=(3 * columns, 3 * -(-len(lines) // columns) + 0.5), layout="constrained")
@@ -127,25 +128,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
     figure.suptitle("figure 4.9: t-SNE of the first 20 ms")
     return figure
-
-
-STUDY = Study(
-    name="fig4.9",
-    title="drops of a tennis ball laid out by t-SNE, by sampling rate",
-    where="thesis 4.4.2, figure 4.9",
-    protocol=(
-        "The drops of the study fig4.8, the first 20 ms of each drop, at the rates of the picture's panels by guess. "
-        "t-SNE of scikit-learn on all pictures of a drop, begun at its principal components; beside each map, how many "
-        "of a drop's 10 nearest neighbours in it are of its own class; and the same of drops sampled from any phase on."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    needs=("sklearn",),
-    courses=True,
-)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.array import Array
@@ -16,12 +17,19 @@ from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13"
+PROTOCOL = (
+    "The drops of the study drops. What the host holds is looked at every so often from the impact's first frame "
+    "on; a change above the board's noise floor since the last one that was sent is an event, rises and falls "
+    "apart. Trains are smoothed in time (5.8) and over taxels (5.11, a train counting twice at its own taxel, as "
+    "printed), and compared by the Euclidean norm over taxels and time that 5.12's left side names; each drop is "
+    "named by most of its 5 nearest others (the thesis gives no number). Bits of these answers, corrected by "
+    "Panzeri and Treves. Tau and sigma are searched at each period on the same drops, as in the thesis. Beside "
+    "it: sampling begun at any phase, and the absolute differences of 5.10 as printed, at the best tau and sigma."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **dropped.TABLE,
@@ -49,6 +57,7 @@ TOY: dict[str, Any] = {
     "times_ms": [5.0, 50.0],
     "absolute_ms": [20.0],
 }
+SIZES = {"coarse": COARSE, "toy": TOY}
 #: The parameters of a drop, in the words of figure 5.12.
 VARIED = {"ball_mm": "ball", "height_mm": "height", "slant_deg": "slant"}
 #: What 5.6.3 found best: period, tau (ms), sigma (mm).
@@ -61,32 +70,28 @@ MARKED_MS = 5.0
 ALIKE = 0.02
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one realisation a condition: all its drops."""
-    del courses
-    return dropped.play_tasks(p)
+tasks = dropped.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List the search, one realisation a period and tau; then details at each period's best."""
-    del courses
     shared = {**dropped.named(p), "neighbours": p["neighbours"]}
-    found: dict[float, dict[tuple[float, float], float]] = {}
+    listed: dict[float, dict[tuple[float, float], float]] = {}
     for row in rows:
         if row.params.get("ask") == "search":
             for sigma, bits in zip(row.params["sigmas_mm"], row.result, strict=True):
-                found.setdefault(row.params["period_ms"], {})[row.params["tau_ms"], sigma] = bits
+                listed.setdefault(row.params["period_ms"], {})[row.params["tau_ms"], sigma] = bits
     periods = sorted(p["periods_ms"])
     first = [
         Task({**shared, "ask": "search", "period_ms": t, "tau_ms": tau, "sigmas_mm": p["sigmas_mm"]}, p["seed"])
         for t in periods
         for tau in p["taus_ms"]
     ]
-    if any(len(found.get(t, {})) < len(p["taus_ms"]) * len(p["sigmas_mm"]) for t in periods):
+    if any(len(listed.get(t, {})) < len(p["taus_ms"]) * len(p["sigmas_mm"]) for t in periods):
         return first
     last = []
     for t in periods:
-        tau, sigma = max(found[t], key=lambda at: found[t][at])
+        tau, sigma = max(listed[t], key=lambda at: listed[t][at])
         at = {**shared, "period_ms": t, "tau_ms": tau, "sigma_mm": sigma}
         last.append(Task({**at, "ask": "detail", "times_ms": p["times_ms"]}, p["seed"]))
         last.append(Task({**at, "ask": "any phase"}, p["seed"]))
@@ -96,7 +101,7 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> Any:
-    """Drop a ball so many times; or compare all drops at a period, and see what their neighbours make of them."""
+    """Drop a ball as often as asked; or compare all drops at a period, and return the bits of neighbours' answers."""
     drops = dropped.played_summary(params, seed, courses)
     if drops is not None:
         return drops
@@ -130,7 +135,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> Any:
 
 
 def _samples_before(time_ms: float, period_ms: float, most: int) -> int:
-    """Return how many samples are there a time after the impact, the first one at it."""
+    """Return the number of samples up to a time after the impact, the first one at the impact."""
     return min(max(1, int(np.ceil(time_ms / period_ms - 1e-9))), most)
 
 
@@ -150,17 +155,17 @@ def _spikes(
 def _bits(
     distances: NDArray[np.float64], y: NDArray[np.int64], params: dict[str, Any], *, by: bool = False
 ) -> dict[str, Any]:
-    """Return the information of what the neighbours say, and of each parameter in it."""
+    """Return the information of the neighbours' answers, and of each parameter in them."""
     answers = dropped.named_by_neighbours(distances, y, params["neighbours"])
-    found: dict[str, Any] = kept_bits.information(y, answers, "bits", "right")
+    bits: dict[str, Any] = kept_bits.information(y, answers, "bits", "right")
     if by:
         all_of_them = dropped.conditions(params)
-        found["by"] = {}
+        bits["by"] = {}
         for name in VARIED:
             values = np.array([f"{getattr(one, name):g}" for one in all_of_them])
             if len(set(values.tolist())) > 1:
-                found["by"][name] = kept_bits.information(values[y], values[answers], "bits", "most")
-    return found
+                bits["by"][name] = kept_bits.information(values[y], values[answers], "bits", "most")
+    return bits
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
@@ -194,7 +199,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     best = max(lines, key=lambda line: line["bits"])
     shorter = [line for line in lines if line["period_ms"] < PRINTED["period_ms"]]
     less = best["bits"] - max((line["bits"] for line in shorter), default=float("nan"))
-    found = [
+    judged = [
         Statement(
             "Figure 5.11: most information at a period of 1 ms, a little less below it.",
             "1 ms; ceiling 4.17 bits",
@@ -208,7 +213,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     long = [line for line in lines if line["period_ms"] > MARKED_MS]
     if MARKED_MS in by and long:
         before, after = best["bits"] - by[MARKED_MS]["bits"], by[MARKED_MS]["bits"] - long[-1]["bits"]
-        found.append(
+        judged.append(
             Statement(
                 "Figure 5.11: a marked loss above 5 ms.",
                 "the picture",
@@ -218,7 +223,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"marked: half a bit or more, and more than up to 5 ms; {size}",
             )
         )
-    found += [
+    judged += [
         Statement(
             "5.6.3: tau .4 ms and sigma 2 mm give most.",
             "0.4 ms, 2 mm",
@@ -239,7 +244,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
     printed = [line for line in lines if line["absolute_bits"] is not None]
     if printed:
-        found.append(
+        judged.append(
             Statement(
                 "5.10 and 5.12 as printed (absolute differences) instead of the Euclidean distance (ours).",
                 "none",
@@ -250,7 +255,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 "at the Euclidean one's best tau and sigma",
             )
         )
-    return found + _by_parameter(best, lines[-1], size) + _by_time(lines, size)
+    return judged + _by_parameter(best, lines[-1], size) + _by_time(lines, size)
 
 
 def _ms(period: float) -> str:
@@ -327,29 +332,3 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
         times_ms=p["times_ms"],
         since="impact",
     )
-
-
-STUDY = Study(
-    name="fig5.11",
-    title="bits of a drop by sampling period, by parameter, and by time since impact (5.11 to 5.13)",
-    where="thesis 5.6.3 and 5.6.4, figures 5.11 to 5.13",
-    protocol=(
-        "The drops of the study drops. What the host holds is looked at every so often from the impact's first frame "
-        "on; a change above the board's noise floor since the last one that was sent is an event, rises and falls "
-        "apart. Trains are smoothed in time (5.8) and over taxels (5.11, a train counting twice at its own taxel, as "
-        "printed), and compared by the Euclidean norm over taxels and time that 5.12's left side names; each drop is "
-        "named by most of its 5 nearest others (the thesis gives no number). Bits of these answers, corrected by "
-        "Panzeri and Treves. Tau and sigma are searched at each period on the same drops, as in the thesis. Beside "
-        "it: sampling begun at any phase, and the absolute differences of 5.10 as printed, at the best tau and sigma."
-    ),
-    parameters=PARAMETERS,
-    sizes={"coarse": COARSE, "toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-    courses=True,
-)

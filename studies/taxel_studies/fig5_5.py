@@ -5,20 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.encode import FA1
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented, kept_bits
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 5.5.1 and 5.5.3, figures 5.5, 5.6 and 5.8"
+PROTOCOL = (
+    "The courses of the study contact, each condition sampled at random phases and places (figure 5.3); FA-1 with "
+    "Table 5.3's constants, theta_0 from the largest pressure of all; linear discriminants on the rasters, ten "
+    "folds; bits of their answers, corrected by Panzeri and Treves. Samples of a condition are shifts of one "
+    "course, so what is measured is interpolation, as in the thesis. Alpha is searched over the thesis' 13 values "
+    "at 2 ms and longer, below that around the best of those. A sample of rest comes before the first. At .2 ms "
+    "(the thesis' own step) only the first 20 ms are sampled, at the alpha of the shortest period."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -41,30 +48,27 @@ TOY: dict[str, Any] = {
     "times_ms": [20.0, 100.0],
     "part_period_ms": 2.5,
 }
+SIZES = {"coarse": {**indented.COARSE, "samples": 100, "alphas": [0.3, 0.5, 0.7, 0.9, 1.1]}, "toy": TOY}
 #: The parameters of a contact, in the words of figure 5.6.
 VARIED = {"diameter_mm": "radius", "modulus_kpa": "hardness", "depth_mm": "depth", "angle_deg": "slant"}
-#: Table 5.3's.
+#: Alpha of Table 5.3.
 PRINTED_ALPHA = 0.7
-#: What 5.5.3 says of 10 ms at .5 ms.
+#: Bits within 10 ms at a period of .5 ms, according to 5.5.3.
 BITS_AT_10_MS = 6.0
-#: What counts as around 100 Hz.
+#: Rates that count as around 100 Hz.
 AROUND_100_HZ = (50.0, 200.0)
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one course a path."""
-    del courses
-    return indented.course_tasks(list(indented.courses_of(p).values()))
+tasks = indented.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List every alpha at the longer periods; then the best of those and its neighbours; then details at the best."""
-    del courses
     shared = indented.shared(p, rows)
-    found: dict[float, dict[float, float]] = {}
+    listed: dict[float, dict[float, float]] = {}
     for row in rows:
         if row.params.get("ask") == "bits" and not row.params["even_ms"]:
-            found.setdefault(row.params["period_ms"], {})[row.params["alpha"]] = row.result["bits"]
+            listed.setdefault(row.params["period_ms"], {})[row.params["alpha"]] = row.result["bits"]
 
     def asked(ask: str, period: float, alpha: float, even: float = 0.0) -> Task:
         more: dict[str, Any] = {"times_ms": p["times_ms"]} if ask == "detail" else {}
@@ -87,23 +91,23 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
     periods = sorted(p["periods_ms"])
     long = [period for period in periods if period >= p["search_from_ms"]]
     first = [asked("bits", period, alpha) for period in long for alpha in p["alphas"]]
-    if any(period not in found for period in long):
+    if any(period not in listed for period in long):
         return first
-    mean = {alpha: np.mean([found[period][alpha] for period in long]) for alpha in p["alphas"]}
+    mean = {alpha: np.mean([listed[period][alpha] for period in long]) for alpha in p["alphas"]}
     best = max(mean, key=lambda alpha: mean[alpha])
     beside = min(np.diff(sorted(p["alphas"])), default=0.0)
     near = {PRINTED_ALPHA, *(alpha for alpha in p["alphas"] if abs(alpha - best) < 1.5 * beside)}
     second = [asked("bits", period, alpha) for period in periods if period not in long for alpha in sorted(near)]
-    if any(period not in found for period in periods):
+    if any(period not in listed for period in periods):
         return first + second
-    chosen = {period: max(found[period], key=lambda alpha: found[period][alpha]) for period in periods}
+    chosen = {period: max(listed[period], key=lambda alpha: listed[period][alpha]) for period in periods}
     last = [asked("detail", period, alpha) for period, alpha in chosen.items()]
     last.append(asked("part", p["part_period_ms"], chosen[periods[0]]))
     return first + second + last + [asked("bits", period, a, p["even_ms"]) for period, a in chosen.items()]
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Press once; or sample all contacts at a period, and see what discriminants make of the spikes."""
+    """Press once; or sample all contacts at a period, and return the bits of the discriminants' answers."""
     course = indented.make(params, courses)
     if course is not None:
         return indented.course_summary(course)
@@ -188,7 +192,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     bits = [line["bits"] for line in lines]
     size = f"{summary['conditions']} conditions, {p['samples']} samples each, mesh {p['mesh_mm']:g} mm"
     short, long = lines[0], lines[-1]
-    found = [
+    judged = [
         Statement(
             "Figure 5.5: mutual information falls as the sampling period grows, with a large gap between .5 and 20 ms.",
             "falls; ceiling 8.23 bits",
@@ -215,8 +219,8 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             "it falls with the period, as one spike raises the threshold by A T theta_0",
         ),
     ]
-    found += _by_parameter(short, long, size) + _by_time(lines, size)
-    return [*found, _finer(short, summary["part"], p["part_until_ms"], size)]
+    judged += _by_parameter(short, long, size) + _by_time(lines, size)
+    return [*judged, _finer(short, summary["part"], p["part_until_ms"], size)]
 
 
 def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
@@ -237,10 +241,10 @@ def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> lis
 
 def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
     by = {line["period_ms"]: dict(map(tuple, line["times"])) for line in lines}
-    found = []
+    judged = []
     if 10.0 in by.get(0.5, {}):
         early = by[0.5][10.0]
-        found.append(
+        judged.append(
             Statement(
                 "Figure 5.8: over 6 bits are there within 10 ms at a period of .5 ms.",
                 "> 6 bits",
@@ -250,7 +254,7 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
             )
         )
         slow = [t for t, bits in by.get(5.0, {}).items() if bits >= early]
-        found.append(
+        judged.append(
             Statement(
                 "Figure 5.8: a period of 5 ms needs 80 ms for as much.",
                 "80 ms (held to be 40 or more)",
@@ -259,11 +263,11 @@ def _by_time(lines: list[dict[str, Any]], size: str) -> list[Statement]:
                 f"for the {early:.2f} bits that .5 ms has at 10 ms; {size}",
             )
         )
-    return found
+    return judged
 
 
 def _finer(short: dict[str, Any], part: dict[str, Any], until_ms: float, size: str) -> Statement:
-    """Set the beginning of a contact at a period below the shortest beside that one, at the same alpha."""
+    """Compare the beginning of a contact, sampled at a shorter period, with the shortest one at the same alpha."""
     theirs = dict(map(tuple, short["times"]))
     beside = [(t, bits, theirs[t]) for t, bits in part["times"] if t in theirs]
     at = f"at {short['period_ms']:g} ms"
@@ -302,28 +306,3 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
         times_ms=p["times_ms"],
         since="contact",
     )
-
-
-STUDY = Study(
-    name="fig5.5",
-    title="bits of an indentation by sampling period, by parameter, and by time since contact (5.5, 5.6, 5.8)",
-    where="thesis 5.5.1 and 5.5.3, figures 5.5, 5.6 and 5.8",
-    protocol=(
-        "The courses of the study contact, each condition sampled at random phases and places (figure 5.3); FA-1 with "
-        "Table 5.3's constants, theta_0 from the largest pressure of all; linear discriminants on the rasters, ten "
-        "folds; bits of their answers, corrected by Panzeri and Treves. Samples of a condition are shifts of one "
-        "course, so what is measured is interpolation, as in the thesis. Alpha is searched over the thesis' 13 values "
-        "at 2 ms and longer, below that around the best of those. A sample of rest comes before the first. At .2 ms "
-        "(the thesis' own step) only the first 20 ms are sampled, at the alpha of the shortest period."
-    ),
-    parameters=PARAMETERS,
-    sizes={"coarse": {**indented.COARSE, "samples": 100, "alphas": [0.3, 0.5, 0.7, 0.9, 1.1]}, "toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-    courses=True,
-)

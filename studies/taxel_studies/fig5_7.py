@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.encode import FA1
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, logarithmic
+from taxel_studies.study import Parameters, Row, Statement, Summary, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 5.5.2, figure 5.7"
+PROTOCOL = (
+    "As fig5.5, with Table 5.3's alpha; a spike's value is the change since the last one in units of theta_0 "
+    "(5.7), towards zero, saturating at 2^bits - 1. When a spike is fired stays that of 5.4."
+)
+COURSES = True
 
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
@@ -28,17 +31,14 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 TOY: dict[str, Any] = {**indented.TOY, "samples": 12, "periods_ms": [10.0, 20.0], "event_bits": [1, 4]}
+SIZES = {"coarse": {**indented.COARSE, "samples": 100}, "toy": TOY}
 
 
-def tasks(p: Parameters, courses: Path) -> list[Task]:
-    """List one course a path."""
-    del courses
-    return indented.course_tasks(list(indented.courses_of(p).values()))
+tasks = indented.tasks
 
 
-def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+def then(p: Parameters, rows: Sequence[Row]) -> list[Task]:
     """List one realisation a period and number of bits; the shortest period first."""
-    del courses
     shared = indented.shared(p, rows)
     return [
         Task(
@@ -51,7 +51,7 @@ def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
-    """Press once; or sample all contacts, and see what discriminants make of spikes with so many bits."""
+    """Press once; or sample all contacts, and return the bits of discriminants on spikes with so many bits."""
     course = indented.make(params, courses)
     if course is not None:
         return indented.course_summary(course)
@@ -77,7 +77,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     """List the bits by period and bits an event."""
     del courses
-    found = {
+    bits = {
         (row.params["period_ms"], row.params["event_bits"]): row.result["bits"]
         for row in rows
         if "event_bits" in row.params
@@ -85,7 +85,7 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Summary:
     periods = sorted(p["periods_ms"])
     return {
         "periods_ms": periods,
-        "lines": [{"event_bits": b, "bits": [found[period, b] for period in periods]} for b in p["event_bits"]],
+        "lines": [{"event_bits": b, "bits": [bits[period, b] for period in periods]} for b in p["event_bits"]],
         "conditions": len(indented.reached(rows[-1].params)),
     }
 
@@ -98,7 +98,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     of_each = f"{p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
     size = f"{summary['conditions']} conditions, {of_each}"
     gain = {period: by[many][period] - by[few][period] for period in (short, long)}
-    found = [
+    judged = [
         Statement(
             "Figure 5.7: more bits an event raise the information, and only at long periods by much.",
             "the picture",
@@ -110,7 +110,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
     if {1, 10} <= set(by) and {2.0, 20.0} <= set(summary["periods_ms"]):
         slow, quick = by[10][20.0], by[1][2.0]
-        found.append(
+        judged.append(
             Statement(
                 "20 ms with 10 bits does much worse than 2 ms with 1 bit, at the same data rate.",
                 "much lower",
@@ -119,14 +119,12 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"much: by half a bit or more; {size}",
             )
         )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 5.7: a line a number of bits."""
     del p
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6, 4), layout="constrained")
     ax = figure.subplots()
     for line in summary["lines"]:
@@ -139,23 +137,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     ax.set_ylabel("bits")
     ax.legend(title="an event", fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="fig5.7",
-    title="bits of an indentation by sampling period and by bits an event",
-    where="thesis 5.5.2, figure 5.7",
-    protocol=(
-        "As fig5.5, with Table 5.3's alpha; a spike's value is the change since the last one in units of theta_0 "
-        "(5.7), towards zero, saturating at 2^bits - 1. When a spike is fired stays that of 5.4."
-    ),
-    parameters=PARAMETERS,
-    sizes={"coarse": {**indented.COARSE, "samples": 100}, "toy": TOY},
-    tasks=tasks,
-    then=then,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    courses=True,
-)

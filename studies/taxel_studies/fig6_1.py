@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.learn import ConeX
@@ -13,13 +13,13 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE, thresholds
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Statement, Summary, one_task, only_result
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.3.1, figure 6.1"
+PROTOCOL = (
+    "60 Poisson inputs of 5 to 25 Hz, two targets; Table 6.1, weights by CONE-X (l1, continuous time). Drawn are "
+    "the exact neuron and the postsynaptic potentials of its twelve largest weights."
+)
 
 PARAMETERS: dict[str, Any] = {
     "inputs": 60,
@@ -30,15 +30,14 @@ PARAMETERS: dict[str, Any] = {
     "step_ms": 0.1,
     "seed": 3,
 }
+SIZES = {"toy": {"step_ms": 0.5}}
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List the one neuron."""
-    return [Task({k: v for k, v in p.items() if k != "seed"}, p["seed"])]
+tasks = one_task
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Train one neuron and follow it."""
+    """Train one neuron, and return its potential and spikes."""
     trains = mapping.poisson(seed, params["inputs"], params["stop"], *params["rates_hz"])
     neuron = Neuron(**TABLE, after_spike=params["after_spike"])
     cone = ConeX(neuron=neuron, **LEARN, lambdas=(1.0, 0.0, 0.0), kappa=1.0)
@@ -72,11 +71,7 @@ def _sum_of_kernels(
     return total
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Keep the one neuron's story."""
-    del p
-    summary: Summary = rows[0].result
-    return summary
+summarise = only_result
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
@@ -118,8 +113,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.1: input trains, output train, and the dynamics in the lower right panel."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(12, 6), layout="constrained")
     axes = figure.subplot_mosaic(
         [["inputs", "output"], ["inputs", "dynamics"]], height_ratios=[1, 5], width_ratios=[2, 3]
@@ -158,21 +151,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
 
 def _by_sign(weights: NDArray[np.float64]) -> list[str]:
     return ["0.7" if abs(w) < 1e-6 else "C3" if w > 0 else "C0" for w in weights]
-
-
-STUDY = Study(
-    name="fig6.1",
-    title="input spikes, potential, threshold and refractory time, and the output spikes they make",
-    where="thesis 6.3.1, figure 6.1",
-    protocol=(
-        "60 Poisson inputs of 5 to 25 Hz, two targets; Table 6.1, weights by CONE-X (l1, continuous time). Drawn are "
-        "the exact neuron and the postsynaptic potentials of its twelve largest weights."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"step_ms": 0.5}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel_studies import waves
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Statement, Study, Summary
-from taxel_studies.waves import NOISES, READINGS, TRAINED_AT, realise
+from taxel_studies.study import Parameters, Statement, Summary
+from taxel_studies.waves import NOISES, READINGS, TRAINED_AT
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.4.7, figure 6.10"
+PROTOCOL = waves.PROTOCOL + " CONE-R in both trainings, kappa 1.08, lambda 3 to 5 at 100, lambda 1 : lambda 2 varied."
 
 PARAMETERS: dict[str, Any] = {
     **waves.TESTED,
@@ -26,6 +25,7 @@ TOY: dict[str, Any] = {
     **waves.TESTED_TOY,
     "ratios": [[0.0, 4.0], [4.0, 0.0]],
 }
+SIZES = {"toy": TOY}
 
 #: Units of the levels.
 UNITS = {"jitter": "ms", "background": "Hz", "shunting": "%"}
@@ -39,9 +39,13 @@ def tasks(p: Parameters) -> list[Task]:
     return waves.tasks(p, settings, settings, "cone_r")
 
 
+realise = waves.realise
+summarise = waves.summarise
+
+
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
-    found = []
+    judged = []
     for reading in p["readings"]:
         curves = summary["curves"][reading]
         why = waves.why(reading)
@@ -52,13 +56,13 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             ("shunting", "against weak shunting sparse is worse", True, WEAK),
             ("shunting", "against strong shunting sparse is better", False, STRONG),
         )
-        found += [
+        judged += [
             _compared(f"Noise-free training: {says}.", clean[noise], UNITS[noise], dense_is_better, levels, why)
             for noise, says, dense_is_better, levels in claims
             if noise in clean
         ]
         spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
-        found.append(
+        judged.append(
             Statement(
                 "Trained with noise, sparsity matters less.",
                 "results of sparsity were less evident",
@@ -68,7 +72,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             )
         )
-    return found
+    return judged
 
 
 def _compared(
@@ -109,8 +113,6 @@ def _spread(curves: dict[str, Any]) -> float:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.10 once a reading: left noise-free, right noisy training; rows jitter, background, shunting."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(7.5 * len(p["readings"]), 8.5), layout="constrained")
     parts = figure.subfigures(1, len(p["readings"]), squeeze=False)[0]
     for part, reading in zip(parts, p["readings"], strict=True):
@@ -129,19 +131,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         axes[0, 1].set_title("trained with noise")
         axes[min(1, len(axes) - 1), 0].legend(title="lambda 1 : lambda 2", fontsize="small", loc="upper left")
     return figure
-
-
-STUDY = Study(
-    name="fig6.10",
-    title="dense against sparse weights under jitter, background and shunting",
-    where="thesis 6.4.7, figure 6.10",
-    protocol=waves.PROTOCOL
-    + " CONE-R in both trainings, kappa 1.08, lambda 3 to 5 at 100, lambda 1 : lambda 2 varied.",
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=waves.summarise,
-    statements=statements,
-    draw=draw,
-)

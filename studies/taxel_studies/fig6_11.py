@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel_studies import waves
+from taxel_studies.mapping import LEARN
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
-from taxel_studies.waves import READINGS, realise
+from taxel_studies.study import Parameters, Row, Statement, Summary
+from taxel_studies.waves import READINGS
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.4.7, figure 6.11"
+PROTOCOL = (
+    waves.PROTOCOL + " Here only the weights: CONE-R, kappa 1.04, lambda (2, 2, 100, 100, 100), mean of the trials."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 100,
@@ -28,6 +30,7 @@ PARAMETERS: dict[str, Any] = {
     "repetitions": waves.REPETITIONS,
 }
 TOY: dict[str, Any] = {"realisations": 3, "repetitions": 5}
+SIZES = {"toy": TOY}
 #: A mode stands out from its valley by this share of the tallest mode.
 STANDS_OUT = 0.05
 #: Bins with a smaller share are not drawn.
@@ -54,9 +57,12 @@ def tasks(p: Parameters) -> list[Task]:
     ]
 
 
+realise = waves.realise
+
+
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Average the histograms over trials, as shares of the weights."""
-    bound = waves.LEARN["ub"]
+    bound = LEARN["ub"]
     half = round(bound / p["bin_mv"])
     # A bin is centred at 0, where l1 leaves many weights.
     edges = (np.arange(-half, half + 2) - 0.5) * p["bin_mv"]
@@ -78,27 +84,27 @@ def modes(shares: NDArray[np.float64]) -> list[int]:
     """Return the bins of the modes that stand out, in a histogram smoothed over three bins."""
     smooth = np.convolve(np.pad(shares, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
     least = STANDS_OUT * smooth.max()
-    found: list[int] = []
+    places: list[int] = []
     best, rising, valley = 0, True, smooth[0]
     for k, value in enumerate(smooth):
         if rising:
             if value > smooth[best]:
                 best = k
             elif value < smooth[best] - least:
-                found.append(best)
+                places.append(best)
                 rising, valley = False, value
         elif value < valley:
             valley = value
         elif value > valley + least:
             rising, best = True, k
     if rising:
-        found.append(best)
-    return found
+        places.append(best)
+    return places
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
-    found = []
+    judged = []
     centres = np.array(summary["centres"])
     for reading in p["readings"]:
         why = READINGS[reading]
@@ -115,14 +121,12 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 behind = shares[centres > 0.5 * p["bin_mv"]]
                 back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
                 ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
-            found.append(Statement(says, published, ours, holds, why))
-    return found
+            judged.append(Statement(says, published, ours, holds, why))
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.11: a row a training, a column a reading."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(5 * len(p["readings"]), 8), layout="constrained")
     axes = figure.subplots(len(p["trainings"]), len(p["readings"]), sharex=True, squeeze=False)
     for column, reading in enumerate(p["readings"]):
@@ -139,19 +143,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     drawn = np.array(summary["centres"])[held > DRAWN_FROM]
     axes[0, 0].set_xlim(drawn[0] - 2 * p["bin_mv"], drawn[-1] + 2 * p["bin_mv"])
     return figure
-
-
-STUDY = Study(
-    name="fig6.11",
-    title="how the weights are distributed, trained without noise and with it",
-    where="thesis 6.4.7, figure 6.11",
-    protocol=waves.PROTOCOL
-    + " Here only the weights: CONE-R, kappa 1.04, lambda (2, 2, 100, 100, 100), mean of the trials.",
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

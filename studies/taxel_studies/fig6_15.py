@@ -6,23 +6,28 @@ import hashlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from taxel_studies.gait import protocols, sources
+from taxel_studies.gait import fits, protocols, sources
+from taxel_studies.gait.judgement import STANDS_FOR
 from taxel_studies.gait.outcomes import EVENTS
-from taxel_studies.gait.realise import realise
 from taxel_studies.gait.recipes import NOTES, PRINTED
 from taxel_studies.gait.sources import SOURCES, fingerprint
-from taxel_studies.gait.statements import STANDS_FOR
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.5.4, figure 6.15"
+PROTOCOL = (
+    "The folds of the gait study. SKIM: alpha kernel with the neuron's tau, least squares on a pulse of 10 ms "
+    "from each target on (ours: the thesis says binary), one spike where the output comes up to the threshold; "
+    "thresholds .1 to .9, the best on the tested recordings is shown, which flatters SKIM as it did in 6.5.4. "
+    "CONE-R: the same inputs, targets, tau and training parts. Window ±50 ms, one to one; every further spike is "
+    "false."
+)
+DATA = tuple(SOURCES[name].folder for name in STANDS_FOR)
 
 PARAMETERS: dict[str, Any] = {
     "sources": list(STANDS_FOR),
@@ -33,6 +38,7 @@ PARAMETERS: dict[str, Any] = {
     "folds": 0,
 }
 TOY: dict[str, Any] = {"sources": ["gaitndd", "gaitpdb"], "recipes": ["printed"], "scopes": 1, "folds": 1}
+SIZES = {"toy": TOY}
 RECIPES = {"printed": ("Table 6.2 as printed", PRINTED), "notes": ("our recipe", NOTES)}
 LEARNERS = {"neuron": "CONE", "skim": "SKIM"}
 #: The lowest of SKIM's thresholds in 6.5.4.
@@ -71,6 +77,9 @@ def unread(p: Parameters, data: Path) -> dict[str, str]:
     return sources.unread(data, p["sources"])
 
 
+realise = fits.realise
+
+
 def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
     """Add up the folds; of SKIM's thresholds the one with the fewest missed and false over all of them, as 6.5.4."""
     del p, data
@@ -87,10 +96,10 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
             if kind == "skim":
                 added = {t: _added([r.result["by_threshold"][t] for r in here]) for t in here[0].result["by_threshold"]}
                 threshold = min(added, key=lambda t: (added[t]["missed"] + added[t]["false"], float(t)))
-                found = added[threshold] | {"threshold": float(threshold)}
+                best = added[threshold] | {"threshold": float(threshold)}
             else:
-                found = _added([r.result["tested"] for r in here])
-            summary["rows"].append({"source": source, "recipe": recipe, "event": event, "learner": kind, **found})
+                best = _added([r.result["tested"] for r in here])
+            summary["rows"].append({"source": source, "recipe": recipe, "event": event, "learner": kind, **best})
     return summary
 
 
@@ -111,7 +120,7 @@ def _added(tested: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.5.4 says, in each recipe and source."""
-    found = []
+    judged = []
     for recipe in p["recipes"]:
         about = RECIPES[recipe][0]
         for source, event in dict.fromkeys((r["source"], r["event"]) for r in summary["rows"] if r["recipe"] == recipe):
@@ -127,7 +136,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             why = f"{source}, {STANDS_FOR[source][0]}; {about} for both"
             refires = "; printed, CONE's neuron keeps its potential after a spike (6.7), and fires again and again"
             low = "; targets are rare beside silence (6.6 names it), so the output hardly comes to the lowest threshold"
-            found += [
+            judged += [
                 Statement(
                     f"SKIM produces significantly higher errors ({EVENTS[event]}).",
                     "SKIM clearly worse",
@@ -154,13 +163,11 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                     why,
                 ),
             ]
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.15: top what was found, below it what was false, bottom the error; a column a recipe."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6.5 * len(p["recipes"]), 7.5), layout="constrained")
     axes = figure.subplots(3, len(p["recipes"]), sharex="col", squeeze=False)
     for column, recipe in enumerate(p["recipes"]):
@@ -183,26 +190,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         ax.set_ylabel(text)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="outside upper center", ncols=2)
     return figure
-
-
-STUDY = Study(
-    name="fig6.15",
-    title="SKIM against CONE on the gait recordings, in the same folds",
-    where="thesis 6.5.4, figure 6.15",
-    protocol=(
-        "The folds of the gait study. SKIM: alpha kernel with the neuron's tau, least squares on a pulse of 10 ms "
-        "from each target on (ours: the thesis says binary), one spike where the output comes up to the threshold; "
-        "thresholds .1 to .9, the best on the tested recordings is shown, which flatters SKIM as it did in 6.5.4. "
-        "CONE-R: the same inputs, targets, tau and training parts. Window ±50 ms, one to one; every further spike is "
-        "false."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    data=tuple(SOURCES[name].folder for name in STANDS_FOR),
-    unread=unread,
-)

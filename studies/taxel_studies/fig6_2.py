@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.3.2, figure 6.2"
+PROTOCOL = (
+    "100 inputs with one spike each, uniform on 0 to 100 ms, target at 100 ms; Table 6.1, CONE-X in continuous "
+    "time, lambda (0, 2, 100), B over the number of targets. The first pattern is drawn; slopes and rises are "
+    "means."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 20,
@@ -29,6 +32,7 @@ PARAMETERS: dict[str, Any] = {
     "drawn": [85.0, 112.0],
     "step_ms": 0.05,
 }
+SIZES = {"toy": {"realisations": 2}}
 #: Delta t of Table 6.1, ms.
 DELTA_T: float = LEARN["delta_t_ms"]
 
@@ -53,6 +57,9 @@ def tasks(p: Parameters) -> list[Task]:
         for kappa in p["kappas"]
         for seed in range(p["realisations"])
     ]
+
+
+realise = mapping.realise
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
@@ -110,8 +117,6 @@ def _by_kappa(p: Parameters, values: Sequence[float], form: str) -> str:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.2: the potential around the target, without and with kappa."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
     ax = figure.subplots()
     theta, target = TABLE["theta_0"], p["target"]
@@ -128,22 +133,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     ax.set(xlabel="time, ms", ylabel="potential without spiking, mV", xlim=p["drawn"])
     ax.legend(loc="lower right", fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="fig6.2",
-    title="kappa lifts the potential behind the target, steepens the crossing and keeps the spike's time",
-    where="thesis 6.3.2, figure 6.2",
-    protocol=(
-        "100 inputs with one spike each, uniform on 0 to 100 ms, target at 100 ms; Table 6.1, CONE-X in continuous "
-        "time, lambda (0, 2, 100), B over the number of targets. The first pattern is drawn; slopes and rises are "
-        "means."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"realisations": 2}},
-    tasks=tasks,
-    realise=mapping.realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.learn import ConeR, ConeX
@@ -13,12 +14,15 @@ from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.3.4, figure 6.3"
+PROTOCOL = (
+    "Two synapses with one spike each, at 5 and 12 ms, one target at 20 ms; Table 6.1 but bounds of ±1 mV (with "
+    "±0.3 mV two inputs cannot reach the threshold: 2 x 0.3 x 0.368 = 0.22 mV), rows on a grid of 1 ms. The "
+    "surfaces are stated with NumPy from 6.5, 6.8, 6.11 and 6.14, apart from the learners; dots are the learners' "
+    "optima."
+)
 
 PARAMETERS: dict[str, Any] = {
     "inputs_at": [5.0, 12.0],
@@ -29,6 +33,7 @@ PARAMETERS: dict[str, Any] = {
     "lambdas_r": [2.0, 2.0, 100.0, 100.0, 100.0],
     "points": 101,
 }
+SIZES = {"toy": {"points": 41}}
 #: Delta t of Table 6.1, ms.
 DELTA_T: float = LEARN["delta_t_ms"]
 
@@ -111,12 +116,12 @@ class _Rows:
         return total
 
     def silent(self, weights: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Mark the weights that keep every silent row."""
+        """Mark the weights that satisfy every row at which the neuron must not fire."""
         kept: NDArray[np.bool_] = np.all(weights @ self.quiet.T <= self.limit + 1e-12, axis=-1)
         return kept
 
     def line(self, axis: NDArray[np.float64], hard: bool) -> dict[str, Any]:
-        """Follow the equality of the target through the box."""
+        """Return the line within the bounds on which the target is met, and the objective along it."""
         fine = np.linspace(axis[0], axis[-1], 4001)
         other = (self.theta - fine * self.target[1]) / self.target[0]
         inside = np.abs(other) <= self.params["bound"]
@@ -132,7 +137,7 @@ class _Rows:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Keep both surfaces."""
+    """Return both surfaces."""
     del p
     return {row.params["learner"]: row.result for row in rows}
 
@@ -198,56 +203,34 @@ def _bend(surface: NDArray[np.float64]) -> float:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.3: left CONE-X with its line, right CONE-R; below them the same from above."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(12, 10.5), layout="constrained")
     for number, (learner, title) in enumerate((("cone_x", "CONE-X"), ("cone_r", "CONE-R")), 1):
-        found = summary[learner]
-        axis, surface = np.array(found["axis"]), np.array(found["objective"])
+        result = summary[learner]
+        axis, surface = np.array(result["axis"]), np.array(result["objective"])
         first, second = np.meshgrid(axis, axis, indexing="ij")
-        line, height = np.array(found["line"]["weights"]), np.array(found["line"]["objective"])
-        kept = np.array(found["line"]["kept"])
+        line, height = np.array(result["line"]["weights"]), np.array(result["line"]["objective"])
+        kept = np.array(result["line"]["kept"])
         ax = figure.add_subplot(2, 2, number, projection="3d", computed_zorder=False)
         ax.plot_surface(first, second, surface, cmap="viridis", alpha=0.75, rcount=80, ccount=80, lw=0, rasterized=True)
         ax.plot(*line.T, height, color="0.2", lw=1.0, ls="--", label="target met")
         ax.plot(*line[kept].T, height[kept], color="C3", lw=2.5, label="target met, silence kept")
-        ax.scatter(*found["weights"], found["optimum"], color="k", s=40, label="optimum", depthshade=False)
+        ax.scatter(*result["weights"], result["optimum"], color="k", s=40, label="optimum", depthshade=False)
         ends = [-p["bound"], 0.0, p["bound"]]
         ax.set(xlabel="w1, mV", ylabel="w2, mV", zlabel="objective", title=title, xticks=ends, yticks=ends)
         ax.view_init(30, -60)
         above = figure.add_subplot(2, 2, number + 2, aspect="equal")
-        # Equal steps of rank, not of height: the floor is flat and the walls are steep.
+        # Levels have equal steps of rank, not of height: the surface is flat at its optimum and steep at the bounds.
         heights = np.unique(np.quantile(surface, np.linspace(0, 1, 25)))
         drawn = above.contourf(first, second, surface, heights, cmap="viridis")
-        drawn.set(edgecolor="face", linewidth=0.4)  # else the page shows between two bands
-        broken = np.where(found["silent"], np.nan, 1.0)
+        drawn.set(edgecolor="face", linewidth=0.4)  # closes the gaps that the page shows between two bands
+        broken = np.where(result["silent"], np.nan, 1.0)
         above.contourf(first, second, broken, [0.5, 1.5], colors="none", hatches=["////"])
         above.plot(*line.T, color="0.2", lw=1.0, ls="--")
         above.plot(*line[kept].T, color="C3", lw=2.5)
-        above.plot(*found["weights"], "ko", ms=6)
+        above.plot(*result["weights"], "ko", ms=6)
         above.set(xlabel="w1, mV", ylabel="w2, mV", xlim=(-p["bound"], p["bound"]), ylim=(-p["bound"], p["bound"]))
         above.set_title("from above; hatched: silence broken", fontsize="small")
         figure.colorbar(drawn, ax=above, shrink=0.8, label="objective", format="%.3f")
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, fontsize="small", loc="outside upper center", ncols=3)
     return figure
-
-
-STUDY = Study(
-    name="fig6.3",
-    title="the objectives of CONE-X and CONE-R over two weights",
-    where="thesis 6.3.4, figure 6.3",
-    protocol=(
-        "Two synapses with one spike each, at 5 and 12 ms, one target at 20 ms; Table 6.1 but bounds of ±1 mV (with "
-        "±0.3 mV two inputs cannot reach the threshold: 2 x 0.3 x 0.368 = 0.22 mV), rows on a grid of 1 ms. The "
-        "surfaces are stated with NumPy from 6.5, 6.8, 6.11 and 6.14, apart from the learners; dots are the learners' "
-        "optima."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"points": 41}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel_studies import mapping
-from taxel_studies.mapping import LEARN, TABLE, realise
+from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 from taxel_studies.waves import READINGS
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.4.1, figure 6.4"
+PROTOCOL = (
+    "100 inputs with one spike each, uniform on 0 to 100 ms, one target at 100 ms; Table 6.1, CONE-X in continuous "
+    "time, lambda (0, 2, 100), kappa varied, in both readings of B. The first pattern is drawn; the statements are "
+    "judged over all of them."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 20,
@@ -31,6 +34,7 @@ PARAMETERS: dict[str, Any] = {
     "drawn_to": 130.0,
 }
 TOY: dict[str, Any] = {"realisations": 2, "kappas": [1.0, 1.2]}
+SIZES = {"toy": TOY}
 #: Delta t of Table 6.1, at which B asks for kappa thetas, ms.
 DELTA_T: float = LEARN["delta_t_ms"]
 
@@ -64,6 +68,9 @@ def tasks(p: Parameters) -> list[Task]:
         for kappa in p["kappas"]
         for seed in range(p["realisations"])
     ]
+
+
+realise = mapping.realise
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
@@ -101,12 +108,12 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.1 says."""
-    found = []
+    judged = []
     for reading, all_ in summary["readings"].items():
         behind = [c["behind"] for c in all_]
         weights = [c["near_weight"] for c in all_]
         why = READINGS[reading]
-        found += [
+        judged += [
             Statement(
                 "The potential crosses the threshold at 100 ms for every kappa: all sets of solutions are feasible.",
                 "100 ms",
@@ -128,7 +135,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             ),
         ]
-    return found
+    return judged
 
 
 def _by_kappa(p: Parameters, values: Sequence[float | None], form: str) -> str:
@@ -139,8 +146,6 @@ def _by_kappa(p: Parameters, values: Sequence[float | None], form: str) -> str:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.4 once a reading: left potential without spiking, right weights by spike time."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 3.6 * len(p["readings"])), layout="constrained")
     axes = figure.subplots(len(p["readings"]), 2, squeeze=False)
     weighed = f"lambda ({', '.join(f'{v:g}' for v in p['lambdas'])})"
@@ -155,22 +160,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         left.legend(title="kappa", fontsize="small")
         right.set(xlabel="spike time of the synapse, ms", ylabel="weight, mV", title=weighed)
     return figure
-
-
-STUDY = Study(
-    name="fig6.4",
-    title="a larger kappa lifts the potential behind the target and leaves the spike where it is",
-    where="thesis 6.4.1, figure 6.4",
-    protocol=(
-        "100 inputs with one spike each, uniform on 0 to 100 ms, one target at 100 ms; Table 6.1, CONE-X in continuous "
-        "time, lambda (0, 2, 100), kappa varied, in both readings of B. The first pattern is drawn; the statements are "
-        "judged over all of them."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

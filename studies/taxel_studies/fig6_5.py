@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel_studies import mapping
-from taxel_studies.mapping import TABLE, realise
+from taxel_studies.mapping import TABLE
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.4.2, figure 6.5"
+PROTOCOL = (
+    "As figure 6.4, with kappa 1 and lambda 1 : lambda 2 varied (lambda 3 = 0). The first pattern is drawn; the "
+    "statements are judged over all of them."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 20,
@@ -29,6 +31,7 @@ PARAMETERS: dict[str, Any] = {
     "drawn_to": 130.0,
 }
 TOY: dict[str, Any] = {"realisations": 2, "ratios": [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]}
+SIZES = {"toy": TOY}
 #: A weight below this counts as zero, mV.
 ZERO = 1e-6
 
@@ -55,6 +58,9 @@ def tasks(p: Parameters) -> list[Task]:
         for ratio in p["ratios"]
         for seed in range(p["realisations"])
     ]
+
+
+realise = mapping.realise
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
@@ -120,8 +126,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.5: left potential without spiking, right weights by spike time."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
     for c in summary["ratios"]:
@@ -137,21 +141,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     right.set(xlabel="spike time of the synapse, ms", ylabel="weight, mV")
     right.legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="fig6.5",
-    title="the l1 norm uses few synapses, l2 all of them; the spike stays where it is",
-    where="thesis 6.4.2, figure 6.5",
-    protocol=(
-        "As figure 6.4, with kappa 1 and lambda 1 : lambda 2 varied (lambda 3 = 0). The first pattern is drawn; the "
-        "statements are judged over all of them."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

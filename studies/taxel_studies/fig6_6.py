@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel_studies import mapping
-from taxel_studies.mapping import TABLE, realise, thresholds
+from taxel_studies.mapping import TABLE, thresholds
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.4.3, figure 6.6"
+PROTOCOL = (
+    "500 Poisson trains of 200 ms, each with a rate of its own, uniform on 5 to 25 Hz; targets at 30, 40, 50, 120 "
+    "and 150 ms; Table 6.1, CONE-X in continuous time with l2 alone and l1 alone; drawn is the mean potential over "
+    "the realisations, 0 in refractory times. In both readings of what remains after a spike: “keep” as 6.7 prints "
+    "it, and “reset”."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 100,
@@ -29,6 +33,7 @@ PARAMETERS: dict[str, Any] = {
     "time": "continuous",
 }
 TOY: dict[str, Any] = {"realisations": 1}
+SIZES = {"toy": TOY}
 
 
 def tasks(p: Parameters) -> list[Task]:
@@ -66,6 +71,9 @@ def _silent(p: Parameters, times: NDArray[np.float64]) -> NDArray[np.bool_]:
     return free
 
 
+realise = mapping.realise
+
+
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
     """Average the potentials, by reading and norm."""
     times = np.array(rows[0].params["times"])
@@ -95,11 +103,11 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.3 says."""
     del p
-    found = []
+    judged = []
     for reading, norms in summary["readings"].items():
         why = f"after a spike “{reading}”"
         mean = {norm: c["mean_between"] for norm, c in norms.items()}
-        found += [
+        judged += [
             Statement(
                 "For all realisations the weights map the trains to the targets.",
                 "100 of 100, both norms",
@@ -114,13 +122,11 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             ),
         ]
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.6 once a reading: solid l2, dot-dash l1, dashed the threshold."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(10, 3.4 * len(p["readings"])), layout="constrained")
     axes = figure.subplots(len(p["readings"]), 1, sharex=True, squeeze=False)[:, 0]
     times = np.array(summary["times"])
@@ -138,23 +144,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         ax.legend(fontsize="small", loc="lower right")
     axes[-1].set_xlabel("time, ms")
     return figure
-
-
-STUDY = Study(
-    name="fig6.6",
-    title="Poisson trains mapped to five spikes; l1 keeps the potential lower between them",
-    where="thesis 6.4.3, figure 6.6",
-    protocol=(
-        "500 Poisson trains of 200 ms, each with a rate of its own, uniform on 5 to 25 Hz; targets at 30, 40, 50, 120 "
-        "and 150 ms; Table 6.1, CONE-X in continuous time with l2 alone and l1 alone; drawn is the mean potential over "
-        "the realisations, 0 in refractory times. In both readings of what remains after a spike: “keep” as 6.7 prints "
-        "it, and “reset”."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

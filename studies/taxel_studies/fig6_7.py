@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from taxel_studies.capacity import realise
+from taxel_studies import capacity
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["OTHERS", "STUDY"]
+WHERE = "thesis 6.4.4, figure 6.7"
+PROTOCOL = (
+    "Each pattern has one spike an input on a random whole ms from 1 to 200; class c of C shall fire once, at 200 "
+    "c / (C + 1) ms. The largest p, a multiple of C, at which all realisations are feasible: start at 0.2 N, up "
+    "while all are, down if not. Table 6.1, bounds ±0.3 mV, silence from 0 to 200 ms: at whole ms as the thesis "
+    "has it, and at every instant. A realisation draws its patterns one after the other and a load takes the "
+    "first p, so verdicts are monotone in p, and the search needs one solve for most realisations. Dotted: what "
+    "others reported, under other criteria."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 100,
@@ -26,8 +32,7 @@ PARAMETERS: dict[str, Any] = {
     "slope": 1e-3,
 }
 TOY: dict[str, Any] = {"realisations": 3, "inputs": [40, 60, 80], "classes": [3, 5], "readings": ["keep"]}
-#: Published loads, got under other criteria: 6.4.4 names them.
-OTHERS = {"E-learning": 0.22, "PSD": 0.144, "SPAN": 0.075, "ReSuMe": 0.04, "I-learning": 0.02}
+SIZES = {"toy": TOY}
 #: Where 6.4.4 says that the rise ends, and from where on we call it saturated.
 BEND, SATURATED = 150, 500
 
@@ -50,6 +55,9 @@ def tasks(p: Parameters) -> list[Task]:
         for classes in p["classes"]
     ]
     return [Task(params) for params in listed]
+
+
+realise = capacity.realise
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
@@ -75,20 +83,20 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
                         "solves": sum(r["solves"] for r in here.values()),
                     }
                 )
-    return {"lines": lines, "others": OTHERS}
+    return {"lines": lines, "others": capacity.PUBLISHED}
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.4 says, in each reading of what remains after a spike, on the grid and in continuous time."""
-    found = []
+    judged = []
     for reading in p["readings"]:
         for time in p["times"]:
             lines = [line for line in summary["lines"] if (line["after_spike"], line["time"]) == (reading, time)]
-            found += _of(
+            judged += _of(
                 p, lines, f"after a spike “{reading}”, " + ("1 ms grid" if time == "grid" else "every instant")
             )
-    found += _price(p, summary)
-    return found
+    judged += _price(p, summary)
+    return judged
 
 
 def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> list[Statement]:
@@ -100,7 +108,7 @@ def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> list[Statement]
         return [Statement("The load factor rises and saturates.", "at about 0.3", f"{ours} (mean over C)", None, why)]
     saturated, at_bend = load[:, late].mean(axis=1), load[:, bend].mean()
     by_class = [f"{v:.3f} at C = {line['classes']}" for v, line in zip(saturated, lines, strict=True)]
-    best = max(OTHERS.values())
+    best = max(capacity.PUBLISHED.values())
     return [
         Statement(
             f"The load factor increases rapidly until about N = {BEND}, thereafter only little.",
@@ -119,7 +127,7 @@ def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> list[Statement]
         ),
         Statement(
             "It is significantly higher than what others reported.",
-            ", ".join(f"{name} {value:g}" for name, value in OTHERS.items()),
+            ", ".join(f"{name} {value:g}" for name, value in capacity.PUBLISHED.items()),
             f"{load[:, -1].min():.3f} or more at N = {inputs[-1]}",
             bool(load[:, -1].min() > best),
             f"{why}; theirs were got under other criteria",
@@ -128,7 +136,7 @@ def _of(p: Parameters, lines: list[dict[str, Any]], why: str) -> list[Statement]
 
 
 def _price(p: Parameters, summary: Summary) -> list[Statement]:
-    found = []
+    judged = []
     for reading in p["readings"]:
         lines = {
             time: np.array(
@@ -140,7 +148,7 @@ def _price(p: Parameters, summary: Summary) -> list[Statement]:
             grid, exact = lines["grid"].sum(axis=0), lines["continuous"].sum(axis=0)
             large = np.array(p["inputs"]) >= min(BEND, max(p["inputs"]))
             cost = 100 * (1 - exact[large].sum() / max(grid[large].sum(), 1))
-            found.append(
+            judged.append(
                 Statement(
                     "Silence at every instant, not only on the grid, costs little capacity (ours, not the thesis').",
                     "none",
@@ -149,13 +157,11 @@ def _price(p: Parameters, summary: Summary) -> list[Statement]:
                     f"after a spike “{reading}”; margin {p['margin']:g} mV, slope {p['slope']:g} mV/ms",
                 )
             )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.7: load by inputs, a line a number of classes; a panel a time and reading."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     shape = len(p["readings"]), len(p["times"])
     figure = Figure(figsize=(5.5 * shape[1], 3.6 * shape[0]), layout="constrained")
     axes = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False)
@@ -165,7 +171,7 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         where = "1 ms grid" if line["time"] == "grid" else "every instant"
         ax.set_title(f"after a spike “{line['after_spike']}”, {where}")
     for ax in axes.ravel():
-        for name, value in OTHERS.items():
+        for name, value in capacity.PUBLISHED.items():
             ax.axhline(value, color="0.75", lw=0.8, ls=":")
             ax.annotate(name, (0.99, value), xycoords=("axes fraction", "data"), fontsize=7, ha="right", va="bottom")
         ax.set_ylim(0, 0.4)
@@ -175,25 +181,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         ax.set_ylabel("largest load p / N")
     axes[0, 0].legend(fontsize="small")
     return figure
-
-
-STUDY = Study(
-    name="fig6.7",
-    title="how many patterns a neuron can learn exactly, by inputs and classes",
-    where="thesis 6.4.4, figure 6.7",
-    protocol=(
-        "Each pattern has one spike an input on a random whole ms from 1 to 200; class c of C shall fire once, at 200 "
-        "c / (C + 1) ms. The largest p, a multiple of C, at which all realisations are feasible: start at 0.2 N, up "
-        "while all are, down if not. Table 6.1, bounds ±0.3 mV, silence from 0 to 200 ms: at whole ms as the thesis "
-        "has it, and at every instant. A realisation draws its patterns one after the other and a load takes the "
-        "first p, so verdicts are monotone in p, and the search needs one solve for most realisations. Dotted: what "
-        "others reported, under other criteria."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

@@ -1,24 +1,25 @@
-"""Figure 6.8: the three noises on a wave train, and what a trained neuron makes of them (thesis 6.4.5)."""
+"""Figure 6.8: the three noises on a wave train, and the response of a trained neuron (thesis 6.4.5)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.learn import ConeX
 from taxel.metrics import victor_purpura
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel_studies import waves
-from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.mapping import LEARN
+from taxel_studies.study import Parameters, Statement, Summary, one_task, only_result
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.4.5, figure 6.8"
+PROTOCOL = (
+    "The first repetitions and some of the 200 inputs are drawn; the neuron was trained by CONE-X on the clean "
+    "pattern, kappa 1.16. " + waves.PROTOCOL
+)
 
 PARAMETERS: dict[str, Any] = {
     "levels": {"jitter": 3.0, "background": 6.0, "shunting": 15.0},
@@ -29,8 +30,9 @@ PARAMETERS: dict[str, Any] = {
     "drawn_inputs": 40,
     "seed": 1,
 }
+SIZES = {"toy": {"repetitions": 8}}
 
-#: What each noise is, with its level, and what is drawn faint or grey.
+#: The title of each panel: the noise with its level, and the spikes that are drawn faint or grey.
 TITLES = {
     "jitter": "jitter, sd {:g} ms (faint: before it)",
     "background": "background, {:g} Hz an input (grey: added)",
@@ -40,16 +42,14 @@ TITLES = {
 ROBUST = 0.2
 
 
-def tasks(p: Parameters) -> list[Task]:
-    """List the one neuron."""
-    return [Task({k: v for k, v in p.items() if k != "seed"}, p["seed"])]
+tasks = one_task
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     """Train a neuron on the clean pattern and run it under each noise."""
     times = waves.pattern(seed)
     learnt = {name: params[name] for name in ("kappa", "lambdas")}
-    cone = ConeX(neuron=Neuron(**waves.NEURON), **waves.LEARN, **learnt, divide_b_by="targets")
+    cone = ConeX(neuron=Neuron(**waves.NEURON), **LEARN, **learnt, divide_b_by="targets")
     cone.fit([SpikeTrains.from_lists([[t] for t in times], 0.0, waves.DURATION_MS)], [[waves.DURATION_MS]])
     train = waves.waves(times, np.random.default_rng([seed, 3]), params["repetitions"])
     clean = train.trains
@@ -82,20 +82,16 @@ def _drawn(trains: SpikeTrains, params: dict[str, Any], end: float) -> list[list
     return [train[train <= end].round(3).tolist() for train in trains][: params["drawn_inputs"]]
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Keep the one neuron's story."""
-    del p
-    summary: Summary = rows[0].result
-    return summary
+summarise = only_result
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.5 and the caption say."""
     noises = summary["noises"]
-    found = []
+    judged = []
     if "jitter" in noises:
         sd = noises["jitter"]["moved_sd_ms"]
-        found.append(
+        judged.append(
             Statement(
                 "Jitter: each spike is moved by a normal deviate of zero mean.",
                 f"sd {p['levels']['jitter']:g} ms",
@@ -107,7 +103,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     if "background" in noises:
         n = noises["background"]
         rate = (n["count"] - n["of"]) / waves.INPUTS / (n["stop"] / 1000)
-        found.append(
+        judged.append(
             Statement(
                 "Background: Poisson spikes are added.",
                 f"{p['levels']['background']:g} Hz",
@@ -119,7 +115,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     if "shunting" in noises:
         n = noises["shunting"]
         lost = 100 * (1 - n["count"] / n["of"])
-        found.append(
+        judged.append(
             Statement(
                 "Shunting: spikes are deleted at random.",
                 f"{p['levels']['shunting']:g} %",
@@ -129,7 +125,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         )
     listed = ", ".join(f"{n} {v['distance']:.2f}" for n, v in noises.items())
     worst = max(v["distance"] for v in noises.values())
-    found.append(
+    judged.append(
         Statement(
             "A robust solution produces the target train despite noise.",
             "the bottom panel",
@@ -138,13 +134,11 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             f"kappa {p['kappa']:g}, B over the number of targets; robust: below {ROBUST:.0%} of silence",
         )
     )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.8: a panel a noise, and the target with the output spikes of the neuron."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 9), layout="constrained")
     axes = figure.subplots(
         len(summary["noises"]) + 1, 1, sharex=True, height_ratios=[*(3 for _ in summary["noises"]), 1.2]
@@ -173,21 +167,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     axes[-1].set_title("target, and spikes of the trained neuron under each noise")
     axes[-1].invert_yaxis()
     return figure
-
-
-STUDY = Study(
-    name="fig6.8",
-    title="three noises on a wave train, and what a trained neuron makes of them",
-    where="thesis 6.4.5, figure 6.8",
-    protocol=(
-        "The first repetitions and some of the 200 inputs are drawn; the neuron was trained by CONE-X on the clean "
-        "pattern, kappa 1.16. " + waves.PROTOCOL
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": {"repetitions": 8}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

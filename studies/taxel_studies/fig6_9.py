@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel_studies import waves
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Statement, Study, Summary
-from taxel_studies.waves import NOISES, READINGS, realise
+from taxel_studies.study import Parameters, Statement, Summary
+from taxel_studies.waves import NOISES, READINGS
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 6.4.5 and 6.4.6, figure 6.9"
+PROTOCOL = (
+    waves.PROTOCOL
+    + " Noise-free training: CONE-X in continuous time, lambda (2, 2, 200); noisy: CONE-R, (2, 2, 100, 100, 100)."
+)
 
 PARAMETERS: dict[str, Any] = {
     **waves.TESTED,
@@ -27,6 +29,7 @@ TOY: dict[str, Any] = {
     **waves.TESTED_TOY,
     "kappas": [1.0, 1.08],
 }
+SIZES = {"toy": TOY}
 #: A distance a target by which two kappas count as different: one spike lost in twenty.
 SAME = 0.05
 
@@ -39,23 +42,27 @@ def tasks(p: Parameters) -> list[Task]:
     return waves.tasks(p, list(clean), list(noisy), "cone_x")
 
 
+realise = waves.realise
+summarise = waves.summarise
+
+
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.4.5 and 6.4.6 say, in each reading of B."""
-    found = []
+    judged = []
     for reading in p["readings"]:
         curves = summary["curves"][reading]
         why = waves.why(reading)
         for training, source in (("clean", "6.4.5"), ("noisy", "6.4.6")):
             trained = "noise-free training" if training == "clean" else "noisy training"
-            found += [
+            judged += [
                 _larger_is_better(p, curves[training][noise], noise, f"{source}, {trained}", why)
                 for noise in ("jitter", "shunting")
                 if noise in curves[training]
             ]
             if "background" in curves[training]:
-                found += _turn(p, curves[training]["background"], f"{source}, {trained}", why)
-        found.append(_training_helps(p, curves, why))
-    return found
+                judged += _turn(p, curves[training]["background"], f"{source}, {trained}", why)
+        judged.append(_training_helps(p, curves, why))
+    return judged
 
 
 def _larger_is_better(p: Parameters, curve: dict[str, Any], noise: str, where: str, why: str) -> Statement:
@@ -122,8 +129,6 @@ def _by_kappa(kappas: Sequence[float], values: Any, form: str = ".1f") -> str:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw 6.9 once a reading: rows a, b, c (clean, noisy, improvement), columns jitter, background, shunting."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     readings = p["readings"]
     figure = Figure(figsize=(12, 10 * len(readings)), layout="constrained")
     parts = figure.subfigures(len(readings), 1, squeeze=False)[:, 0]
@@ -158,19 +163,3 @@ def _column(axes: Any, curves: dict[str, Any], noise: str, p: Parameters) -> Non
     axes[2].axhline(0, color="0.7", lw=0.8)
     axes[0].set_title(noise)
     axes[2].set_xlabel(f"{noise}, {NOISES[noise]}")
-
-
-STUDY = Study(
-    name="fig6.9",
-    title="kappa against jitter, background and shunting, trained without noise and with it",
-    where="thesis 6.4.5 and 6.4.6, figure 6.9",
-    protocol=waves.PROTOCOL
-    + " Noise-free training: CONE-X in continuous time, lambda (2, 2, 200); noisy: CONE-R, (2, 2, 100, 100, 100).",
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=waves.summarise,
-    statements=statements,
-    draw=draw,
-)

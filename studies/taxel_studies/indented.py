@@ -32,6 +32,7 @@ __all__ = [
     "shared",
     "summed",
     "table_of",
+    "tasks",
     "varying",
 ]
 
@@ -47,7 +48,7 @@ TABLE: dict[str, Any] = {
 }
 #: All of it on elements twice as large and longer steps: minutes instead of an hour, pressure within some 1 %.
 COARSE: dict[str, Any] = {"mesh_mm": 0.2, "step_um": 16.0}
-#: Seconds; coarse.
+#: A small table on coarse elements, which takes seconds.
 TOY: dict[str, Any] = {
     "diameters_mm": [2.0, 4.0],
     "moduli_kpa": [50.0],
@@ -57,7 +58,7 @@ TOY: dict[str, Any] = {
     "base_mesh_mm": 0.4,
     "step_um": 25.0,
 }
-#: How `course_tasks` and `make` know the realisations that are theirs.
+#: The parameter that marks the realisations of `course_tasks`.
 _COURSE = "course"
 
 
@@ -78,15 +79,20 @@ def course_tasks(asked: Sequence[Indentation]) -> list[Task]:
     return [Task({_COURSE: i.to_dict()}) for i in sorted(asked, key=lambda i: -i.diameter_mm)]
 
 
+def tasks(p: Mapping[str, Any]) -> list[Task]:
+    """List one realisation a path of a table of contacts."""
+    return course_tasks(list(courses_of(p).values()))
+
+
 def make(params: Mapping[str, Any], courses: Path) -> Course | None:
-    """Return the course that a realisation is to make, from the folder or anew; None where it is another's."""
+    """Return the course that a realisation is to make, from the folder or anew; None where it makes none."""
     if _COURSE not in params:
         return None
     return KeptCourses(courses).made(Indentation.from_dict(params[_COURSE]))
 
 
 def largest_kpa(asked: Sequence[Indentation], courses: Path, grid: SamplingGrid) -> float:
-    """Return the largest pressure that any taxel of a grid sees on any course: Table 5.3's range."""
+    """Return the largest pressure on any taxel of a grid on any course: Table 5.3's range."""
     kept = KeptCourses(courses)
     return max(grid.most_kpa(kept.made(one)) for one in asked)
 
@@ -102,13 +108,13 @@ def rasters(
     seed: int,
     until_ms: float | None = None,
 ) -> NDArray[np.int8] | NDArray[np.int16]:
-    """Return what the afferents say of each condition's samples, (conditions * samples, steps * taxels), by step.
+    """Return the spikes of the afferents in each condition's samples, (conditions * samples, steps * taxels), by step.
 
     Of the whole contact, or of its beginning until a time.
     """
     kept = KeptCourses(courses)
     steps = grid.steps(encoder.period_ms) if until_ms is None else round(until_ms / encoder.period_ms)
-    found = np.zeros((len(conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
+    raster = np.zeros((len(conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
     t = np.round(np.arange(steps + 1) * encoder.period_ms * 1000).astype(np.int64)
     loaded: dict[tuple[float, float, float], Course] = {}
     for k, c in enumerate(conditions):
@@ -121,12 +127,12 @@ def rasters(
         assert spikes.values is not None  # FA-1's spikes have signs
         train = np.repeat(np.arange(len(spikes)), np.diff(spikes.offsets))
         step = np.round(spikes.times / encoder.period_ms).astype(np.int64) - 1
-        found[k, train // grid.taxels, step, train % grid.taxels] = spikes.values
-    return found.reshape(len(conditions) * samples, -1)
+        raster[k, train // grid.taxels, step, train % grid.taxels] = spikes.values
+    return raster.reshape(len(conditions) * samples, -1)
 
 
 def summed(x: NDArray[Any], conditions: int, samples: int, seed: int) -> FoldSums:
-    """Deal the samples out to ten folds and sum them up by fold and condition."""
+    """Assign the samples to ten folds, and sum them by fold and condition."""
     y = np.repeat(np.arange(conditions), samples)
     return FoldSums(x, y, folds(y, count=10, seed=seed))
 
@@ -146,14 +152,14 @@ def bits_of(
 
 
 def varying(x: NDArray[Any], folds: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which features vary in every training set: before any does there is nothing to tell."""
+    """Return which features vary in every training set: with none there is nothing to classify by."""
     least, most = (np.stack([way(x[folds == k], 0) for k in np.unique(folds)]) for way in (np.min, np.max))
     others = [np.arange(len(least)) != k for k in range(len(least))]
     return np.asarray(np.all([least[o].min(0) < most[o].max(0) for o in others], axis=0))
 
 
 def course_summary(course: Course) -> dict[str, Any]:
-    """Return what the studies of bits must know of a course."""
+    """Return the properties of a course that the studies of bits need."""
     return {
         "reached_mm": float(course.path_mm[-1]),
         "fault": course.fault,
@@ -162,7 +168,7 @@ def course_summary(course: Course) -> dict[str, Any]:
 
 
 def shared(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
-    """Return what realisations on samples have in common: the largest pressure and the conditions left out among it.
+    """Return the parameters that all realisations on samples share: the largest pressure, conditions left out and more.
 
     A condition that its course did not reach is left out, never filled in.
     """

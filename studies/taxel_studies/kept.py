@@ -2,7 +2,7 @@
 
 A figure is kept as its numbers, ``NAME.json``, with the digest of every source that they were computed from
 (``made_of``). It is stale when one of these has changed since. Beside it, ``coarse/NAME.json`` holds what the study
-gives at size toy: where a change leaves that as it was, the figure is confirmed, and takes the digests of today.
+gives at size toy: where a change does not move that, the figure is confirmed, and gets the digests of today.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ __all__ = ["COARSE", "changed", "coarse_result", "confirm", "keep_coarse", "stal
 
 #: The size of the coarse result.
 COARSE = "toy"
-#: What a coarse result is not held against: times differ from run to run.
+#: Times differ from run to run, so they are not compared.
 _TIMES = ("cpu_seconds",)
 
 
 def changed(section: Section) -> list[str]:
-    """Return the sources of a study's section that are others today, by name; none where it still counts."""
+    """Return the sources that have changed since a study's section was made, by name; none where it still counts."""
     if "made_of" not in section:
         return ["its sources were not recorded"]
     before, now = section["made_of"], load(section["name"]).made_of
@@ -53,11 +53,11 @@ def _kept(folder: Path, name: str) -> Section | None:
 
 
 def coarse_result(name: str, data: Path | None = None, *, strict: bool = False) -> dict[str, Any]:
-    """Run a study at its smallest size, and return its parameters and what it found, but for times."""
+    """Run a study at its smallest size, and return its parameters and results without times."""
     with tempfile.TemporaryDirectory() as report:
         section = load(name).run(Path(report), size=COARSE, data=data, strict=strict, quiet=True)
-    found = {"parameters": section["parameters"], "unread": section["unread"], "said": _timeless(section["said"])}
-    plain: dict[str, Any] = json.loads(json.dumps(found))
+    result = {"parameters": section["parameters"], "unread": section["unread"], "said": _timeless(section["said"])}
+    plain: dict[str, Any] = json.loads(json.dumps(result))
     return plain
 
 
@@ -70,7 +70,7 @@ def _timeless(value: Any) -> Any:
 def confirm(name: str, folder: Path, *, data: Path | None = None, strict: bool = False) -> str:
     """Run a study at coarse size, and renew its figure's digests where the coarse result is the kept one.
 
-    Where there is no coarse result yet this one is kept, and the figure's digests are taken for the first time.
+    Where there is no coarse result yet this one is kept, and the figure gets its first digests.
 
     Parameters
     ----------
@@ -116,16 +116,16 @@ def keep_coarse(name: str, folder: Path, *, data: Path | None = None, strict: bo
     _write(folder / "coarse" / f"{name}.json", coarse_result(name, data, strict=strict))
 
 
-def _differences(kept: Any, found: Any, where: str = "") -> Any:
+def _differences(kept: Any, now: Any, where: str = "") -> Any:
     """List where two results differ."""
-    if isinstance(kept, dict) and isinstance(found, dict) and kept.keys() == found.keys():
+    if isinstance(kept, dict) and isinstance(now, dict) and kept.keys() == now.keys():
         for key in kept:
-            yield from _differences(kept[key], found[key], f"{where}.{key}".lstrip("."))
-    elif isinstance(kept, list) and isinstance(found, list) and len(kept) == len(found):
-        for k, (a, b) in enumerate(zip(kept, found, strict=True)):
+            yield from _differences(kept[key], now[key], f"{where}.{key}".lstrip("."))
+    elif isinstance(kept, list) and isinstance(now, list) and len(kept) == len(now):
+        for k, (a, b) in enumerate(zip(kept, now, strict=True)):
             yield from _differences(a, b, f"{where}[{k}]")
-    elif json.dumps(kept) != json.dumps(found):
-        yield f"{where} was {str(kept)[:40]}, is {str(found)[:40]}"
+    elif json.dumps(kept) != json.dumps(now):
+        yield f"{where} was {str(kept)[:40]}, is {str(now)[:40]}"
 
 
 def _write(file: Path, value: Any) -> None:

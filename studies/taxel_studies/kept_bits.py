@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.information import confusion_matrix, panzeri_treves, plug_in
 from taxel_studies.study import Summary, logarithmic
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 __all__ = ["by_period_parameter_and_time", "information", "listed", "lost", "shares"]
 
 
 def information(truth: NDArray[Any], answers: NDArray[Any], *wanted: str) -> dict[str, float]:
-    """Return of answers ``bits`` (corrected), ``plug_in`` (as counted), ``right`` (share), ``most`` (bits)."""
+    """Return of answers: ``bits`` (corrected), ``plug_in`` (as counted), ``right`` (share), ``most`` (bits)."""
     counts, classes = confusion_matrix(truth, answers)
-    found = {
+    values = {
         "bits": panzeri_treves(counts),
         "plug_in": plug_in(counts),
         "right": np.mean(truth == answers),
         "most": np.log2(len(classes)),
     }
-    return {name: round(float(found[name]), 4) for name in wanted}
+    return {name: round(float(values[name]), 4) for name in wanted}
 
 
 def listed(lines: Sequence[Mapping[str, Any]]) -> str:
@@ -56,23 +54,21 @@ def by_period_parameter_and_time(
     times_ms: Sequence[float],
     since: str,
 ) -> list[Figure]:
-    """Draw three figures of what was found, period by period (``summary["lines"]``).
+    """Draw three figures of the results, period by period (``summary["lines"]``).
 
     Parameters
     ----------
-    summary : what a study found; what was sampled in part (``summary["part"]``) is in the third
+    summary : of a study; what was sampled in part (``summary["part"]``) is in the third
     figures : the thesis' numbers of the three
     curves : of the first figure, what each curve of bits is called
     named : of the second, what each parameter is called
     times_ms : of the third, ms
     since : what times count from
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     lines = summary["lines"]
     periods = [line["period_ms"] for line in lines]
     labels = ("bits", "share of the largest possible bits", "bits")
-    found = []
+    drawn_figures = []
     for k, (title, label) in enumerate(zip(figures, labels, strict=True)):
         figure = Figure(figsize=(6, 4), layout="constrained")
         ax = figure.subplots()
@@ -90,8 +86,8 @@ def by_period_parameter_and_time(
         ax.set_xlabel(f"ms since {since}" if k == 2 else "sampling period, ms")
         ax.set_ylabel(label)
         ax.set_title(f"figure {title}")
-        # Curves over time fill the axes; their names stand beside them.
+        # Curves over time fill the axes, so the legend stands beside them.
         beside: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if k == 2 else {}
         ax.legend(fontsize="small", **beside)
-        found.append(figure)
-    return found
+        drawn_figures.append(figure)
+    return drawn_figures

@@ -14,7 +14,7 @@ from taxel.spikes import SpikeTrains
 
 __all__ = ["LEARN", "TABLE", "exactness", "poisson", "realise", "single_spikes", "thresholds", "timing"]
 
-#: Table 6.1; what it does not hold is taxel's default.
+#: Table 6.1; parameters that it does not name have taxel's defaults.
 TABLE: dict[str, Any] = {"tau": 15.0, "theta_0": 0.3, "theta_plus": 0.2, "refractory": 3.0}
 LEARN: dict[str, Any] = {"delta_t_ms": 1.5, "lb": -0.3, "ub": 0.3}
 
@@ -62,7 +62,7 @@ def timing(results: Sequence[dict[str, Any]], targets: Sequence[float]) -> dict[
 
 
 def exactness(parts: Sequence[dict[str, Any]]) -> tuple[str, bool]:
-    """Describe what `timing` found of several parts, and whether every one of them is exact."""
+    """Describe the results of `timing` for several parts, and whether every one of them is exact."""
     exact, of = sum(p["exact"] for p in parts), sum(p["of"] for p in parts)
     errors = [p["worst_error_ms"] for p in parts if p["worst_error_ms"] is not None]
     worst = f"worst error {max(errors):.0e} ms" if errors else "none fires as often as it should"

@@ -1,4 +1,4 @@
-"""The one page of all studies: each figure drawn, what was claimed, what was found, what was not run."""
+"""The page of all studies: each figure, its statements with our results, and the studies that were not run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def write_page(report: Path) -> Path:
 
     Raises
     ------
-    FormatError : a summary in the folder that is none
+    FormatError : a file ``summary.json`` in the folder that is not a study's
     """
     sections = {name: read_section(report / name) for name in STUDIES}
     charts = {name: _charts(name, section) for name, section in sections.items()}
@@ -42,7 +42,7 @@ def write_page(report: Path) -> Path:
 
 
 def _charts(name: str, section: Section | None) -> Markup | None:
-    """Return a study's figures, drawn of its numbers; None where they are of an older code, whose pictures stay."""
+    """Return a study's figures, drawn from its numbers; None where only older code can draw them."""
     if section is None:
         return None
     from taxel.report.charts import chart  # noqa: PLC0415  loads slowly

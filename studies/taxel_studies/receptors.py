@@ -1,4 +1,4 @@
-"""What SA-1, FA-1, SA-2 and FA-2 answer to: a ramp and a hold, and sines of all frequencies (thesis 2.1.5, 3.3, 7.2).
+"""Responses of SA-1, FA-1, SA-2 and FA-2 to ramp and hold, and to sines of all frequencies (thesis 2.1.5, 3.3, 7.2).
 
 Published: the phases of a ramp-and-hold in which each type fires; the frequency at which its threshold of one spike a
 cycle is least, near 5 Hz (SA-1), 34 Hz (FA-1) and 200 to 250 Hz (FA-2).
@@ -8,20 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.encode import FA1, FA2, SA1, SA2, Encoder
 from taxel.frames import Frames
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1"
+PROTOCOL = (
+    "One afferent a type, with its defaults, every 0.2 ms; FA-1's threshold decays by the ms. Half of the "
+    "range is pressed within 5 or 200 ms, held for 1 s and let go: spikes by phase. Sines from contact on, 200 sizes: "
+    "the least that gives a spike in every cycle. Times and thresholds of SA-1 and FA-2 were fitted to these published "
+    "frequencies, so that they agree is no discovery; FA-1 is the thesis', and was fitted to nothing."
+)
 
 PARAMETERS: dict[str, Any] = {
     "kinds": ["SA-1", "FA-1", "SA-2", "FA-2"],
@@ -30,6 +34,7 @@ PARAMETERS: dict[str, Any] = {
     "ramps_ms": [5.0, 200.0],
     "period_ms": 0.2,
 }
+SIZES = {"toy": {"frequencies_hz": [5, 34, 225], "amplitudes": 12}}
 #: Full scale of all of them, kPa, and how high the ramp goes.
 RANGE, HELD = 100.0, 50.0
 #: When the ramp begins, how long the hold lasts, ms.
@@ -97,7 +102,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Keep what each type answered, and where its threshold is least."""
+    """List each type's spikes, and the frequency at which its threshold is least."""
     summary: Summary = {}
     for row in rows:
         known = [(f, a) for f, a in zip(p["frequencies_hz"], row.result["thresholds"], strict=True) if a is not None]
@@ -109,7 +114,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge phases and frequencies."""
-    found = []
+    judged = []
     fast, slow = (f"{ramp:g}" for ramp in (min(p["ramps_ms"]), max(p["ramps_ms"])))
     expected: dict[str, tuple[str, Callable[[list[int], list[int]], bool]]] = {
         "SA-1": ("all through the hold, faster while it begins", lambda q, s: min(q[2], s[2]) > 0 and s[4] == 0),
@@ -120,7 +125,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     for kind, one in summary.items():
         quick, gentle = one["phases"][fast], one["phases"][slow]
         says, holds = expected[kind]
-        found.append(
+        judged.append(
             Statement(
                 f"{kind} fires in {says} of a ramp-and-hold.",
                 "Johansson and Flanagan 2009; thesis 3.3",
@@ -143,7 +148,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         if kind == "FA-1":
             why += "; FA-1 of 5.1 to 5.5 never forgets a change, so that slow ones reach it as fast ones do, and "
             why += "its threshold, raised by each spike, sinks for hundreds of ms"
-        found.append(
+        judged.append(
             Statement(
                 f"The threshold of {kind} is least near {np.sqrt(low * high):.0f} Hz.",
                 f"{low:g} to {high:g} Hz",
@@ -152,7 +157,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
@@ -165,8 +170,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw thresholds over frequency."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6.5, 4), layout="constrained")
     axes = figure.subplots()
     for kind, one in summary.items():
@@ -176,22 +179,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     axes.set(xscale="log", yscale="log", xlabel="frequency, Hz", ylabel="threshold, share of range, peak to peak")
     axes.legend()
     return figure
-
-
-STUDY = Study(
-    name="receptors",
-    title="what SA-1, FA-1, SA-2 and FA-2 answer to: phases of a ramp-and-hold, thresholds against frequency",
-    where="thesis 2.1.5, 3.3 and 7.2, which asks for the types beside FA-1",
-    protocol="One afferent a type, with its defaults, every 0.2 ms; FA-1's threshold decays by the ms. Half of the "
-    "range is pressed within 5 or 200 ms, held for 1 s and let go: spikes by phase. Sines from contact on, 200 sizes: "
-    "the least that gives a spike in every cycle. Times and thresholds of SA-1 and FA-2 were fitted to these published "
-    "frequencies, so that they agree is no discovery; FA-1 is the thesis', and was fitted to nothing.",
-    parameters=PARAMETERS,
-    sizes={"toy": {"frequencies_hz": [5, 34, 225], "amplitudes": 12}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    tables=tables,
-    draw=draw,
-)

@@ -1,8 +1,8 @@
-"""Runs the realisations of a study: progress, resuming after a stop, jobs here or on a cluster.
+"""Runs the realisations of a study: shows progress, resumes after a stop, uses processes here or a cluster.
 
-A study hands over one pure function of parameters and seed, and the list of what to run. Each result is one JSON line,
-keyed by parameters, seed and a digest of the code, so what is there already is not reckoned again, and a stop (Ctrl-C,
-kill, power) loses no more than the realisations at work.
+A study gives one pure function of parameters and seed, and the list of what to run. Each result is one JSON line, keyed
+by parameters, seed and a digest of the code, so a result that is there already is not computed again, and a stop
+(Ctrl-C, kill, power) loses no more than the realisations that are running.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "one_of", "run", "whole"]
 
-#: Who may run realisations: loky's processes on this machine, or a cluster's.
+#: Where realisations may run: in loky's processes on this machine, or on a cluster.
 BACKENDS = ("loky", "dask", "ray")
 
 
@@ -68,12 +68,12 @@ class Task:
     seed: int = 0
 
     def key(self, code: str) -> str:
-        """Return what its result is filed under."""
+        """Return the key of its result in the file."""
         return json.dumps([self.params, self.seed, code], sort_keys=True)
 
 
 class Results:
-    """Keep results in a file of JSON lines, and read back what is there.
+    """Save results in a file of JSON lines, and read those that are there.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class Results:
         return sum(self._seconds[t.key(self.code)] for t in tasks)
 
     def add(self, task: Task, result: Any, seconds: float) -> None:
-        """Append one result, and see it written."""
+        """Append one result to the file at once."""
         seconds = round(seconds, 3)
         row = {"params": task.params, "seed": task.seed, "code": self.code, "seconds": seconds}
         with self.path.open("a", encoding="utf-8") as file:
@@ -129,7 +129,7 @@ def _whole_lines(path: Path) -> list[str]:
 
 @dataclass(frozen=True)
 class Workers:
-    """Say who runs realisations.
+    """Name the processes that run realisations.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ class Workers:
 
     @contextmanager
     def joblib(self) -> Iterator[joblib.Parallel]:
-        """Give joblib's way to them, for the time of a ``with`` block."""
+        """Give a `joblib.Parallel` that uses them, for the time of a ``with`` block."""
         import joblib  # noqa: PLC0415  what runs in one process does not need it
 
         if self.backend == "dask":

@@ -7,20 +7,24 @@ such runs end with a neuron that fires at nearly every pattern, early in it, and
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.learn import STDP
 from taxel.spikes import SpikeTrains
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table, one_task_per_seed
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377"
+PROTOCOL = (
+    "2000 inputs, Poisson at rates that wander between 0 and 90 Hz (speed within 1800 Hz/s, changed by up to "
+    "360 Hz/s a ms), none silent for 50 ms. 50 ms of the first 1000 of them are played again in a quarter of the "
+    "sections of 50 ms, never twice in a row, each spike moved by 1 ms (sd). 10 Hz of noise on all. 150 s, presented "
+    "three times; judged by the last."
+)
 
 PARAMETERS: dict[str, Any] = {
     "runs": 100,
@@ -35,19 +39,23 @@ PARAMETERS: dict[str, Any] = {
     "most_hz": 90.0,
     "threshold": 500.0,
 }
+SIZES = {
+    "quick": {"runs": 4, "seconds": 50},
+    "toy": {"runs": 1, "seconds": 2, "parts": 2, "trains": 200, "threshold": 50.0},
+}
 #: How fast a rate may change, Hz/s, and by how much that changes in a ms.
 SPEED, PUSH = 1800.0, 360.0
-#: What counts as success over the last part: share of patterns met, latency in ms; and no spike outside.
+#: A run succeeds if over the last part it fires at this share of patterns, within this latency, ms, and never outside.
 HITS, LATENCY = 0.98, 10.0
 PUBLISHED = 96.0
-#: Fewer runs say little of a share.
+#: With fewer runs a share is not judged.
 ENOUGH_RUNS = 20
 
 Spikes = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def background(p: Parameters, rng: np.random.Generator) -> Spikes:
-    """Draw what all inputs do for one part: Poisson at rates that wander, none silent for a pattern's length."""
+    """Draw the spikes of all inputs for one part: Poisson at rates that wander, none silent for a pattern's length."""
     trains, steps = p["trains"], 1000 * p["seconds"]
     rate = np.asarray(rng.uniform(0, p["most_hz"], trains), np.float32)
     speed = np.asarray(rng.uniform(-SPEED, SPEED, trains), np.float32)
@@ -72,7 +80,7 @@ def starts(p: Parameters, rng: np.random.Generator) -> NDArray[np.int64]:
     """Draw when the pattern is played, ms: in a share of the sections of its length, never twice in a row."""
     sections = 1000 * p["seconds"] // p["pattern_ms"]
     played = round(p["share"] * sections)
-    # So many places of the shortened row, each followed by a section without.
+    # Each pattern is followed by a section without one: places are drawn in a row shortened by those sections.
     places = np.sort(rng.choice(sections - played + 1, played, replace=False)) + np.arange(played)
     return np.asarray(places * p["pattern_ms"], np.int64)
 
@@ -109,12 +117,11 @@ def pieces(p: Parameters, spikes: Spikes, start: float) -> Iterator[SpikeTrains]
 
 def tasks(p: Parameters) -> list[Task]:
     """List one run a task."""
-    shared = {name: value for name, value in p.items() if name != "runs"}
-    return [Task(shared, seed) for seed in range(p["runs"])]
+    return one_task_per_seed(p, "runs")
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Give one neuron the spikes of a run; return what it found, and from when on it fired at the pattern alone."""
+    """Train one neuron on a run; return its success, and from when on it fired at the pattern alone."""
     rng = np.random.default_rng([seed, 2008])
     spikes, begin = part(params, rng)
     stdp, fired = STDP(threshold=params["threshold"]), []
@@ -176,7 +183,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     # Two standard deviations of a count of so many runs.
     give = 200 * np.sqrt(0.96 * 0.04 / summary["runs"])
     enough = p["parts"] * p["seconds"] >= 450 and summary["runs"] >= ENOUGH_RUNS
-    found = [
+    judged = [
         Statement(
             "A neuron finds the pattern: it meets over 98 % of the last 150 s, 10 ms from its start or sooner, and "
             "fires at nothing else.",
@@ -189,7 +196,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     ]
     middle = summary["median"]
     if summary["good"]:
-        found.append(
+        judged.append(
             Statement(
                 "It is found within seconds.",
                 "13.5 s in the paper's example",
@@ -197,7 +204,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 middle["found_s"] < 60,
             )
         )
-        found.append(
+        judged.append(
             Statement(
                 "Strong weights are those of inputs that play the pattern.",
                 "all of them",
@@ -205,7 +212,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 middle["strong_in_pattern"] >= 0.99 * middle["strong"],
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
@@ -219,8 +226,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw latencies of the first spikes of one run: 0 for those outside the pattern."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(6.5, 3.6), layout="constrained")
     axes = figure.subplots()
     if summary["course"]:
@@ -228,25 +233,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         axes.plot(seconds, since, ".", markersize=2)
     axes.set(xlabel="s", ylabel="ms from the pattern's start (0: outside)", ylim=(-1, p["pattern_ms"] + 1))
     return figure
-
-
-STUDY = Study(
-    name="stdp",
-    title="a neuron finds a pattern that repeats in its inputs, without labels",
-    where="thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377",
-    protocol="2000 inputs, Poisson at rates that wander between 0 and 90 Hz (speed within 1800 Hz/s, changed by up to "
-    "360 Hz/s a ms), none silent for 50 ms. 50 ms of the first 1000 of them are played again in a quarter of the "
-    "sections of 50 ms, never twice in a row, each spike moved by 1 ms (sd). 10 Hz of noise on all. 150 s, presented "
-    "three times; judged by the last.",
-    parameters=PARAMETERS,
-    sizes={
-        "quick": {"runs": 4, "seconds": 50},
-        "toy": {"runs": 1, "seconds": 2, "parts": 2, "trains": 200, "threshold": 50.0},
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    tables=tables,
-    draw=draw,
-)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.array import Array
@@ -13,13 +14,18 @@ from taxel.learn import STDP
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary, one_task_per_seed
 from taxel_studies.unlabelled import moved, threshold, unlearning
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008"
+PROTOCOL = (
+    "Balls fall on the emulated board: 35 % of them the same one from the same height on the same place (to "
+    "2 mm and 1 mm, standard deviations), the others of any radius (25 to 35 mm), height (10 to 20 cm) and place. One "
+    "neuron receives the rises and falls of all taxels, 8192 trains, with the paper's constants: half of the touches "
+    "four times, then the others for the first time, always learning; judged by these. Before it learns, its threshold "
+    "lets it fire twice a second; a touch comes three times a second. Beside it a neuron that never learns and fires "
+    "as often."
+)
 
 PARAMETERS: dict[str, Any] = {
     "touches": 240,
@@ -32,6 +38,7 @@ PARAMETERS: dict[str, Any] = {
     "passes": 4,
     "boards": 5,
 }
+SIZES = {"toy": {"touches": 24, "boards": 1, "passes": 2}}
 #: How long after a contact a spike belongs to it, and how much before it a stamp may lie, ms.
 TOUCH_MS, STAMP_MS = 60.0, 0.5
 #: How far random places keep from the array's edge, and the one that comes again from its middle, mm.
@@ -41,20 +48,19 @@ EVERY, NONE = 0.95, 0.1
 
 
 class Play(NamedTuple):
-    """A play: the spikes that reach a neuron, and what truly happened."""
+    """The spikes that a neuron receives, and the true contacts."""
 
     spikes: SpikeTrains
-    """Rises and falls of each taxel, beside each other."""
+    """Two trains a taxel: its rises, then its falls."""
     contacts: NDArray[np.float64]
     """When balls touched, ms."""
     same: NDArray[np.bool_]
-    """Whether it was the ball that falls again and again on one place."""
+    """Whether each touch was by the ball that falls again and again on one place."""
 
 
 def tasks(p: Parameters) -> list[Task]:
     """List one board a task."""
-    shared = {name: value for name, value in p.items() if name != "boards"}
-    return [Task(shared, seed) for seed in range(p["boards"])]
+    return one_task_per_seed(p, "boards")
 
 
 def played(p: Parameters, seed: int) -> Play:
@@ -97,7 +103,7 @@ def _scene(rng: np.random.Generator, same: bool) -> Scene:
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     """Train a neuron on half of the touches, many times over; test it on the others, beside an untrained one."""
     play = played(params, seed)
-    # Whole, so that pieces end where the next ones begin; and between two touches.
+    # A whole ms, so that each piece begins where the last one ends, and between two touches.
     half = float(np.floor(play.contacts[params["touches"] // 2] - 20))
     first, second = play.spikes.between(0, half), play.spikes.between(half, play.spikes.stop)
     taus = {name: params[name] for name in ("tau_m", "tau_s", "tau_plus", "tau_minus")}
@@ -109,7 +115,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         course += [[len(play.contacts) // 2 * k + n, round(float(t), 2)] for n, t in enumerate(late) if t < TOUCH_MS]
     last = (params["passes"] - 1) * half
     stdp.partial_fit(moved(second, last))
-    # As often, without learning: at another threshold.
+    # For comparison a neuron that does not learn, with a threshold at which it fires as often.
     hz = 1000 * len(stdp.spikes_) / (play.spikes.stop - half)
     untrained = unlearning(threshold(first, max(hz, params["untrained_hz"]), taus), taus).partial_fit(play.spikes)
     return {
@@ -123,15 +129,15 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 def latencies(times: NDArray[np.float64], contacts: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how long after each contact the first spike came that belongs to it, ms; infinite where none did."""
     touch = np.searchsorted(contacts, times + STAMP_MS, side="right") - 1
-    found = np.full(len(contacts), np.inf)
+    delays = np.full(len(contacts), np.inf)
     since = times - contacts[np.maximum(touch, 0)]
     mine = (touch >= 0) & (since < TOUCH_MS)
-    np.minimum.at(found, touch[mine], since[mine])
-    return found
+    np.minimum.at(delays, touch[mine], since[mine])
+    return delays
 
 
 def judged(times: NDArray[np.float64], play: Play, begin: float) -> dict[str, Any]:
-    """Return at which share of the touches from `begin` on a neuron fired, how soon, and how often beside them."""
+    """Return at which share of the touches from `begin` on a neuron fired, how soon, and how often outside them."""
     there = play.contacts >= begin
     late = latencies(times, play.contacts)
     fired = np.isfinite(late)
@@ -157,7 +163,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Say what it found."""
+    """Judge how often and how soon neurons fire at touches."""
     boards = summary["boards"]
 
     def middle(how: str, what: str) -> float:
@@ -195,8 +201,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw how soon after contact one neuron fires while it learns."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     figure = Figure(figsize=(6.5, 3.6), layout="constrained")
     axes = figure.subplots()
@@ -204,23 +208,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
         axes.plot(*np.transpose(summary["course"]), ".", markersize=3)
     axes.set(xlabel="touches presented", ylabel="ms from contact to spike", ylim=(0, None))
     return figure
-
-
-STUDY = Study(
-    name="stdp_touch",
-    title="a neuron learns without labels, from an array on which balls fall, to fire as a touch begins",
-    where="thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008",
-    protocol="Balls fall on the emulated board: 35 % of them the same one from the same height on the same place (to "
-    "2 mm and 1 mm, standard deviations), the others of any radius (25 to 35 mm), height (10 to 20 cm) and place. One "
-    "neuron receives the rises and falls of all taxels, 8192 trains, with the paper's constants: half of the touches "
-    "four times, then the others for the first time, always learning; judged by these. Before it learns, its threshold "
-    "lets it fire twice a second; a touch comes three times a second. Beside it a neuron that never learns and fires "
-    "as often.",
-    parameters=PARAMETERS,
-    sizes={"toy": {"touches": 24, "boards": 1, "passes": 2}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

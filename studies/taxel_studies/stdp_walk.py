@@ -4,25 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.learn import STDP
 from taxel_studies.gait import sources
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 from taxel_studies.unlabelled import moved, threshold, unlearning
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
-
-#: Whose recordings.
+WHERE = "thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008"
+PROTOCOL = (
+    "Two minutes of walking a foot, eight force sensors (PhysioNet gaitpdb), as crossings of levels in shares "
+    "of the running range: 112 trains. One neuron a foot gets the first minute eight times, then the second for the "
+    "first time, always learning; judged by that. Its threshold is such that before it learns it fires once in ten "
+    "seconds. Time constants are longer than the paper's (50 ms for 10), as a step is longer than its pattern. Beside "
+    "it a neuron that never learns, whose threshold lets it fire as often as the learnt one."
+)
+#: The source of the recordings, of those of the gait study.
 SOURCE = "gaitpdb"
+DATA = (sources.SOURCES[SOURCE].folder,)
 PARAMETERS: dict[str, Any] = {
     "levels": [0.02, 0.045, 0.08, 0.15, 0.3, 0.45, 0.6],
     "tau_m": 50.0,
@@ -33,9 +38,10 @@ PARAMETERS: dict[str, Any] = {
     "passes": 8,
     "feet": 0,
 }
+SIZES = {"toy": {"feet": 2, "passes": 2}}
 #: Of all feet the constants were chosen on every sixth; statements are of the others.
 CHOSEN_ON = 6
-#: What counts as found: a share of strides with one spike and no other, and how far it wanders at most, ms.
+#: A stride is found with this share of strides with one spike, and at most this deviation of its time, ms.
 ONCE, WANDERS_MS = 0.8, 50.0
 #: Longer than this is no stride but a pause, ms.
 LONGEST_STRIDE_MS = 2000.0
@@ -67,7 +73,7 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
 
 def train_and_test(foot: Piece, params: Parameters) -> dict[str, Any]:
     """Train a neuron on the first half of a walk, presented again and again, and test it on the second."""
-    # Whole, so that pieces end where the next ones begin.
+    # A whole ms, so that each piece begins where the last one ends.
     half = float(foot.spikes.stop // 2)
     first, second = foot.spikes.between(0, half), foot.spikes.between(half, foot.spikes.stop)
     taus = {name: params[name] for name in ("tau_m", "tau_s", "tau_plus", "tau_minus")}
@@ -115,7 +121,7 @@ def phases(
 
 
 def judged(times: NDArray[np.float64], foot: Piece, begin: float) -> dict[str, Any]:
-    """Return how often a neuron fired once a stride, when in it, and how far that wanders (circular deviation)."""
+    """Return how often a neuron fired once a stride, when in the stride, and the circular deviation of that."""
     counts, phased, length = phases(times, foot.truth["contact"], begin, foot.scored[1])
     if not len(counts) or not phased:
         return {"strides": len(counts), "once": 0.0, "phase_ms": None, "wanders_ms": None}
@@ -130,7 +136,7 @@ def judged(times: NDArray[np.float64], foot: Piece, begin: float) -> dict[str, A
     }
 
 
-def found(one: Mapping[str, Any]) -> bool:
+def finds_stride(one: Mapping[str, Any]) -> bool:
     """Judge whether a neuron has found the stride."""
     return one["wanders_ms"] is not None and one["once"] >= ONCE and one["wanders_ms"] <= WANDERS_MS
 
@@ -142,16 +148,16 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Summary:
         {"foot": row.params["foot"], "chosen_on": k % CHOSEN_ON == 0, **row.result, "course": None}
         for k, row in enumerate(rows)
     ]
-    good = [row for row in rows if found(row.result["learnt"])]
+    good = [row for row in rows if finds_stride(row.result["learnt"])]
     shown = min(good, key=lambda row: float(row.result["learnt"]["wanders_ms"])) if good else rows[0]
     return {"feet": feet, "shown": shown.params["foot"], "course": shown.result["course"]}
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Say what it found."""
+    """Judge how many neurons have found the stride."""
     del p
     feet = [one for one in summary["feet"] if not one["chosen_on"]] or summary["feet"]
-    good, by_chance = ([one for one in feet if found(one[how])] for how in ("learnt", "untrained"))
+    good, by_chance = ([one for one in feet if finds_stride(one[how])] for how in ("learnt", "untrained"))
     wander = np.median([one["learnt"]["wanders_ms"] for one in good]) if good else float("nan")
     after = [one["learnt"]["phase_ms"] for one in good]
     near = sum(-WANDERS_MS <= t <= 2 * WANDERS_MS for t in after)
@@ -178,8 +184,6 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw when one neuron fires while it learns, and when those fire that have found the stride."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -198,22 +202,6 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     return figure
 
 
-STUDY = Study(
-    name="stdp_walk",
-    title="a neuron learns without labels, from a foot that walks, to fire once a stride",
-    where="thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008",
-    protocol="Two minutes of walking a foot, eight force sensors (PhysioNet gaitpdb), as crossings of levels in shares "
-    "of the running range: 112 trains. One neuron a foot gets the first minute eight times, then the second for the "
-    "first time, always learning; judged by that. Its threshold is such that before it learns it fires once in ten "
-    "seconds. Time constants are longer than the paper's (50 ms for 10), as a step is longer than its pattern. Beside "
-    "it a neuron that never learns, whose threshold lets it fire as often as the learnt one.",
-    parameters=PARAMETERS,
-    sizes={"toy": {"feet": 2, "passes": 2}},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    data=(sources.SOURCES[SOURCE].folder,),
-    unread=lambda _parameters, data: sources.unread(data, [SOURCE]),
-)
+def unread(_p: Parameters, data: Path) -> Mapping[str, str]:
+    """Return which recordings cannot be read, and why."""
+    return sources.unread(data, [SOURCE])

@@ -1,4 +1,4 @@
-"""What a study is: a protocol, its parameters, the published values as data, a picture, and what holds."""
+"""A study: a protocol, its parameters, the published values as data, a picture, and judged statements."""
 
 from __future__ import annotations
 
@@ -8,20 +8,21 @@ import json
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from types import ModuleType
+from typing import Any, BinaryIO
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from taxel import FormatError, ProblemError, __version__
 from taxel.report import installed_sources, write_whole
 from taxel_studies.runner import HERE, Results, Task, Workers, one_of, run, whole
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 __all__ = [
     "Parameters",
@@ -33,6 +34,9 @@ __all__ = [
     "Table",
     "drawn",
     "logarithmic",
+    "one_task",
+    "one_task_per_seed",
+    "only_result",
     "read_section",
     "refuse",
     "svg",
@@ -40,7 +44,7 @@ __all__ = [
 
 #: Experiment parameters by name: what JSON can hold.
 Parameters = Mapping[str, Any]
-#: What a study found, as JSON holds it: enough to judge its statements and to draw its picture.
+#: The results of a study, as JSON holds them: enough to judge its statements and to draw its picture.
 Summary = dict[str, Any]
 #: One study's part of the page, as ``summary.json`` holds it.
 Section = dict[str, Any]
@@ -48,7 +52,7 @@ Section = dict[str, Any]
 
 @dataclass(frozen=True)
 class Statement:
-    """Hold a published statement beside what was found.
+    """A published statement with its value and ours.
 
     Attributes
     ----------
@@ -58,7 +62,7 @@ class Statement:
         Its value.
     ours : str
     holds : bool, optional
-        None: nothing to hold it against (the picture is lost, or too little was run).
+        None: it cannot be judged (the published picture is lost, or too little was run).
     why : str
         Why it does not hold; or the reading under which it does.
     """
@@ -72,7 +76,7 @@ class Statement:
 
 @dataclass(frozen=True)
 class Table:
-    """Hold a table of the page.
+    """A table of the page.
 
     Attributes
     ----------
@@ -81,7 +85,7 @@ class Table:
     rows : sequence of sequences of str
         The first cell names the row.
     note : str
-        What to know of it.
+        An explanation below it.
     folded : bool
         Shown on the page only where it is opened, and not by the command.
     """
@@ -95,7 +99,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Row:
-    """Hold one realisation, its result and the CPU seconds that it took."""
+    """One realisation, its result and the CPU seconds that it took."""
 
     params: dict[str, Any]
     seed: int
@@ -103,17 +107,28 @@ class Row:
     seconds: float = 0.0
 
 
+#: What a module must define to be a study, and what it may define.
+_REQUIRED = ("WHERE", "PROTOCOL", "PARAMETERS", "SIZES", "tasks", "realise", "summarise", "statements", "draw")
+_OPTIONAL = ("then", "tables", "unread", "DATA", "COURSES", "NEEDS")
+
+
 @dataclass(frozen=True)
 class Study:
     """Describe a study: everything that the runner, the page and the command line need.
 
+    A study is a module: `of` reads the attributes below from its constants, whose names are in capital letters
+    (``WHERE``, ``PROTOCOL`` ...), and from its functions (``tasks``, ``realise`` ...).
+
     Of studies on recordings `tasks`, `then`, `realise` and `summarise` are also given ``data``, the folder of them; of
-    studies on simulated contact ``courses``, a folder in the report's that these share.
+    studies on simulated contact `realise` and `summarise` are also given ``courses``, a folder in the report's that
+    these share.
 
     Attributes
     ----------
-    name, title, where : str
-        As in ``taxel study NAME``; one line; its place in the source.
+    name, title : str
+        As in ``taxel_studies.STUDIES``.
+    where : str
+        Its place in the source.
     protocol : str
         What is done, in plain words, with the readings that were used.
     parameters : mapping
@@ -130,17 +145,17 @@ class Study:
     draw : function of (parameters, summary)
         The picture, as the source draws it; or several.
     then : function of (parameters, rows), optional
-        The realisations that depend on what others gave: asked again until it lists nothing new.
+        The realisations that depend on the results of others: asked again until it lists nothing new.
     tables : function of (parameters, summary), optional
         Tables below the picture.
+    unread : function of (parameters, data), optional
+        Which files of the recordings cannot be read, and why. It raises `FormatError` where none can.
     data : tuple of str
         Folders of recordings that it needs.
     courses : bool
         Whether it is on simulated contact.
     needs : tuple of str
         Modules of the extra ``studies`` that it needs.
-    unread : function of (parameters, data)
-        Which of their files cannot be read, and why. It raises `FormatError` where none can.
     """
 
     name: str
@@ -156,17 +171,31 @@ class Study:
     draw: Callable[[Parameters, Summary], Figure | Sequence[Figure]]
     then: Callable[..., Sequence[Task]] | None = None
     tables: Callable[[Parameters, Summary], Sequence[Table]] | None = None
-    data: tuple[str, ...] = field(default=())
+    unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
+    data: tuple[str, ...] = ()
     courses: bool = False
     needs: tuple[str, ...] = ()
-    unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
+
+    @classmethod
+    def of(cls, name: str, title: str, module: ModuleType) -> Study:
+        """Return the study that a module defines.
+
+        Raises
+        ------
+        ProblemError : the module lacks constants or functions of a study (names them)
+        """
+        missing = [wanted for wanted in _REQUIRED if not hasattr(module, wanted)]
+        if missing:
+            raise ProblemError(f"{module.__name__} is no study: it lacks {', '.join(missing)}")
+        defined = {wanted.lower(): vars(module)[wanted] for wanted in _REQUIRED + _OPTIONAL if hasattr(module, wanted)}
+        return cls(name, title, **defined)
 
     def set(self, size: str = "full", **changes: Any) -> dict[str, Any]:
         """Return the parameters of a size, with changes.
 
         Raises
         ------
-        ProblemError : a size or a parameter that is none, or a value of another kind
+        ProblemError : an unknown size or parameter, or a value of another kind
         """
         one_of("size", size, ("full", *self.sizes))
         values = {**self.parameters, **self.sizes.get(size, {})}
@@ -182,17 +211,17 @@ class Study:
 
     @property
     def code(self) -> str:
-        """The digest of what a realisation is computed by: when it changes, results are computed anew."""
+        """The digest of the code that computes a realisation: when it changes, results are computed anew."""
         return installed_sources("taxel_studies").digest(self.realise.__module__)
 
     @property
     def made_of(self) -> dict[str, str]:
-        """The digest of every source that what it shows is computed from, by name."""
+        """The digest of every source that its figures are computed from, by name."""
         return installed_sources("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
 
     @property
     def lacks(self) -> str | None:
-        """Say which modules are not installed; None where all are."""
+        """The modules that are not installed, in words; None where all are."""
         missing = [name for name in self.needs if find_spec(name) is None]
         return f'it needs {", ".join(missing)}: pip install "taxel[studies]"' if missing else None
 
@@ -212,7 +241,7 @@ class Study:
         Parameters
         ----------
         report : Path
-            Of all studies; this one's folder in it has its name.
+            The folder of all studies; this one's folder in it has its name.
         size : str
             "full", "toy" ...
         changes : mapping, optional
@@ -231,7 +260,7 @@ class Study:
 
         Raises
         ------
-        ProblemError : a size or parameter that is none; a module that is not installed
+        ProblemError : an unknown size or parameter; a module that is not installed
         FormatError : recordings that it needs are not there, or cannot be read (none of them; one, with `strict`)
         """
         parameters = self.set(size, **(changes or {}))
@@ -245,6 +274,7 @@ class Study:
             refuse(unread, strict=strict)
         folder = report / self.name
         folder.mkdir(parents=True, exist_ok=True)
+        listing = dict(given)
         if self.courses:
             given["courses"] = report / "courses"
             given["courses"].mkdir(exist_ok=True)
@@ -257,9 +287,9 @@ class Study:
             for t in wanted:
                 rows[t.key("")] = Row(t.params, t.seed, results[t], results.seconds([t]))
 
-        phase(self.name, self.tasks(parameters, **given))
+        phase(self.name, self.tasks(parameters, **listing))
         while self.then is not None:
-            wanted = [t for t in self.then(parameters, list(rows.values()), **given) if t.key("") not in rows]
+            wanted = [t for t in self.then(parameters, list(rows.values()), **listing) if t.key("") not in rows]
             if not wanted:
                 break
             phase(f"{self.name}, next", wanted)
@@ -316,13 +346,13 @@ def _alike(value: Any, other: Any) -> bool:
 
 
 def _kind(value: Any) -> str:
-    """Say in words what is alike."""
+    """Return the kind of value that is allowed, in words."""
     kinds = {bool: "true or false", int: "a whole number", float: "a number", list: "a list", tuple: "a list"}
     return kinds.get(type(value), "a text")
 
 
 def _machine() -> dict[str, Any]:
-    """Return what a reader needs to place the times: processor, versions, date."""
+    """Return what times depend on: processor, versions, date."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -339,10 +369,25 @@ def _machine() -> dict[str, Any]:
     }
 
 
+def one_task(p: Parameters) -> list[Task]:
+    """List the one realisation of a study, with its parameters' seed."""
+    return [Task({k: v for k, v in p.items() if k != "seed"}, p["seed"])]
+
+
+def only_result(_p: Parameters, rows: Sequence[Row]) -> Summary:
+    """Return the result of the one realisation of a study."""
+    summary: Summary = rows[0].result
+    return summary
+
+
+def one_task_per_seed(p: Parameters, count: str = "realisations") -> list[Task]:
+    """List as many realisations as the parameter of this name says, each with a seed of its own."""
+    shared = {k: v for k, v in p.items() if k != count}
+    return [Task(shared, seed) for seed in range(p[count])]
+
+
 def svg(figure: Figure) -> bytes:
     """Return a picture as SVG, the same bytes for the same numbers."""
-    from matplotlib import rc_context  # noqa: PLC0415  loads slowly
-
     buffer = io.BytesIO()
     with rc_context({"svg.hashsalt": "taxel", "svg.fonttype": "none"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None}, bbox_inches="tight", facecolor="white")
@@ -362,7 +407,7 @@ def logarithmic(axes: Axes, *, x: Sequence[float] = (), y: Sequence[float] = ())
 
 
 def drawn(study: Study, parameters: Parameters, summary: Summary) -> list[bytes]:
-    """Return a study's pictures of what it found, as SVG."""
+    """Return the pictures of a study's results, as SVG."""
     figures = study.draw(parameters, summary)
     return [svg(figure) for figure in (figures if isinstance(figures, Sequence) else [figures])]
 
@@ -381,7 +426,7 @@ def _put(data: bytes, file: BinaryIO) -> None:
 
 
 def read_section(folder: Path) -> Section | None:
-    """Return what a study left, pictures as data addresses; None where nothing was run."""
+    """Return the section that a run saved, with pictures as data addresses; None where nothing was run."""
     path = folder / "summary.json"
     if not path.exists():
         return None

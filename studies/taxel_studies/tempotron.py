@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary
+from taxel_studies.study import Parameters, Row, Statement, Summary
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "Gütig and Sompolinsky 2006; thesis 3.3"
+PROTOCOL = (
+    "500 inputs, one spike each in 500 ms, a random label a pattern; the settings of the paper's capacity runs as "
+    "secondary sources give them (rate 3e-3 T / (tau N V0), momentum .99, first weights of 1e-3), without the "
+    "supplement's small potential; weights change after each wrong pattern, until an epoch has no error or 2000 "
+    "are over."
+)
 
 PARAMETERS: dict[str, Any] = {
     "realisations": 10,
@@ -25,6 +29,7 @@ PARAMETERS: dict[str, Any] = {
     "epochs": 2000,
 }
 TOY: dict[str, Any] = {"realisations": 3, "inputs": 50, "loads": [1.0, 2.0], "epochs": 300}
+SIZES = {"toy": TOY}
 #: Epochs to the solution in throw-away code with the same settings, 2 to 3 seeds a load.
 NOTED = {1.0: (21, 29), 2.0: (68, 155)}
 
@@ -70,15 +75,15 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold what was noted beside ours."""
+    """Compare the noted epochs with ours."""
     full = (p["inputs"], p["epochs"]) == (PARAMETERS["inputs"], PARAMETERS["epochs"])
-    found = []
+    judged = []
     for line in summary["lines"]:
         spread = f"{line['epochs'][0]} to {line['epochs'][-1]} epochs" if line["epochs"] else "none"
         ours = f"{line['solved']} of {line['runs']} solved: {spread}"
         if line["load"] in NOTED:
             low, high = NOTED[line["load"]]
-            found.append(
+            judged.append(
                 Statement(
                     f"At p / N = {line['load']:g} every task is solved.",
                     f"{low} to {high} epochs (2 to 3 seeds of throw-away code)",
@@ -88,18 +93,16 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 )
             )
         else:
-            found.append(
+            judged.append(
                 Statement(
                     f"At p / N = {line['load']:g} some tasks are solved.", "in part; capacity about 3", ours, None
                 )
             )
-    return found
+    return judged
 
 
 def draw(p: Parameters, summary: Summary) -> Figure:
-    """Draw the share of tasks solved, and the epochs that they took, by load."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
+    """Draw the share of tasks solved, and the epochs that they needed, by load."""
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     left.plot(
@@ -114,23 +117,3 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     for ax in (left, right):
         ax.set_xlabel("load p / N")
     return figure
-
-
-STUDY = Study(
-    name="tempotron",
-    title="which loads the Tempotron solves, and in how many epochs",
-    where="Gütig and Sompolinsky 2006; thesis 3.3",
-    protocol=(
-        "500 inputs, one spike each in 500 ms, a random label a pattern; the settings of the paper's capacity runs as "
-        "secondary sources give them (rate 3e-3 T / (tau N V0), momentum .99, first weights of 1e-3), without the "
-        "supplement's small potential; weights change after each wrong pattern, until an epoch has no error or 2000 "
-        "are over."
-    ),
-    parameters=PARAMETERS,
-    sizes={"toy": TOY},
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-)

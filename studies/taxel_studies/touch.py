@@ -1,8 +1,8 @@
 """Touch learnt from labels alone: contact and lift, and which of two spheres fell (after thesis 5.6.2).
 
-Nobody writes a rule: the recipe `touch` and the training of `taxel train` learn both questions from labelled recordings
-of the emulated board. Beside each stand the best plain rule that we could think of and an LDA on frames around the
-touch, on the same scenes; for the spheres also an LDA on three numbers.
+No rule is written by hand: the recipe `touch` and the training of `taxel train` learn both questions from labelled
+recordings of the emulated board. For comparison the best plain rule that we could think of and an LDA on frames around
+the touch run on the same scenes; for the spheres also an LDA on three numbers.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import detect
@@ -32,12 +33,19 @@ from taxel.simulate import Act, Contact, Scene, Silence, play, truth
 from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
+WHERE = "after 5.6.2"
+PROTOCOL = (
+    "Balls of 36 g, 50 and 70 mm across, fall on foam over the emulated board; heights (100 to 200 mm), places and "
+    "foams are drawn by seed. The recordings and a table of labels are written to files, and read and learnt from "
+    "as `taxel train --recipe touch` does; the recipe was chosen on other seeds. Judged on other seeds, so other "
+    "places. Two questions: contact and lift of every fall and bounce; which sphere, at its first contact. Beside "
+    "the neuron: the best of some plain rules, chosen on the training scenes (loaded taxels for contact and lift; "
+    "a threshold on area, total, peak or a ratio of them for the sphere), and a linear discriminant on the 16 x 16 "
+    "taxels above rest around the touch, as 5.6.2 takes them (on the whole array it learns places by heart), for "
+    "the sphere also one on the logarithms of area, total and peak; ridges chosen inside the training scenes."
+)
 
 Floats = NDArray[np.float64]
 
@@ -53,13 +61,23 @@ PARAMETERS: dict[str, Any] = {
     "window_ms": 10.0,
     "seed": 1,
 }
+SIZES = {
+    "toy": {
+        "parts": 1,
+        "train": 16,
+        "test": 8,
+        "train_contacts": 4,
+        "test_contacts": 3,
+        "times_ms": [1.0, 5.0, 10.0],
+    }
+}
 
 #: What a loaded taxel reads above rest at least, ticks.
 ABOVE = ContactArea().above
 #: The two spheres, as labels.
 KINDS = ("small", "large")
 EVENTS = ("contact", "lift")
-#: Who answers which sphere fell, and who contact and lift.
+#: The methods that classify the spheres, and those that detect contact and lift.
 WAYS = {
     "neuron": "neuron, learnt",
     "rule": "best plain rule",
@@ -79,7 +97,7 @@ MOST_FRAMES = 1500
 
 
 class Drop(NamedTuple):
-    """A recording as `taxel train` reads it, and what the simulation knows of it besides."""
+    """A recording as `taxel train` reads it, with the ground truth of the simulation."""
 
     example: Example
     events: Events
@@ -88,7 +106,7 @@ class Drop(NamedTuple):
     kind: int
 
     def frames(self, period_us: int, start: float, stop: float) -> Frames:
-        """Return what stands above rest as pictures, us."""
+        """Return pictures of the readings above rest; times in us."""
         return self.tare.off(Frames.from_events(self.events, period_us, round(start), round(stop)))
 
 
@@ -132,17 +150,17 @@ def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[
 def tasks(p: Parameters) -> list[Task]:
     """List the parts: other seeds, so other places, heights and foams, to learn from and to judge by."""
     shared = {k: p[k] for k in ("radii_mm", "drop_mm", "times_ms", "window_ms")}
-    found = []
+    listed = []
     for part in range(p["parts"]):
         seed = 100 * p["seed"] + 2 * part
-        found.append(Task({"question": "kind", "train": p["train"], "test": p["test"], **shared}, seed))
+        listed.append(Task({"question": "kind", "train": p["train"], "test": p["test"], **shared}, seed))
         sizes = {"train": p["train_contacts"], "test": p["test_contacts"]}
-        found.append(Task({"question": "contact", **sizes, **shared}, seed))
-    return found
+        listed.append(Task({"question": "contact", **sizes, **shared}, seed))
+    return listed
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Draw scenes, learn from some, judge all three ways by the others."""
+    """Draw scenes, learn from some, judge all three methods by the others."""
     with tempfile.TemporaryDirectory() as place:
         sets = {}
         for n, which in enumerate(("train", "test")):
@@ -158,7 +176,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Drop], test: list[Drop]) -> dict[str, Any]:
-    """Say which sphere fell, by time since contact."""
+    """Classify the spheres, by time since contact."""
     times = params["times_ms"]
     right: dict[str, Any] = {"neuron": [], "said_ms": [], "silent": 0}
     for drop in test:
@@ -180,8 +198,8 @@ def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Drop], t
         name, by_rule = _best_rule(now, truths[0])
         names.append(name)
         answers_by = {"rule": by_rule}
-        for way, seen in (("numbers", _numbers), ("lda", _around)):
-            learnt, judged = (seen(pictures) for pictures in now)
+        for way, features in (("numbers", _numbers), ("lda", _around)):
+            learnt, judged = (features(pictures) for pictures in now)
             answers_by[way] = _lda(learnt, truths[0])(judged)
         for way, kinds in answers_by.items():
             shares[way].append(float(np.mean(kinds == truths[1])))
@@ -203,7 +221,7 @@ def _since_contact(drop: Drop, times: Sequence[float]) -> list[Frames]:
 
 
 def _best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
-    """Return the feature whose threshold tells most training scenes apart, and its answers for the others."""
+    """Return the feature whose threshold classifies most training scenes right, and its answers for the others."""
     features = [_features(which) for which in by_moment]
     best: tuple[float, str, float, int] = (-1.0, "", 0.0, 1)
     for name, values in features[0].items():
@@ -217,7 +235,7 @@ def _best_rule(by_moment: list[list[Frames]], kinds: NDArray[np.int64]) -> tuple
 
 
 def _features(pictures: list[Frames]) -> dict[str, Floats]:
-    """Return what a person would look at first, of each picture."""
+    """Return the simple features of each picture: area, total, peak and their ratios."""
     area = np.array([frames.area(ABOVE)[0] for frames in pictures])
     total = np.array([frames.total()[0] for frames in pictures])
     peak = np.array([frames.peak()[0] for frames in pictures])
@@ -242,10 +260,10 @@ def _numbers(pictures: list[Frames]) -> Floats:
 def _around(pictures: Iterable[Frames]) -> Floats:
     """Return the values of 16 x 16 taxels around the centre of what is loaded, picture by picture; beyond the edge 0.
 
-    A touch is anywhere on the array: what is learnt of a taxel at one place holds at no other. Where nothing is loaded,
-    they are those in the middle of the array.
+    A touch is anywhere on the array, and weights learnt for the taxels of one place are of no use at another. Where
+    nothing is loaded, the taxels are those in the middle of the array.
     """
-    found = []
+    regions = []
     for frames in pictures:
         values = frames.values.astype(np.float64)
         shape = values.shape[1:]
@@ -260,8 +278,8 @@ def _around(pictures: Iterable[Frames]) -> Floats:
             first = np.rint(middle).astype(np.int64) + AROUND - AROUND // 2
             index.append(first[:, None] + np.arange(AROUND))
         n, row, column = index
-        found.append(padded[n[:, None, None], row[:, :, None], column[:, None, :]].reshape(len(values), -1))
-    return np.concatenate(found)
+        regions.append(padded[n[:, None, None], row[:, :, None], column[:, None, :]].reshape(len(values), -1))
+    return np.concatenate(regions)
 
 
 def _lda(values: ArrayLike, classes: NDArray[Any]) -> Callable[[ArrayLike], NDArray[Any]]:
@@ -277,7 +295,7 @@ def _lda(values: ArrayLike, classes: NDArray[Any]) -> Callable[[ArrayLike], NDAr
 
 
 def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Drop], test: list[Drop]) -> dict[str, Any]:
-    """Say when touches begin and end."""
+    """Detect when touches begin and end."""
     window = params["window_ms"]
     levels = {level: _tally([_by_area(t, level) for t in train], train, window) for level in (1, 2, 4, 8)}
     level = max(
@@ -292,12 +310,12 @@ def _contacts(params: dict[str, Any], readout: detect.Readout, train: list[Drop]
     }
 
 
-def _tally(found: list[Detections], drops: list[Drop], window_ms: float) -> dict[str, Any]:
+def _tally(detections: list[Detections], drops: list[Drop], window_ms: float) -> dict[str, Any]:
     """Return found, missed, false, the error of its time, and its delay until it was known (ms)."""
     tallies: dict[str, Any] = {
         label: {"found": 0, "missed": 0, "false": 0, "error_ms": [], "later_ms": []} for label in EVENTS
     }
-    for detected, drop in zip(found, drops, strict=True):
+    for detected, drop in zip(detections, drops, strict=True):
         judged = score(detected, {label: drop.example.labels[label] for label in EVENTS}, window_ms).to_dict()[
             "by_label"
         ]
@@ -311,13 +329,14 @@ def _tally(found: list[Detections], drops: list[Drop], window_ms: float) -> dict
 
 
 def _by_area(drop: Drop, level: int) -> Detections:
-    """Say contact where so many taxels are loaded, and lift where fewer are."""
+    """Detect contact where so many taxels are loaded, and lift where fewer are."""
     spikes = ContactArea(levels=[level], tare=drop.tare).encode(drop.events)
     times = [np.rint(to_us(train)).astype(np.int64) for train in spikes]
     return detections_at(times[0]) + detections_at(times[1], "lift")
 
 
 def detections_at(t: NDArray[np.int64], label: str = "contact") -> Detections:
+    """Return detections of one label at these times."""
     return Detections(np.full(len(t), label), t, t)
 
 
@@ -335,14 +354,14 @@ def _touched(train: list[Drop]) -> Callable[[ArrayLike], NDArray[Any]]:
 
 
 def _by_frames(drop: Drop, touched: Callable[[ArrayLike], NDArray[Any]]) -> Detections:
-    """Say contact and lift where the LDA changes its mind from one picture to the next, 1 ms apart."""
+    """Detect contact and lift where the LDA's answer changes from one picture to the next, 1 ms apart."""
     frames = drop.frames(1000, drop.events.markers[0][0], drop.contacts[-1].stop_us + AFTER_US)
     change = np.diff(touched(_around([frames])), prepend=0)
     return detections_at(frames.t[change > 0]) + detections_at(frames.t[change < 0], "lift")
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
-    """Join the parts."""
+    """Merge the results of the parts."""
     kinds = [row.result for row in rows if row.params["question"] == "kind"]
     contacts = [row.result for row in rows if row.params["question"] == "contact"]
     late = [ms for one in kinds for ms in one["said_ms"]]
@@ -369,13 +388,13 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Judge what the study is to show, and say where another way wins."""
+    """Judge what the study is to show, and name the other method where it does better."""
     at = summary["times_ms"].index(10.0) if 10.0 in summary["times_ms"] else len(summary["times_ms"]) - 1
     shares = {way: summary["kinds"][way][at] for way in WAYS}
     best = max(shares, key=lambda way: shares[way])
     middle = "never" if summary["said_ms"] is None else f"{summary['said_ms'][1]:.1f} ms after contact (median)"
     ways = ", ".join(f"{WAYS[way]} {shares[way]:.1%}" for way in WAYS)
-    found = [
+    judged = [
         Statement(
             "Which of the two spheres of 5.6.2 fell is learnt from labels alone and detected within 10 ms of contact.",
             "95 % right or more (our goal)",
@@ -399,7 +418,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         listed = "; ".join(
             f"{WAYS[w]} {o['found']} found, {o['missed']} missed, {o['false']} false" for w, o in each.items()
         )
-        found.append(
+        judged.append(
             Statement(
                 f"{label.capitalize()} is learnt from labels alone as well as the best plain rule says it.",
                 "no more missed and false than the rule (our goal)",
@@ -408,11 +427,11 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 f"window {p['window_ms']:g} ms; the rule: {levels} or more taxels loaded",
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
-    """List both questions by way."""
+    """List both questions by method."""
     del p
     recipe = Recipe.load("touch", labels=EVENTS)
     trained = " and ".join(f"{label} {recipe.learner_of(label)[1]:g} ms" for label in EVENTS)
@@ -444,8 +463,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> Figure:
     """Draw both questions."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 5), layout="constrained")
     left, right = figure.subplots(1, 2)
     for way, words in WAYS.items():
@@ -467,40 +484,6 @@ def draw(p: Parameters, summary: Summary) -> Figure:
     right.set(xticks=places, xticklabels=EVENTS, ylabel="of the touches (%)")
     right.set_title(f"contact and lift, within {p['window_ms']:g} ms")
     for ax, columns in ((left, 2), (right, 3)):
-        # Below the axes: no line and no bar is hidden.
+        # The legend stands below the axes, so that it hides no line and no bar.
         ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize="small", frameon=False)
     return figure
-
-
-STUDY = Study(
-    name="touch",
-    title="contact and lift, and which of two spheres fell, learnt from labels alone",
-    where="after 5.6.2",
-    protocol=(
-        "Balls of 36 g, 50 and 70 mm across, fall on foam over the emulated board; heights (100 to 200 mm), places and "
-        "foams are drawn by seed. The recordings and a table of labels are written to files, and read and learnt from "
-        "as `taxel train --recipe touch` does; the recipe was chosen on other seeds. Judged on other seeds, so other "
-        "places. Two questions: contact and lift of every fall and bounce; which sphere, at its first contact. Beside "
-        "the neuron: the best of some plain rules, chosen on the training scenes (loaded taxels for contact and lift; "
-        "a threshold on area, total, peak or a ratio of them for the sphere), and a linear discriminant on the 16 x 16 "
-        "taxels above rest around the touch, as 5.6.2 takes them (on the whole array it learns places by heart), for "
-        "the sphere also one on the logarithms of area, total and peak; ridges chosen inside the training scenes."
-    ),
-    parameters=PARAMETERS,
-    sizes={
-        "toy": {
-            "parts": 1,
-            "train": 16,
-            "test": 8,
-            "train_contacts": 4,
-            "test_contacts": 3,
-            "times_ms": [1.0, 5.0, 10.0],
-        }
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    draw=draw,
-    tables=tables,
-)

@@ -1,4 +1,4 @@
-"""What studies of STDP share: thresholds by how often a neuron fires before it learns, and streams presented again."""
+"""Shared by studies of STDP: thresholds by how often a neuron fires before it learns, and streams presented again."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from taxel.spikes import SpikeTrains
 
 __all__ = ["moved", "threshold", "unlearning"]
 
-#: Halvings when a threshold is sought: to 1e-4 of it.
+#: Halvings in the search for a threshold: to 1e-4 of it.
 _HALVINGS = 16
 
 
 def moved(spikes: SpikeTrains, later_ms: float) -> SpikeTrains:
-    """Return the same spikes so much later."""
+    """Return the same spikes, later by a time."""
     return SpikeTrains(spikes.times + later_ms, spikes.offsets, spikes.start + later_ms, spikes.stop + later_ms)
 
 
@@ -26,7 +26,7 @@ def unlearning(level: float, taus: Mapping[str, float]) -> STDP:
 
 
 def threshold(spikes: SpikeTrains, hz: float, taus: Mapping[str, float]) -> float:
-    """Return the threshold at which a neuron that has learnt nothing fires so often, or a little less."""
+    """Return the threshold at which a neuron that has learnt nothing fires at this rate, or a little less."""
     low, high = 1e-3, float(len(spikes.offsets))
     for _ in range(_HALVINGS):
         middle = float(np.sqrt(low * high))

@@ -1,7 +1,7 @@
 """Wave trains and their noises (thesis 6.4.5 to 6.4.7): what figures 6.8 to 6.11 share.
 
 A pattern is one spike a train. A wave train repeats it with random gaps; the neuron shall fire once a repetition.
-Every draw comes from its own seed, so all thresholds, lambdas and learners meet the same noise.
+Every draw comes from its own seed, so all thresholds, lambdas and learners are tested with the same noise.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from taxel import learn
 from taxel.metrics import victor_purpura
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
+from taxel_studies.mapping import LEARN
 from taxel_studies.runner import Task
 from taxel_studies.study import Row
 
@@ -47,7 +48,6 @@ INPUTS, DURATION_MS, REPETITIONS = 200, 40.0, 30
 GAP_MS = (50.0, 100.0)
 #: Table 6.1 with the changes of 6.4.5; tau_rec is 2 tau in both tables. "reset": figures 6.9 to 6.11 need it.
 NEURON: dict[str, Any] = {"tau": 10.0, "theta_0": 0.3, "theta_plus": 0.0, "refractory": 3.0, "after_spike": "reset"}
-LEARN: dict[str, Any] = {"delta_t_ms": 1.5, "lb": -0.3, "ub": 0.3}
 #: Cost of a millisecond in the distance of Victor and Purpura.
 Q = 0.05
 #: Units of the noises, and the levels that are tested.
@@ -57,13 +57,13 @@ LEVELS: dict[str, tuple[float, ...]] = {
     "background": (0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30),
     "shunting": (0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30),
 }
-#: Of the noise that noisy training has.
+#: Level of the noise in noisy training.
 TRAINED_AT = 3.0
 
 #: What B is divided by.
 READINGS = {"targets": "B over the number of targets", "B_max": "B over B_max, as printed"}
 
-#: Parameters of what is trained and then tested under all noises (6.9, 6.10); of a run that takes seconds.
+#: Parameters of studies that train and then test under all noises (6.9, 6.10); the same at a size that takes seconds.
 TESTED: dict[str, Any] = {
     "realisations": 100,
     "readings": list(READINGS),
@@ -89,7 +89,7 @@ PROTOCOL = (
 
 @dataclass(frozen=True)
 class Waves:
-    """Hold a wave train: ``times`` of shape (repetitions, inputs), ms; ``targets``, ms; ``stop``, ms."""
+    """A wave train: ``times`` of shape (repetitions, inputs), ms; ``targets``, ms; ``stop``, ms."""
 
     times: NDArray[np.float64]
     targets: NDArray[np.float64]
@@ -205,7 +205,7 @@ def summarise(p: Mapping[str, Any], rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def why(reading: str) -> str:
-    """Say under which reading of B a statement was judged."""
+    """Name the reading of B under which a statement was judged."""
     return READINGS[reading] + (", which leaves kappa nearly powerless" if reading == "B_max" else "")
 
 
@@ -235,7 +235,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         ]
         for noise in noises
     }
-    found = []
+    results = []
     for setting in params["settings"]:
         cone = _fitted(params, setting, *training)
         neuron = cone.neuron_
@@ -246,8 +246,8 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
             ]
             for noise, tested in tests.items()
         }
-        found.append({"weights": [round(float(w), 6) for w in cone.weights_], "distance": distance})
-    return {"found": found}
+        results.append({"weights": [round(float(w), 6) for w in cone.weights_], "distance": distance})
+    return {"found": results}
 
 
 def _training(

@@ -1,4 +1,4 @@
-"""The study of codes: what it listens to, and that what is put in comes out."""
+"""The study of codes: the region that it reads, and that planted latencies are found."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 from taxel import Frames, ProblemError
 from taxel.encode import FA1
 from taxel.simulate.fem import Course, Indentation, KeptCourses, SamplingGrid, press
-from taxel_studies import contact, contact_choices, fig5_5, fig5_7, indented
+from taxel_studies import contact, contact_choices, fig5_5, fig5_7, indented, load
 from taxel_studies.runner import Task
 from taxel_studies.study import Row
 
@@ -58,7 +58,7 @@ def test_deeper_is_faster_along_one_course(course):
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "message"),
     [
         (lambda c: SamplingGrid(taxels=0), "taxels"),
         (lambda c: SamplingGrid(pitch_mm=0), "pitch_mm is 0: must be above 0"),
@@ -71,8 +71,8 @@ def test_deeper_is_faster_along_one_course(course):
         (lambda c: SamplingGrid(quantity="log").draw(c, 0.5, 1.0, 2), 'must be "nominal"'),
     ],
 )
-def test_nonsense_is_one_clear_error(course, make, said):
-    with pytest.raises(ProblemError, match=said):
+def test_nonsense_is_one_clear_error(course, make, message):
+    with pytest.raises(ProblemError, match=message):
         make(course)
 
 
@@ -92,16 +92,16 @@ def test_rasters_are_the_encoders_spikes(tmp_path, course):
         spikes = encoder.encode(Frames(values[sample][:, None, :], t, unit="kPa"))
         wanted = np.zeros((50, 25))
         for taxel in range(25):
-            said = spikes.values[spikes.offsets[taxel] : spikes.offsets[taxel + 1]]
-            wanted[np.round(spikes[taxel] / 2.0).astype(int) - 1, taxel] = said
+            message = spikes.values[spikes.offsets[taxel] : spikes.offsets[taxel + 1]]
+            wanted[np.round(spikes[taxel] / 2.0).astype(int) - 1, taxel] = message
         np.testing.assert_array_equal(x[4 + sample].reshape(50, 25), wanted)
     assert np.abs(x).max() > 1
 
 
 def test_a_condition_that_was_not_reached_is_left_out_and_named(tmp_path):
-    p = fig5_5.STUDY.set("toy")
+    p = load("fig5.5").set("toy")
     rows = []
-    for k, task in enumerate(fig5_5.tasks(p, tmp_path)):
+    for k, task in enumerate(fig5_5.tasks(p)):
         result = {"reached_mm": 0.3 if k == 0 else 0.5, "fault": "stopped at 0.3 mm" if k == 0 else "", "most_kpa": 4.0}
         rows.append(Row(task.params, task.seed, result))
     shared = indented.shared(p, rows)
@@ -112,22 +112,22 @@ def test_a_condition_that_was_not_reached_is_left_out_and_named(tmp_path):
 
 def test_a_course_without_equilibrium_is_said(tmp_path):
     """And no statement of Table 5.1 holds then."""
-    p = contact.STUDY.set("toy")
+    p = load("contact").set("toy")
     one = {**p["drawn"], "fault": "stopped at 0.3 mm: no equilibrium", "asymmetry": 0.3, "unbalanced": 0.0}
     one |= {"factorisations": 40, "cuts": 9}
     drawn = {"times": [[1.0]], "least_change": 1.2}
-    told = contact.statements(p, {"paths": [one], "conditions": 2, "sampled": drawn})[0]
-    assert told.holds is False
-    assert "stopped at 0.3 mm" in told.why
+    statement = contact.statements(p, {"paths": [one], "conditions": 2, "sampled": drawn})[0]
+    assert statement.holds is False
+    assert "stopped at 0.3 mm" in statement.why
 
 
-def test_alpha_is_searched_at_long_periods_then_around_the_best_at_short_ones(tmp_path):
+def test_alpha_is_searched_at_long_periods_then_around_the_best_at_short_ones():
     """`then` is asked until it lists nothing new; here with results that put the best alpha at 0.4."""
-    p = fig5_5.STUDY.set()
-    rows = [Row(t.params, t.seed, {"reached_mm": 2.0, "fault": "", "most_kpa": 9.0}) for t in fig5_5.tasks(p, tmp_path)]
+    p = load("fig5.5").set()
+    rows = [Row(t.params, t.seed, {"reached_mm": 2.0, "fault": "", "most_kpa": 9.0}) for t in fig5_5.tasks(p)]
     phases: list[list[Task]] = []
     known: set[str] = {Task(r.params, r.seed).key("") for r in rows}
-    while wanted := [t for t in fig5_5.then(p, rows, tmp_path) if t.key("") not in known]:
+    while wanted := [t for t in fig5_5.then(p, rows) if t.key("") not in known]:
         phases.append(wanted)
         for t in wanted:
             known.add(t.key(""))
@@ -146,14 +146,14 @@ def courses(tmp_path_factory):
 
 
 def rows_of(study, p, courses) -> list[Row]:
-    return [Row(t.params, t.seed, study.realise(t.params, t.seed, courses)) for t in study.tasks(p, courses)]
+    return [Row(t.params, t.seed, study.realise(t.params, t.seed, courses)) for t in study.tasks(p)]
 
 
 def test_fig5_7_with_one_bit_an_event_is_fig5_5(courses):
-    p, q = fig5_7.STUDY.set("toy"), fig5_5.STUDY.set("toy")
-    rows = rows_of(fig5_7.STUDY, p, courses)
-    mine = {t.params["period_ms"]: t for t in fig5_7.then(p, rows, courses) if t.params["event_bits"] == 1}
-    theirs = {t.params["period_ms"]: t for t in fig5_5.then(q, rows, courses) if t.params["alpha"] == p["alpha"]}
+    p, q = load("fig5.7").set("toy"), load("fig5.5").set("toy")
+    rows = rows_of(load("fig5.7"), p, courses)
+    mine = {t.params["period_ms"]: t for t in fig5_7.then(p, rows) if t.params["event_bits"] == 1}
+    theirs = {t.params["period_ms"]: t for t in fig5_5.then(q, rows) if t.params["alpha"] == p["alpha"]}
     assert sorted(mine) == sorted(theirs) == [10.0, 20.0]
     for period, task in mine.items():
         other = theirs[period]
@@ -161,9 +161,9 @@ def test_fig5_7_with_one_bit_an_event_is_fig5_5(courses):
 
 
 def test_the_beginning_of_a_contact_is_told_as_of_the_whole_one(courses):
-    """Sampled until 20 ms only, or all along and looked at until then: bits are the same."""
-    p = fig5_5.STUDY.set("toy")
-    shared = indented.shared(p, rows_of(fig5_5.STUDY, p, courses))
+    """Bits until 20 ms are the same whether samples end there or go on."""
+    p = load("fig5.5").set("toy")
+    shared = indented.shared(p, rows_of(load("fig5.5"), p, courses))
     asked = {**shared, "period_ms": 5.0, "alpha": 0.7, "even_ms": 0.0, "samples": 12, "times_ms": [10.0, 20.0]}
     whole = fig5_5.realise({**asked, "ask": "detail"}, 1, courses)
     part = fig5_5.realise({**asked, "ask": "part", "until_ms": 20.0}, 1, courses)
@@ -172,12 +172,12 @@ def test_the_beginning_of_a_contact_is_told_as_of_the_whole_one(courses):
 
 
 def test_contact_choices_begins_with_fig5_5_and_every_choice_changes_something(courses):
-    p, q = contact_choices.STUDY.set("toy"), fig5_5.STUDY.set("toy")
-    rows = rows_of(contact_choices.STUDY, p, courses)
-    mine = contact_choices.then(p, rows, courses)
+    p, q = load("contact_choices").set("toy"), load("fig5.5").set("toy")
+    rows = rows_of(load("contact_choices"), p, courses)
+    mine = contact_choices.then(p, rows)
     plain = next(t for t in mine if t.params["choice"] == "as it is" and t.params["period_ms"] == 10.0)
     own = [row for row in rows if row.params["course"]["height_mm"] == 5.0]
-    asked = fig5_5.then(q, own, courses)
+    asked = fig5_5.then(q, own)
     other = next(t for t in asked if t.params["period_ms"] == 10.0 and t.params["alpha"] == 0.7)
     found = contact_choices.realise(plain.params, plain.seed, courses)
     assert found["bits"] == pytest.approx(fig5_5.realise(other.params, other.seed, courses)["bits"], abs=0.05)

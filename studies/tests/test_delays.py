@@ -1,4 +1,4 @@
-"""The study of delays: what each arm hears, and that weights chosen among copies fire where they shall."""
+"""The study of delays: the inputs of each arm, and that weights chosen among copies fire at the targets."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from taxel_studies.capacity import patterns
 PARAMS = {"inputs": 40, "classes": 3, "longest_ms": 90.0, "time": "continuous", "arm": "none"}
 
 
-def heard(arm: str, seed: int = 3) -> list:
+def delayed(arm: str, seed: int = 3) -> list:
     return delays.delayed({**PARAMS, "arm": arm}, patterns(seed, 40, 4, 3)[0], seed)
 
 
 def test_random_delays_are_an_inputs_own_and_the_same_in_every_pattern() -> None:
-    plain, put_off = heard("none"), heard("random")
+    plain, put_off = delayed("none"), delayed("random")
     apart = np.array([b.times - a.times for a, b in zip(plain, put_off, strict=True)])
     assert np.allclose(apart, apart[0])
     assert (apart[0].min() >= 0.0, apart[0].max() <= 90.0, len(np.unique(apart[0]))) == (True, True, 40)
-    assert not np.allclose(apart[0], heard("random", seed=4)[0].times - heard("none", seed=4)[0].times)
+    assert not np.allclose(apart[0], delayed("random", seed=4)[0].times - delayed("none", seed=4)[0].times)
 
 
 def test_copies_are_spaced_evenly_up_to_the_longest() -> None:
-    for plain, copied in zip(heard("none"), heard("4 copies"), strict=True):
+    for plain, copied in zip(delayed("none"), delayed("4 copies"), strict=True):
         assert copied == plain.delayed([0.0, 30.0, 60.0, 90.0])
 
 
@@ -38,6 +38,6 @@ def test_what_l1_chooses_fires_at_the_targets_and_nowhere_else(arm: str) -> None
         fired = cone.neuron_.run(cone.weights_, pattern.between(0.0, 200.0))
         assert len(fired) == 1
         assert abs(fired[0] - target[0]) < 1e-6
-    told = delays.realise({**params, "asks": "weights", "share": 0.15}, 1)
-    assert told["weights"] == np.count_nonzero(np.abs(cone.weights_) > delays.NONE)
-    assert told["heard"] <= told["weights"] < len(cone.weights_)
+    result = delays.realise({**params, "asks": "weights", "share": 0.15}, 1)
+    assert result["weights"] == np.count_nonzero(np.abs(cone.weights_) > delays.NONE)
+    assert result["heard"] <= result["weights"] < len(cone.weights_)

@@ -12,7 +12,7 @@ from taxel.information.neighbours import distances_of
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
-from taxel_studies import dropped, drops, fig4_8, fig4_9, fig5_11
+from taxel_studies import dropped, drops, fig4_8, fig4_9, fig5_11, load
 from taxel_studies.dropped import FRAMES, REGION, TENNIS, Condition
 from taxel_studies.study import Row
 
@@ -75,7 +75,7 @@ def test_absolute_differences_are_those_of_metrics():
 
 
 def test_at_every_frame_the_events_are_the_boards(fallen):
-    """The encoder sees what the host holds; what it says is what the board said, event by event."""
+    """The encoder on the readings that the host holds gives the events that the board sent, one by one."""
     assert fallen.ticks.shape == (4, 1 + FRAMES, REGION * REGION)
     spikes = dropped.sampled(fallen.ticks, to_ms(FRAME_US), np.zeros(4))
     np.testing.assert_array_equal(spikes.sum((1, 2, 3)), fallen.events)
@@ -127,7 +127,7 @@ def test_a_ball_glances_off_along_the_rows_of_a_tilted_array_and_off_a_level_one
 
 
 def test_the_region_holds_the_impact_and_not_a_taxel_of_noise(fallen):
-    """The middle of what answered lies in the middle of the region, in all drops."""
+    """The middle of the taxels that respond lies in the middle of the region, in all drops."""
     risen = fallen.ticks.max(1).astype(int) - fallen.ticks[:, 0]
     x, y = np.arange(REGION * REGION) % REGION, np.arange(REGION * REGION) // REGION
     for one in risen:
@@ -144,18 +144,18 @@ def test_a_drop_that_nothing_answers_is_said(tmp_path):
 
 def test_none_is_its_own_neighbour():
     distances = np.array([[0.0, 1.0, 9.0], [1.0, 0.0, 9.0], [9.0, 9.0, 0.0]])
-    said = dropped.named_by_neighbours(distances, np.array([0, 1, 1]), 1)
-    np.testing.assert_array_equal(said, [1, 0, 0])
+    summary = dropped.named_by_neighbours(distances, np.array([0, 1, 1]), 1)
+    np.testing.assert_array_equal(summary, [1, 0, 0])
     assert not np.diag(distances).any()
 
 
-def test_search_first_then_details_at_each_periods_best(tmp_path):
-    p = fig5_11.STUDY.set("toy")
-    rows = [Row(t.params, t.seed, {}) for t in fig5_11.tasks(p, tmp_path)]
-    search = fig5_11.then(p, rows, tmp_path)
+def test_search_first_then_details_at_each_periods_best():
+    p = load("fig5.11").set("toy")
+    rows = [Row(t.params, t.seed, {}) for t in fig5_11.tasks(p)]
+    search = fig5_11.then(p, rows)
     assert [t.params["ask"] for t in search] == ["search"] * 4
     rows += [Row(t.params, t.seed, [2 - abs(t.params["tau_ms"] - 1.0)]) for t in search]
-    last = [t for t in fig5_11.then(p, rows, tmp_path) if t.params["ask"] != "search"]
+    last = [t for t in fig5_11.then(p, rows) if t.params["ask"] != "search"]
     assert [t.params["ask"] for t in last] == ["detail", "any phase", "detail", "any phase", "absolute"]
     assert {(t.params["tau_ms"], t.params["sigma_mm"]) for t in last} == {(1.0, 2.0)}
 
@@ -176,10 +176,10 @@ def test_a_tennis_ball_is_filmed_at_2_khz_around_the_first_taxel_that_answered(f
     film = dropped.pictures(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
     np.testing.assert_array_equal(film, tennis.ticks[:, 1:].astype(int) - tennis.ticks[:, :1].astype(int))
     middle = 17 * 8 + 8
-    assert (film[:, 0, middle] > 0).all()  # it answered in the impact's first frame
+    assert (film[:, 0, middle] > 0).all()  # it responded in the impact's first frame
     rise = film.sum(2)
     assert (rise.argmax(1) * TENNIS.frame_us < 12_000).all()
-    assert (rise[:, -1] < 0.3 * rise.max(1)).all()  # the ball is off again
+    assert (rise[:, -1] < 0.3 * rise.max(1)).all()  # the ball has left the array again
 
 
 def test_slower_films_hold_the_frames_before_their_times(tennis):
@@ -192,12 +192,12 @@ def test_slower_films_hold_the_frames_before_their_times(tennis):
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
-    """Both studies of a tennis ball leave their drops here, and share them."""
+    """The folder in which both studies of a tennis ball save and share their drops."""
     return tmp_path_factory.mktemp("tennis")
 
 
 def test_faster_films_of_a_tennis_ball_tell_more(report):
-    section = fig4_8.STUDY.run(report, size="toy", changes={"drops": 6}, quiet=True)
+    section = load("fig4.8").run(report, size="toy", changes={"drops": 6}, quiet=True)
     fast, slow = section["said"]["lines"]
     assert (fast["period_ms"], slow["period_ms"]) == (2.0, 40.0)
     assert fast["bits"] > slow["bits"] + 0.5
@@ -215,7 +215,7 @@ def test_own_neighbours_are_those_of_scikit_learn():
 
 
 def test_t_sne_lays_classes_that_differ_apart(report):
-    section = fig4_9.STUDY.run(
+    section = load("fig4.9").run(
         report, size="toy", changes={"drops": 6, "rates_hz": [1000.0], "perplexity": 4.0}, quiet=True
     )
     (line,) = section["said"]["lines"]
@@ -226,7 +226,7 @@ def test_t_sne_lays_classes_that_differ_apart(report):
 def test_without_its_package_a_study_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn", None)
     with pytest.raises(ProblemError, match=r'fig4.9: it needs sklearn: pip install "taxel\[studies\]"'):
-        fig4_9.STUDY.run(tmp_path, size="toy", quiet=True)
+        load("fig4.9").run(tmp_path, size="toy", quiet=True)
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_a_difference_of_a_few_drops_is_none(below, height, least, radius):
         }
 
     lines = [line(0.5, 3.9 - below, 1.0, 1.0), line(1.0, 3.9, 1.0, 1.0), line(20.0, 0.5, 0.1, 1.0 - height)]
-    found = fig5_11.statements(fig5_11.STUDY.set("toy"), {"lines": lines, "conditions": 18})
+    found = fig5_11.statements(load("fig5.11").set("toy"), {"lines": lines, "conditions": 18})
     holds = {
         one.says.split(":")[0]: one.holds for one in found if one.says.startswith(("Figure 5.11: most", "Figure 5.12"))
     }
@@ -261,12 +261,12 @@ def test_the_gain_above_100_hz_is_told_from_100_hz_itself_too():
     lines = [
         {"period_ms": t, "bits": b, "any_phase_bits": a} for t, b, a in [(1, 1.8, 1.7), (10, 1.6, 0.4), (20, 0.1, 0.2)]
     ]
-    said = {
+    summary = {
         "lines": lines,
         "conditions": 4,
         "sum": [[0.0, 0.0], [1.0, 9.0], [5.0, 0.0]],
         "middle": [0.0, 0.0],
         "full": 510,
     }
-    *_, gain = fig4_8.statements(fig4_8.STUDY.set("toy"), said)
+    *_, gain = fig4_8.statements(load("fig4.8").set("toy"), summary)
     assert gain.ours.endswith("from 100 Hz itself on +0.20, begun at any phase +1.30")

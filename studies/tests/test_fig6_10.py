@@ -1,10 +1,10 @@
-"""Figure 6.10: what is said of dense and sparse weights follows from the curves, whichever way they go."""
+"""Figure 6.10: the statements on dense and sparse weights follow from the curves, whichever way they go."""
 
 from __future__ import annotations
 
 import pytest
 
-from taxel_studies import fig6_10
+from taxel_studies import fig6_10, load
 
 
 @pytest.mark.parametrize("sparse_gains", [1.0, -1.0])
@@ -12,15 +12,15 @@ def test_the_verdict_is_of_the_levels_asked_about_and_turns_with_the_curves(spar
     levels = [0.0, 1.0, 2.0, 3.0]
     dense = [0.0, 1.0, 1.0, 9.0]
     curve = {"levels": levels, "mean": [dense, [d + sparse_gains for d in dense]]}
-    said = fig6_10._compared("Dense is better.", curve, "ms", True, (0.5, 2.0), "")
-    assert said.holds is (sparse_gains > 0)
-    assert f"1.00 dense (0 : 4), {1 + sparse_gains:.2f} sparse" in said.ours, "the level of 3 is not asked about"
-    assert "do not cross" in said.ours
+    summary = fig6_10._compared("Dense is better.", curve, "ms", True, (0.5, 2.0), "")
+    assert summary.holds is (sparse_gains > 0)
+    assert f"1.00 dense (0 : 4), {1 + sparse_gains:.2f} sparse" in summary.ours, "the level of 3 is not asked about"
+    assert "do not cross" in summary.ours
     other = fig6_10._compared("Sparse is better.", curve, "ms", False, (0.5, 2.0), "")
     assert other.holds is (sparse_gains < 0)
 
 
 def test_every_ratio_of_norms_is_run_in_both_trainings() -> None:
-    p = fig6_10.STUDY.set("toy")
+    p = load("fig6.10").set("toy")
     ratios = {tuple(t.params["lambdas"][:2]) for t in fig6_10.tasks(p) if "lambdas" in t.params}
     assert not ratios or ratios == {tuple(map(float, ratio)) for ratio in p["ratios"]}

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 
-from taxel_studies import fig6_7
+from taxel_studies import fig6_7, load
 from taxel_studies.study import Row
 
 
 def test_each_line_holds_the_loads_of_its_own_searches_in_the_order_of_inputs() -> None:
-    p = fig6_7.STUDY.set("toy", inputs=[20, 50], classes=[2, 3])
+    p = load("fig6.7").set("toy", inputs=[20, 50], classes=[2, 3])
     tasks = fig6_7.tasks(p)
     keys = [tuple(t.params[k] for k in ("after_spike", "time", "classes", "inputs")) for t in tasks]
     assert sorted(keys) == sorted(itertools.product(p["readings"], p["times"], p["classes"], p["inputs"]))

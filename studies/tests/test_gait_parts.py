@@ -157,23 +157,23 @@ def walking() -> Piece:
     return piece("h/1", on, off, [120.0, 610.0])
 
 
-def said(rule: str, numbers: dict, event: str = "contact", **changed) -> list[float]:
+def detected(rule: str, numbers: dict, event: str = "contact", **changed) -> list[float]:
     options = {"levels": 1, "channels": None, "sum_name": "total", "dead_ms": 100.0} | changed
     return rules.detection_times(rule, numbers, walking(), event, **options).tolist()
 
 
 def test_a_counter_that_remembers_says_when_enough_sensors_are_on():
-    assert said("state", {"count": 2, "release": 0}) == [120.0, 610.0]
-    assert said("state", {"count": 1, "release": 0}) == [100.0, 600.0]
+    assert detected("state", {"count": 2, "release": 0}) == [120.0, 610.0]
+    assert detected("state", {"count": 1, "release": 0}) == [100.0, 600.0]
 
 
 def test_a_counter_says_lift_when_enough_sensors_are_off():
-    assert said("state", {"count": 2, "release": 0}, "foot_off") == [350.0, 805.0]
-    assert said("state", {"count": 2, "release": 1}, "foot_off") == [300.0, 800.0]
+    assert detected("state", {"count": 2, "release": 0}, "foot_off") == [350.0, 805.0]
+    assert detected("state", {"count": 2, "release": 1}, "foot_off") == [300.0, 800.0]
 
 
 def test_a_counter_hears_only_its_sensors():
-    assert said("state", {"count": 1, "release": 0}, channels=np.array([1])) == [120.0, 610.0]
+    assert detected("state", {"count": 1, "release": 0}, channels=np.array([1])) == [120.0, 610.0]
 
 
 def test_a_counter_knows_what_was_on_before_it_listened():
@@ -186,9 +186,9 @@ def test_a_counter_knows_what_was_on_before_it_listened():
 
 
 def test_a_spike_counter_needs_its_spikes_within_the_window():
-    assert said("spikes", {"window_ms": 30.0, "count": 2}) == [120.0, 610.0]
-    assert said("spikes", {"window_ms": 15.0, "count": 2}) == [610.0]
-    assert said("spikes", {"window_ms": 15.0, "count": 1}, dead_ms=0.0) == [100.0, 120.0, 600.0, 610.0]
+    assert detected("spikes", {"window_ms": 30.0, "count": 2}) == [120.0, 610.0]
+    assert detected("spikes", {"window_ms": 15.0, "count": 2}) == [610.0]
+    assert detected("spikes", {"window_ms": 15.0, "count": 1}, dead_ms=0.0) == [100.0, 120.0, 600.0, 610.0]
 
 
 def test_a_sum_has_its_threshold_and_its_release():
@@ -209,6 +209,6 @@ def test_a_sum_has_its_threshold_and_its_release():
 def test_every_point_of_a_grid_is_one_that_can_be_said():
     for rule in rules.RULES:
         for numbers in rules.grid(rule, levels=1, channels=2, largest=10.0):
-            times = said(rule, numbers)
+            times = detected(rule, numbers)
             assert times == sorted(times), (rule, numbers)
             assert np.isfinite(times).all(), (rule, numbers)

@@ -89,23 +89,23 @@ def rows(section: Section, source: str, event: str) -> dict[str, dict]:
 
 
 def test_a_toy_study_has_all_its_rows_and_finds_easy_steps(ran):
-    _, said = ran
-    assert said["said"]["skipped"] == ["insole_gaitndd", "insole_moticon", "pressure_formats"]
-    contact = rows(said, "gaitpdb", "contact")
+    _, section = ran
+    assert section["said"]["skipped"] == ["insole_gaitndd", "insole_moticon", "pressure_formats"]
+    contact = rows(section, "gaitpdb", "contact")
     assert {"notes", "chosen", "printed", "tonic", "rule: spikes", "rule: state", "rule: level"} == set(contact)
     assert contact["notes"]["figures"]["events"] >= 70
     assert contact["notes"]["figures"]["found_percent"] >= 95
     assert contact["chosen"]["figures"]["found_percent"] >= 95
     assert contact["printed"]["figures"]["false"] > 10 * contact["notes"]["figures"]["false"]
-    footfall = rows(said, "plate", "contact")
+    footfall = rows(section, "plate", "contact")
     assert {"notes", "chosen", "printed", "others", "rule: spikes", "rule: state", "rule: level"} == set(footfall)
     assert footfall["notes"]["figures"]["events"] == 15
     assert footfall["notes"]["figures"]["missed"] <= 1
 
 
 def test_every_figure_adds_up(ran):
-    _, said = ran
-    for source in said["said"]["sources"]:
+    _, section = ran
+    for source in section["said"]["sources"]:
         for row in source["protocols"][0]["rows"]:
             f = row["figures"]
             assert f["found"] + f["missed"] == f["events"]
@@ -191,10 +191,10 @@ def test_other_people_are_judged_by_all_of_these(data, tmp_path):
     other = tmp_path / "other"
     (other / "insole_gaitpdb").mkdir(parents=True)
     walker(other / "insole_gaitpdb", "SiPt99", 9)
-    said = study(data, tmp_path / "report", test=str(other))
-    assert said["said"]["judged"] == "on another folder"
-    assert said["said"]["skipped"] == ["plate", "insole_gaitndd", "insole_moticon", "pressure_formats"]
-    contact = rows(said, "gaitpdb", "contact")
+    section = study(data, tmp_path / "report", test=str(other))
+    assert section["said"]["judged"] == "on another folder"
+    assert section["said"]["skipped"] == ["plate", "insole_gaitndd", "insole_moticon", "pressure_formats"]
+    contact = rows(section, "gaitpdb", "contact")
     assert set(contact["chosen"]["by_person"]) == {"SiPt99"}
     assert contact["chosen"]["figures"]["found_percent"] >= 90
     assert contact["chosen"]["goal"]["found_percent"] == 98.0
@@ -215,9 +215,9 @@ def test_ctrl_c_stops_the_command_and_the_next_run_goes_on(data, tmp_path):
         process.kill()
         process.wait()
     done = len(lines.read_text().splitlines())
-    said = study(data, tmp_path, sources=["gaitpdb"])
+    section = study(data, tmp_path, sources=["gaitpdb"])
     assert len(lines.read_text().splitlines()) >= done
-    assert rows(said, "gaitpdb", "contact")["notes"]["figures"]["found_percent"] >= 95
+    assert rows(section, "gaitpdb", "contact")["notes"]["figures"]["found_percent"] >= 95
 
 
 def test_no_list_of_points_is_longer_than_24():
@@ -240,7 +240,7 @@ def test_a_goal_is_met_only_where_every_part_of_it_is():
 
 
 @pytest.mark.parametrize(
-    ("changes", "error", "said"),
+    ("changes", "error", "message"),
     [
         ({"search": "all"}, ProblemError, "search is 'all'"),
         ({"sources": ["emed"]}, ProblemError, "sources is 'emed'"),
@@ -255,8 +255,8 @@ def test_a_goal_is_met_only_where_every_part_of_it_is():
         ),
     ],
 )
-def test_nonsense_is_refused(data, tmp_path, changes, error, said):
-    with pytest.raises(error, match=said):
+def test_nonsense_is_refused(data, tmp_path, changes, error, message):
+    with pytest.raises(error, match=message):
         study(data, tmp_path, **changes)
     assert not (tmp_path / "gait" / "results.jsonl").exists()
 
@@ -273,17 +273,17 @@ def test_too_few_people_to_choose_inside_are_said(data, tmp_path):
     (few / "insole_gaitpdb").mkdir(parents=True)
     for name in ("GaCo90", "GaPt90"):
         (few / "insole_gaitpdb" / f"{name}_01.txt").symlink_to(data / "insole_gaitpdb" / f"{name}_01.txt")
-    said = study(few, tmp_path / "report")
-    assert "gaitpdb, people left out: chosen inside (too few people)" in said["said"]["skipped"]
-    assert "chosen" not in rows(said, "gaitpdb", "contact")
+    section = study(few, tmp_path / "report")
+    assert "gaitpdb, people left out: chosen inside (too few people)" in section["said"]["skipped"]
+    assert "chosen" not in rows(section, "gaitpdb", "contact")
 
 
 def test_one_person_alone_is_said(data, tmp_path):
     (tmp_path / "plate").mkdir()
     (tmp_path / "plate" / "subj900.h5").symlink_to(data / "plate" / "subj900.h5")
-    said = study(tmp_path, tmp_path / "report")["said"]
-    assert said["skipped"][-1] == "plate (too few people or recordings)"
-    assert said["sources"] == []
+    summary = study(tmp_path, tmp_path / "report")["said"]
+    assert summary["skipped"][-1] == "plate (too few people or recordings)"
+    assert summary["sources"] == []
 
 
 @pytest.fixture
@@ -307,10 +307,10 @@ def test_a_file_that_cannot_be_read_is_left_out_and_said(ran, damaged, tmp_path,
     out = capsys.readouterr().out
     assert "left out: insole_gaitpdb/GaPt99_01.txt: line" in out
     assert "left out: pressure_formats/pliance.asc: no line of column names" in out
-    said = json.loads((tmp_path / "report" / "gait" / "summary.json").read_text())
-    assert list(said["unread"]) == ["insole_gaitpdb/GaPt99_01.txt", "pressure_formats/pliance.asc"]
+    section = json.loads((tmp_path / "report" / "gait" / "summary.json").read_text())
+    assert list(section["unread"]) == ["insole_gaitpdb/GaPt99_01.txt", "pressure_formats/pliance.asc"]
     assert "pliance.asc" in (tmp_path / "report" / "index.html").read_text()
-    found, whole = (rows(s, "gaitpdb", "contact")["notes"]["figures"] for s in (said, ran[1]))
+    found, whole = (rows(s, "gaitpdb", "contact")["notes"]["figures"] for s in (section, ran[1]))
     assert found == whole, "the people that can be read are judged as if the others were not there"
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from tests.formats.making import write_icub, write_popu
 
-from taxel_studies.information import STUDY, grasps, postures
+from taxel_studies import load
+from taxel_studies.information import grasps, postures
 
 
 @pytest.fixture
@@ -36,7 +37,7 @@ def data(tmp_path):
 def test_what_is_known_comes_out(data):
     common = {"slices": [1, 4], "draws": 1, "shuffles": 3, "most_trials": 0}
     hand = grasps.realise({"ask": "object", **common}, 1, data / "touch_icub_grasp")
-    assert hand["first"]["bits"] > 1.5  # the warning: drift alone names it
+    assert hand["first"]["bits"] > 1.5  # as the study warns, drift alone reveals the object
     assert hand["events"][0]["bits"] < 0.4  # nothing has changed yet
     assert hand["events"][1]["bits"] > 1.5
     assert hand["length"]["bits"] < 0.1
@@ -50,7 +51,9 @@ def test_what_is_known_comes_out(data):
 
 
 def test_it_leaves_a_section_with_statements_tables_and_pictures(data, tmp_path):
-    section = STUDY.run(tmp_path / "report", size="toy", changes={"mat_taxels": [8]}, data=data, quiet=True)
+    section = load("information").run(
+        tmp_path / "report", size="toy", changes={"mat_taxels": [8]}, data=data, quiet=True
+    )
     assert {s["holds"] for s in section["statements"]} == {None}  # toy size is never judged
     assert [t["title"].split(":")[0] for t in section["tables"]] == ["hand, object", "mat, posture"]
     assert sorted(p.name for p in (tmp_path / "report" / "information").glob("*.svg")) == [

@@ -1,4 +1,4 @@
-"""What is kept for the page of figures names the commit that ran it, or is not kept."""
+"""Figures saved for the page name the commit that ran them, or are not saved."""
 
 import importlib.util
 import json
@@ -35,7 +35,7 @@ def report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_commit_is_named_where_its_code_ran_the_study(report: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(figures, "git", lambda *said: "" if said[0] == "status" else "1234abc")
+    monkeypatch.setattr(figures, "git", lambda *arguments: "" if arguments[0] == "status" else "1234abc")
     figures.keep(report)
     assert json.loads((report / "kept" / "fig6.1.json").read_text())["commit"] == "1234abc"
 
@@ -43,7 +43,7 @@ def test_the_commit_is_named_where_its_code_ran_the_study(report: Path, monkeypa
 def test_a_report_of_other_code_or_of_uncommitted_code_is_not_kept(
     report: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(figures, "git", lambda *said: " M python/taxel/neuron.py")
+    monkeypatch.setattr(figures, "git", lambda *arguments: " M python/taxel/neuron.py")
     with pytest.raises(SystemExit, match="not committed"):
         figures.keep(report)
     summary = report / "fig6.1" / "summary.json"
@@ -61,7 +61,7 @@ def test_statements_are_judged_from_the_numbers_that_stand_beside_them(file: Pat
 
 @pytest.mark.parametrize("file", sorted(figures.FIGURES.glob("*.json")), ids=lambda file: file.stem)
 def test_bars_begin_at_zero(file: Path) -> None:
-    """A bar's length is what is read of it."""
+    """The length of a bar is its value only where bars begin at 0."""
     section = json.loads(file.read_text())
     drawn = load(file.stem).draw(section["parameters"], section["said"])
     for axes in (axes for figure in (drawn if isinstance(drawn, Sequence) else [drawn]) for axes in figure.axes):

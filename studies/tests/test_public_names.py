@@ -28,7 +28,7 @@ def is_module(name: str) -> bool:
 
 
 def wrong(source: str, taken: str) -> str | None:
-    """Say what is wrong with taking a name from a module of taxel; None where it is public."""
+    """Return why a name must not be imported from a module of taxel; None where it is public."""
     if any(part.startswith("_") and not part.startswith("__") for part in (*source.split("."), taken)):
         return f"{source}.{taken} is private"
     module: ModuleType = import_module(source)
@@ -53,7 +53,7 @@ def test_a_study_takes_public_names_of_taxel_alone(file: Path) -> None:
             # A named tuple's own methods have such names.
             named = node.attr in ("_replace", "_asdict", "_fields", "_make")
             found += [] if own or named else [f"line {node.lineno}: {ast.unparse(node)}"]
-    assert [said for said in found if said] == []
+    assert [why for why in found if why] == []
 
 
 def test_what_is_private_or_unnamed_is_found() -> None:

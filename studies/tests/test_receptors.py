@@ -1,4 +1,4 @@
-"""The study of receptors: thresholds against a count of spikes, and what published curves say of each type."""
+"""The study of receptors: thresholds against a count of spikes, and the published curve of each type."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def test_a_threshold_is_where_every_cycle_has_a_spike_and_hardly_moves_with_the_
 
 
 def test_each_type_fires_in_its_phases() -> None:
-    said = {
+    summary = {
         kind: [receptors.phases(kind, ramp, 0.2) for ramp in (5.0, 200.0)] for kind in receptors.PARAMETERS["kinds"]
     }
     for kind in ("SA-1", "SA-2"):
-        assert all(hold > 5 and before == after == 0 for before, _, hold, _, after in said[kind])
+        assert all(hold > 5 and before == after == 0 for before, _, hold, _, after in summary[kind])
     # FA-1's raised threshold may hold a change back, and let it fire late.
-    assert all(min(rise, fall) > 5 and hold <= 1 for _, rise, hold, fall, _ in said["FA-1"])
-    assert min(said["FA-2"][0][1], said["FA-2"][0][3]) > 0
-    assert said["FA-2"][0][2] == 0
-    assert sum(said["FA-2"][1]) == 0
+    assert all(min(rise, fall) > 5 and hold <= 1 for _, rise, hold, fall, _ in summary["FA-1"])
+    assert min(summary["FA-2"][0][1], summary["FA-2"][0][3]) > 0
+    assert summary["FA-2"][0][2] == 0
+    assert sum(summary["FA-2"][1]) == 0

@@ -7,8 +7,8 @@ import pytest
 
 from taxel import ProblemError
 from taxel.learn import INST
-from taxel_studies import load
-from taxel_studies.rivals import comparison, protocols
+from taxel_studies import load, rivals
+from taxel_studies.rivals import protocols
 from taxel_studies.rivals.protocols import gardner_gruning, realise, share_right, thesis
 from taxel_studies.rivals.rules import CHOSEN_ON, RULES, learner
 
@@ -75,8 +75,8 @@ def test_the_search_ends_at_the_largest_load_that_holds(monkeypatch, most, begin
 
 def test_the_crossing_of_90_percent_lies_between_the_loads_around_it():
     tried = [[25, 20, 0.96, 17], [30, 20, 0.88, 9]]
-    assert comparison._at_90(tried, 200) == pytest.approx((25 + 5 * 0.06 / 0.08) / 200, abs=1e-4)
-    assert comparison._at_90([[5, 20, 0.5, 1]], 200) is None
+    assert rivals._at_90(tried, 200) == pytest.approx((25 + 5 * 0.06 / 0.08) / 200, abs=1e-4)
+    assert rivals._at_90([[5, 20, 0.5, 1]], 200) is None
 
 
 def test_a_toy_run_leaves_a_summary_and_is_not_reckoned_again(tmp_path):

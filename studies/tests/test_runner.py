@@ -1,4 +1,4 @@
-"""The runner of studies: each result once, whatever stops it."""
+"""The runner of studies: each result is computed once, however a run ends."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def test_a_backend_that_is_not_installed_names_its_extra(monkeypatch, backend):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         ({"jobs": 0}, "jobs is 0"),
         ({"jobs": "two"}, "jobs is 'two'"),
@@ -173,8 +173,8 @@ def test_a_backend_that_is_not_installed_names_its_extra(monkeypatch, backend):
         ({"scheduler": "tcp://127.0.0.1:9"}, "scheduler is for the backends"),
     ],
 )
-def test_nonsense_about_workers_is_refused(arguments, said):
-    with pytest.raises(ProblemError, match=said):
+def test_nonsense_about_workers_is_refused(arguments, message):
+    with pytest.raises(ProblemError, match=message):
         Workers(**arguments)
 
 

@@ -46,6 +46,6 @@ def test_no_input_is_silent_for_longer_than_the_pattern() -> None:
 def test_pieces_hold_all_spikes_once() -> None:
     p = {**SMALL, "seconds": 3}
     spikes, _ = stdp.part(p, np.random.default_rng(3))
-    said = list(stdp.pieces(p, spikes, 5000.0))
-    assert [(one.start, one.stop) for one in said] == [(5000 + 1000 * k, 6000 + 1000 * k) for k in range(3)]
-    assert sum(len(one.times) for one in said) == len(spikes[0])
+    result = list(stdp.pieces(p, spikes, 5000.0))
+    assert [(one.start, one.stop) for one in result] == [(5000 + 1000 * k, 6000 + 1000 * k) for k in range(3)]
+    assert sum(len(one.times) for one in result) == len(spikes[0])

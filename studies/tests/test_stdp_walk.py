@@ -31,17 +31,18 @@ def foot(seed=1, jitter_ms=3.0, pattern=True):
 
 
 def test_it_finds_the_steps_of_a_made_up_foot_without_labels():
-    said = stdp_walk.train_and_test(foot(), stdp_walk.PARAMETERS)
-    assert stdp_walk.found(said["learnt"])
-    assert said["learnt"]["once"] > 0.9
-    assert -10 < said["learnt"]["phase_ms"] < 80
-    assert said["learnt"]["strides"] == pytest.approx(STEPS / 2, abs=2)
-    assert 5 < said["strong"] <= TRAINS // 2
+    result = stdp_walk.train_and_test(foot(), stdp_walk.PARAMETERS)
+    assert stdp_walk.finds_stride(result["learnt"])
+    assert result["learnt"]["once"] > 0.9
+    assert -10 < result["learnt"]["phase_ms"] < 80
+    assert result["learnt"]["strides"] == pytest.approx(STEPS / 2, abs=2)
+    assert 5 < result["strong"] <= TRAINS // 2
 
 
 def test_where_nothing_repeats_there_is_nothing_to_find():
     for seed in range(3):
-        assert not stdp_walk.found(stdp_walk.train_and_test(foot(seed, pattern=False), stdp_walk.PARAMETERS)["learnt"])
+        result = stdp_walk.train_and_test(foot(seed, pattern=False), stdp_walk.PARAMETERS)
+        assert not stdp_walk.finds_stride(result["learnt"])
 
 
 @pytest.mark.parametrize("hz", [0.1, 1.0])
@@ -57,9 +58,9 @@ def test_a_threshold_is_the_least_at_which_a_neuron_fires_so_often(hz):
 
 def test_spikes_are_told_by_stride_and_pauses_are_none():
     contacts = np.array([0.0, 1000.0, 2000.0, 5000.0, 6000.0, 7000.0])
-    counts, told, length = stdp_walk.phases(np.array([100.0, 1250.0, 1500.0, 3000.0, 6900.0]), contacts, 0.0, 8000.0)
+    counts, phased, length = stdp_walk.phases(np.array([100.0, 1250.0, 1500.0, 3000.0, 6900.0]), contacts, 0.0, 8000.0)
     np.testing.assert_array_equal(counts, [1, 2, 0, 1])  # the pause from 2 to 5 s is no stride
-    assert told == [(100.0, 0.1), (1250.0, 0.25), (1500.0, 0.5), (6900.0, 0.9)]
+    assert phased == [(100.0, 0.1), (1250.0, 0.25), (1500.0, 0.5), (6900.0, 0.9)]
     assert length == 1000.0
 
 
@@ -67,6 +68,6 @@ def test_spikes_just_before_contact_wander_as_little_as_those_just_after():
     piece = foot(3)
     contacts = piece.truth["contact"]
     for later in (-30.0, 30.0):
-        said = stdp_walk.judged(contacts + later, piece, 0.0)
-        assert said["phase_ms"] == pytest.approx(later, abs=2)
-        assert said["wanders_ms"] < 5
+        result = stdp_walk.judged(contacts + later, piece, 0.0)
+        assert result["phase_ms"] == pytest.approx(later, abs=2)
+        assert result["wanders_ms"] < 5

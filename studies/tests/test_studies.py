@@ -87,7 +87,7 @@ def test_a_second_run_reckons_nothing_again_and_says_the_same(report, name):
 def test_a_realisation_is_a_pure_function_of_parameters_and_seed(name, courses):
     study = load(name)
     given = {"courses": courses} if study.courses else {}
-    tasks = study.tasks(study.set("toy"), **given)
+    tasks = study.tasks(study.set("toy"))
     task = tasks[-1]
     first = json.dumps(study.realise(task.params, task.seed, **given))
     study.realise(tasks[0].params, tasks[0].seed, **given)
@@ -96,7 +96,7 @@ def test_a_realisation_is_a_pure_function_of_parameters_and_seed(name, courses):
 
 
 class Page(HTMLParser):
-    """Collects what a page refers to and says."""
+    """Collects the references and the text of a page."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -149,8 +149,8 @@ def test_a_page_shows_the_kept_picture_of_numbers_that_the_code_cannot_draw_any_
 
 def test_the_command_prints_the_statements_and_where_the_page_is(small, tmp_path, capsys):
     assert ends(small) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "index.html" in said
+    message = " ".join(capsys.readouterr().out.split())
+    assert "index.html" in message
     assert (tmp_path / "index.html").exists()
 
 
@@ -162,7 +162,7 @@ def test_the_command_prints_json(small, capsys):
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "message"),
     [
         (["--size", "huge"], "size is 'huge'"),
         (["--set", "kapa=1"], "fig6.11 has no parameter 'kapa': there are"),
@@ -174,10 +174,10 @@ def test_the_command_prints_json(small, capsys):
         (["--scheduler", "tcp://127.0.0.1:1"], "scheduler is for the backends"),
     ],
 )
-def test_nonsense_ends_in_one_line(small, capsys, more, said):
+def test_nonsense_ends_in_one_line(small, capsys, more, message):
     assert ends([*small, *more]) == 2
     error = capsys.readouterr().err
-    assert said in error
+    assert message in error
     assert error.count("\n") == 1
 
 

@@ -7,11 +7,14 @@ import json
 import pkgutil
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import taxel_studies as studies
+from taxel import ProblemError
 from taxel.cli import main
+from taxel_studies.study import Study
 
 HERE = Path(__file__).parent
 
@@ -36,7 +39,7 @@ def named() -> set[str]:
 
 def test_every_file_with_a_study_is_in_the_registry() -> None:
     files = [m.name for m in pkgutil.iter_modules(studies.__path__)]
-    there = {name for name in files if hasattr(import_module(f"taxel_studies.{name}"), "STUDY")}
+    there = {name for name in files if hasattr(import_module(f"taxel_studies.{name}"), "WHERE")}
     missing = sorted(there - {module(name) for name in studies.STUDIES})
     assert not missing, f"taxel_studies/__init__.py: STUDIES lacks {', '.join(missing)}"
 
@@ -51,10 +54,16 @@ def test_a_study_has_a_test_of_its_own(name: str) -> None:
 @pytest.mark.parametrize("name", studies.STUDIES)
 def test_a_study_says_what_it_is(name: str) -> None:
     study = studies.load(name)
-    assert study.name == name
-    assert study.title == studies.STUDIES[name]
+    assert (study.name, study.title) == (name, studies.STUDIES[name])
     assert "toy" in study.sizes
     assert min(len(study.where), len(study.protocol)) > 10
+
+
+def test_a_module_that_is_no_study_is_refused_and_what_it_lacks_is_named() -> None:
+    module = ModuleType("taxel_studies.half")
+    vars(module).update(WHERE="ours", PARAMETERS={}, SIZES={}, tasks=list, realise=int, statements=list, draw=list)
+    with pytest.raises(ProblemError, match=r"taxel_studies\.half is no study: it lacks PROTOCOL, summarise"):
+        Study.of("half", "half a study", module)
 
 
 def test_every_kept_figure_lies_beside_its_numbers() -> None:
@@ -87,9 +96,9 @@ def test_a_figure_runs_the_study_that_holds_it_and_says_so(tmp_path: Path, capsy
     with pytest.raises(SystemExit) as ended:
         main(["study", "table6.1", "--size", "toy", "--report", str(tmp_path), "--json"])
     assert not ended.value.code
-    said = capsys.readouterr()
-    assert said.err == "table6.1 is held by the study fig6.1\n"
-    assert json.loads(said.out)["name"] == "fig6.1"
+    output = capsys.readouterr()
+    assert output.err == "table6.1 is held by the study fig6.1\n"
+    assert json.loads(output.out)["name"] == "fig6.1"
 
 
 def test_a_figure_that_is_a_drawing_says_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""The study of touch: its parts against what is known, and the recipe that it shows."""
+"""The study of touch: its parts on cases with known answers, and the recipe that it shows."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_the_picture_around_a_touch_has_its_centre_in_the_middle_and_nothing_bey
     values = np.zeros((3, 20, 40))
     values[0, 3:6, 30:33] = 9.0
     values[1, 0, 0] = 9.0
-    values[2, 10, 20] = 3.0  # not loaded: the middle of the array is taken
+    values[2, 10, 20] = 3.0  # not loaded: the middle of the array is used
     inside, corner, nothing = touch._around([taxel.Frames(values, [0, 1, 2], unit="ticks")]).reshape(3, 16, 16)
     assert np.argwhere(inside).mean(axis=0).tolist() == [8.0, 8.0]
     assert np.count_nonzero(inside) == 9
@@ -67,9 +67,9 @@ def test_the_best_rule_is_the_feature_that_differs() -> None:
     rng = np.random.default_rng(2)
     kinds = np.arange(40) % 2
     sets = [[felt(20 + 30 * kind + rng.normal(0, 2)) for kind in kinds] for _ in range(2)]
-    name, said = touch._best_rule(sets, kinds)
+    name, answers = touch._best_rule(sets, kinds)
     assert "peak" in name or "total" in name
-    assert (said == kinds).all()
+    assert (answers == kinds).all()
 
 
 def test_scenes_come_back_from_their_files_with_their_labels(tmp_path) -> None:
@@ -80,9 +80,9 @@ def test_scenes_come_back_from_their_files_with_their_labels(tmp_path) -> None:
         assert trial.example.labels["contact"].tolist() == [round(c.start_us) for c in trial.contacts]
         assert trial.example.labels["lift"].tolist() == [round(c.stop_us) for c in trial.contacts]
         assert (trial.events.t <= trial.contacts[-1].stop_us + touch.AFTER_US).all()
-    told = touch._tally([touch._by_area(trial, 2) for trial in trials], trials, 10.0)
-    assert told["contact"]["missed"] == told["lift"]["missed"] == 0
-    assert abs(np.median(told["contact"]["error_ms"])) < 2.0
+    tally = touch._tally([touch._by_area(trial, 2) for trial in trials], trials, 10.0)
+    assert tally["contact"]["missed"] == tally["lift"]["missed"] == 0
+    assert abs(np.median(tally["contact"]["error_ms"])) < 2.0
     (tmp_path / "again").mkdir()
     assert touch.drawn(params, 5, 1, tmp_path / "again")[0].events == trials[0].events
 

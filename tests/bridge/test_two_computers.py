@@ -60,7 +60,7 @@ def two():
             pytest.skip("no virtual cable here")
         for name, *addresses in ((near, BOARD, BOARD_6), (far, FAR, FAR_6)):
             ip("-n", name, "addr", "add", f"{addresses[0]}/24", "dev", "cable")
-            # Without IPv6 the tests of it are left out.
+            # On a machine without IPv6 its tests are skipped.
             ip("-n", name, "-6", "addr", "add", f"{addresses[1]}/64", "dev", "cable", "nodad", check=False)
             for link in ("lo", "cable"):
                 ip("-n", name, "link", "set", link, "up")

@@ -89,12 +89,12 @@ def test_the_parts_of_a_delay_sum_to_it():
         begin = math.ceil(stamp / FRAME_US) * FRAME_US
         physics = (begin - contact.start_us) / 1000
         assert -0.2 < physics < delay
-        assert evaluation.found.known[evaluation.found.label == "contact"][said] >= begin + FRAME_US - 1
+        assert evaluation.detections.known[evaluation.detections.label == "contact"][said] >= begin + FRAME_US - 1
 
 
 def test_noise_alone_says_nothing():
     quiet = evaluate_acts([Silence(5_050.3)], shipped(), seed=8)
-    assert len(quiet.found) == 0
+    assert len(quiet.detections) == 0
     assert len(quiet.plain) == 0
     assert 20 < len(quiet.events) / 5 < 400
 
@@ -152,7 +152,7 @@ def test_in_real_time_the_board_is_a_process_of_its_own_and_its_recording_says_t
     host, board = values["host"], values["board"]
     assert board["bytes"] == host["wire"]["bytes"]
     assert host["events"] == host["read_out"] + host["events_dropped"]
-    # On a machine that is busy, events come after the readout's time has moved on: then they are counted.
+    # On a busy machine, events arrive after the readout's time has passed them; these are counted as late.
     found = values["neuron"]["classes"]["first impact"]["contact"]["found"]
     assert (values["recording_agrees"] and found == 2) or host["late"] > 0, (found, host)
     shutil.rmtree(tmp_path / folder)

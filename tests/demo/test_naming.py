@@ -9,14 +9,14 @@ import pytest
 
 from taxel.demo import naming
 from taxel.demo.evaluation import evaluate_acts
-from taxel.demo.naming import ANSWERED_MS, LOOKED_MS, QUESTIONS, Drops, named, shipped_drops
+from taxel.demo.naming import ANSWERED_MS, LOOKED_MS, QUESTIONS, Drops, estimates, shipped_drops
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.demo.shipped import shipped
 from taxel.simulate import Scene, Silence
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 
-#: Drops of a board in the shipped set, and of three boards.
+#: Number of drops for one board of the shipped set, and for three boards.
 BOARD, FOLD = naming._DROPS, 3 * naming._DROPS
 
 
@@ -83,7 +83,7 @@ def test_the_middle_moves_down_the_slant_and_not_on_a_level_array():
 
 def test_each_drop_of_a_play_is_named_and_judged(evaluation):
     scenes = [act for act in script(23, 3) if isinstance(act, Scene)]
-    found = named(evaluation, scenes)
+    found = estimates(evaluation, scenes)
     assert [drop["true"]["height"] for drop in found["drops"]] == [
         s.parameters["bodies"][0]["motion"]["dropped"]["height_mm"] for s in scenes
     ]
@@ -97,15 +97,15 @@ def test_each_drop_of_a_play_is_named_and_judged(evaluation):
                 most = int(np.argmax(one["probable"]))
                 edges = [-1.0, *question.edges, np.inf]
                 assert one["right"] == (edges[most] < drop["true"][name] <= edges[most + 1])
-    # A stamp is its frame's start, which may lie before the touch.
+    # A stamp is the start of its frame, which may precede the touch.
     assert all(-to_ms(FRAME_US) < drop["felt_ms"] < 2 for drop in found["drops"])
 
 
 def test_a_play_without_drops_and_drops_that_were_not_felt(evaluation):
     quiet = evaluate_acts([Silence(400.0)], shipped(), seed=3)
-    assert named(quiet, [])["drops"] == []
+    assert estimates(quiet, [])["drops"] == []
     begin = evaluation.area.start
     deaf = replace(evaluation, area=evaluation.area.between(begin, begin + 1.0))
-    found = named(deaf, [act for act in script(23, 3) if isinstance(act, Scene)])
+    found = estimates(deaf, [act for act in script(23, 3) if isinstance(act, Scene)])
     assert [drop["felt_ms"] for drop in found["drops"]] == [None] * 3
     assert found["right"] == {"ball": [0] * 4, "height": [0] * 4, "slant": [0] * 4}

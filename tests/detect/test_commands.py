@@ -5,19 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import call
 from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
 from taxel import _core
 from taxel.cli import main
-
-
-def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    """Run the command line; give exit code, what it printed, what it complained of."""
-    with pytest.raises(SystemExit) as ended:
-        main([str(a) for a in arguments])
-    said = capsys.readouterr()
-    return int(ended.value.code or 0), said.out, said.err
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +74,7 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
     assert result["score"]["by_label"]["contact"]["found"] == 6
     assert (result["score"]["missed"], result["score"]["false"]) == (0, 0)
     assert len(result["detections"]) == 12
-    # The labels of all recordings do as well: this one is named in them.
+    # The file of all recordings' labels works too: it names this recording.
     code, out, _ = call(capsys, *arguments, "--truth", folder / "labels.csv", "--window-ms", 10)
     assert (code, out.count("contact")) == (0, 6 + 4)
     assert "known (ms)" in out
@@ -215,7 +208,7 @@ def test_without_a_recipe_it_starts_from_the_recipe_of_the_unit(tmp_path: Path, 
     readout = taxel.Readout.load(out)
     assert (readout.encoder.levels, readout.neurons["contact"].delay_ms) == ([5.0, 50.0], 10.0)
     assert {trained.neuron.tau for trained in readout.neurons.values()} == {20.0}
-    walk(tmp_path, 15)  # its running range wants 10 s
+    walk(tmp_path, 15)  # the running range needs 10 s
     assert call(capsys, *arguments, "--recipe", "gait_channel", "--json")[0] == 0
     assert taxel.Readout.load(out).encoder.running_range is not None
 

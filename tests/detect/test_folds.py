@@ -55,7 +55,7 @@ def test_a_point_that_finds_nothing_is_not_chosen() -> None:
     }
     silent = dataclasses.replace(plan, neurons=neurons)
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # of readouts that nobody keeps nothing is said
+        warnings.simplefilter("error")  # readouts that are not chosen must not warn
         best = choose(examples(1, 2), silent, window_ms=10.0)
     assert {label: own["ub"] for label, own in best.neurons.items()} == dict.fromkeys(plan.neurons, 3.0)
     assert judge(examples(1, 9), best, 2, window_ms=10.0).together.missed == 0
@@ -157,7 +157,7 @@ def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
     )
     both = [judge(one, recipe(), 3, window_ms=10.0).together for one in (data, spikes)]
     assert both[0].found == both[1].found == both[0].events
-    # On a grid the first step lies where the input begins, so that a crossing moves by a step at most.
+    # On a grid the first step is where the input begins, so a crossing differs by at most one step.
     assert np.abs(both[0].errors_ms - both[1].errors_ms).max() <= 0.2
 
 

@@ -11,7 +11,7 @@ from taxel import Array, Events, FormatError, Frames, ProblemError
 from taxel.detect import Recipe, recipes
 from taxel.encode import ContactArea
 
-#: What each recipe came to when version 0.1 was cut, as files of then.
+#: The results of each recipe at version 0.1, as files of that version.
 KEPT = Path(__file__).parents[1] / "data" / "recipes"
 FILES = sorted(KEPT.glob("*.json"))
 

@@ -38,7 +38,7 @@ def test_what_rests_on_repaired_values_is_marked_and_nothing_else():
     events = lossy(3, 0.0)
     assert not said(readout, events).repaired.any()
     assert len(said(readout, events)) > 3
-    # Everything up to the middle was told by states.
+    # Marks every event before the middle as decoded from states.
     middle = int(events.t[len(events) // 2])
     marked = taxel.Events(
         events.t, events.x, events.y, events.p, array=ARRAY, intensity=events.intensity, repaired=events.t < middle

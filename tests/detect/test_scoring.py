@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel.detect import Score, Spread, score
@@ -116,9 +117,8 @@ def test_the_spread_is_numpys(values: list[float]) -> None:
     ],
 )
 def test_nonsense_in_a_score_is_one_clear_error(truth: object, window_ms: object, said: str) -> None:
-    with pytest.raises(taxel.ProblemError, match=said) as error:
+    with refused(said):
         score(some(), truth, window_ms)  # type: ignore[arg-type]
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("found", [None, [1, 2], "contact", 3.0])
@@ -212,9 +212,8 @@ def test_detections_are_chosen_by_label_time_and_place() -> None:
     ],
 )
 def test_nonsense_in_detections_is_one_clear_error(columns: tuple[object, ...], said: str) -> None:
-    with pytest.raises(taxel.ProblemError, match=said) as error:
+    with refused(said):
         taxel.Detections(*columns)  # type: ignore[arg-type]
-    assert "\n" not in str(error.value)
 
 
 def test_detections_can_be_drawn() -> None:

@@ -219,7 +219,7 @@ def afferent(t, values, transfer, *, range_, threshold, jump, recovery_ms, refra
     x = np.maximum(np.asarray(values, float), 0) / range_
     fine = np.linspace(t[0], t[-1], (len(t) - 1) * finer + 1)
     line = np.interp(fine, t, x)
-    # From rest at the first value: the filter is linear, so what was always there is added.
+    # The filter is linear and at rest for the first value, so only the difference from it is filtered.
     u = signal.lsim(transfer, line - line[0], fine - fine[0])[1] + settled * line[0]
     raised, last, spikes, step = max(u[0] - threshold, 0.0), -np.inf, [], fine[1] - fine[0]
     for at, potential in zip(fine[1:], u[1:], strict=True):

@@ -4,7 +4,7 @@ import numpy as np
 
 from taxel import Array, Events, Frames, Tare
 
-#: The array of the laws.
+#: The array for the laws that every encoder must satisfy.
 ARRAY = Array(3, 4)
 
 

@@ -13,7 +13,7 @@ from . import oracles
 from .test_sa1 import apart, of, smooth
 
 REPAIRED = "silent"
-#: What the laws of all encoders are tried on (test_laws.py).
+#: Examples for the laws of all encoders (test_laws.py).
 EXAMPLES = {
     "FA-2": FA2(),
     "FA-2 of coarse samples": FA2(period_ms=0.5, corner_ms=3.0, refractory_ms=0.0),
@@ -45,7 +45,7 @@ def test_fa2_is_its_filter_under_its_threshold(seed, period):
         settled=0.0,
     )
     assert len(theirs)
-    # A spike that is just missed comes at the next occasion.
+    # A spike that rounding prevents is emitted at a later sample.
     assert apart(of(e, t, x), theirs, period) <= 0.1
 
 

@@ -14,7 +14,7 @@ from .scenes import frames_of
 seeds = st.integers(0, 2**32 - 1)
 
 REPAIRED = "read"
-#: What the laws of all encoders are tried on (test_laws.py).
+#: Examples for the laws of all encoders (test_laws.py).
 EXAMPLES = {
     "SA-1": SA1(),
     "SA-1, every sample": SA1(period_ms=0.2, threshold=0.01, jump=0.02, refractory_ms=0.0),
@@ -72,7 +72,7 @@ def test_sa1_is_its_filter_under_its_threshold(seed, period):
     )
     encoder.period_ms = period
     ours = encoder.encode(frames_of(np.rint(t * 1000).astype(int), x[:, None]))[0]
-    # A spike that is just missed comes at the next occasion, so a few may differ.
+    # If rounding prevents a spike, it is emitted at the next sample, so a few times may differ.
     assert apart(ours, slow(encoder, t, x), period) <= 0.1
 
 

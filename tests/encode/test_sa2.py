@@ -7,7 +7,7 @@ from taxel.encode import SA1, SA2
 from .test_sa1 import apart, of, pressed, rate, slow, smooth
 
 REPAIRED = "read"
-#: What the laws of all encoders are tried on (test_laws.py).
+#: Examples for the laws of all encoders (test_laws.py).
 EXAMPLES = {"SA-2": SA2(), "SA-2, faster": SA2(period_ms=0.5, threshold=0.1)}
 
 

@@ -10,7 +10,7 @@ from taxel.encode import FA1, FA2, SA1, SA2, Skin
 from .scenes import frames_of
 
 REPAIRED = "both"
-#: What the laws of all encoders are tried on (test_laws.py).
+#: Examples for the laws of all encoders (test_laws.py).
 EXAMPLES = {
     "skin": Skin(),
     "skin of small fields": Skin(sa1_field_mm2=0.01, fa1_field_mm2=0.5, fa2_per_cm2=0.0, seed=9, period_ms=0.5),
@@ -43,7 +43,7 @@ def test_places_are_even_and_belong_to_the_seed():
     afferents = skin.afferents(array)
     fa1 = afferents.trains("FA-1")
     taxel_ = np.rint(afferents.y_mm[fa1]) * 20 + np.rint(afferents.x_mm[fa1])
-    # 1.4 afferents a taxel: one in each of 560 equal parts, so from none (or one) to three on a taxel.
+    # 1.4 afferents per taxel: one in each of 560 equal parts, so a taxel has none (or one) to three.
     assert np.bincount(taxel_.astype(int), minlength=400).max() <= 3
     assert (np.diff(taxel_) >= 0).all()
     assert np.array_equal(skin.afferents(array).x_mm, afferents.x_mm)
@@ -105,7 +105,7 @@ def test_each_train_is_its_type_s_encoder_on_what_its_field_feels(pitch, masked)
             len(np.setxor1d(np.rint(spikes[train] * 1000), np.rint(theirs[k] * 1000)))
             for k, train in enumerate(trains.tolist())
         )
-        # Weights are rounded to 32 bits here and not there, so a spike may move by a sample.
+        # The encoder rounds weights to 32 bits and the oracle does not, so a spike may differ by a sample.
         assert differ <= 0.01 * len(theirs.times) + 2, kind
     assert spikes.values is None
 

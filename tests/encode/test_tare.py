@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 from typer.testing import CliRunner
 
 import taxel
@@ -93,9 +94,8 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
     ],
 )
 def test_nonsense_gets_one_clear_line(call, said):
-    with pytest.raises(taxel.Error, match=said) as error:
+    with refused(said, taxel.Error):
         call()
-    assert "\n" not in str(error.value)
 
 
 def test_a_file_that_is_no_tare_is_named(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import FormatError, ProblemError, formats
@@ -63,9 +64,8 @@ def test_an_ending_in_capitals_is_the_same_ending(write, tmp_path):
     ],
 )
 def test_nonsense_in_an_argument_is_one_clear_error(call, said):
-    with pytest.raises(ProblemError, match=said) as error:
+    with refused(said):
         call()
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("write", [write_gaitpdb, write_moticon, write_pedar])
@@ -147,9 +147,8 @@ def test_a_trial_survives_our_own_kinds_of_file(name: str, tmp_path: Path) -> No
 @pytest.mark.parametrize("name", formats.FORMATS)
 @pytest.mark.parametrize("path", [3, None, 3.5, b"", [], {}, "a\0b"])
 def test_nonsense_for_a_path_is_one_clear_error(name: str, path: object) -> None:
-    with pytest.raises(ProblemError, match="path is") as error:
+    with refused("path is"):
         list(formats.FORMATS[name].trials(path))
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("name", formats.FORMATS)

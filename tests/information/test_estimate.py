@@ -46,8 +46,8 @@ def test_a_perfect_answers_interval_ends_where_the_rule_of_three_says():
 def test_groups_that_answer_alike_widen_the_interval():
     labels = np.repeat([0, 1], 120)
     groups = np.tile(np.repeat(np.arange(6), 20), 2)
-    said = np.where((groups < 2), 1 - labels, labels)  # two of six people are taken the other way round ...
-    said = np.where(groups == 2, 0, said)  # ... and one tells nothing
+    said = np.where((groups < 2), 1 - labels, labels)  # two of six people have the opposite coding ...
+    said = np.where(groups == 2, 0, said)  # ... and one has none
     alone, together = estimate(labels, said), estimate(labels, said, groups=groups)
     assert together.bits == alone.bits
     assert np.diff(together.interval) > 2 * np.diff(alone.interval)
@@ -139,10 +139,10 @@ def test_of_responses_that_tell_nothing_there_is_nothing_to_keep():
         a, b = (estimate(labels, random.integers(0, 4, len(labels)), redraws=2) for _ in range(2))
         groups = np.arange(len(labels)) // 4 if seed % 2 else None
         said.append(keeps(b, a, groups=groups).says)
-    # Bits are held against 0 one-sided at 90 %.
+    # The information is tested against 0 one-sided at 90 %.
     assert said.count("nothing") >= 32
     assert str(keeps(a, a)) == "nothing to keep"
-    # One group alone says nothing of how sure anything is.
+    # A single group gives no estimate of the uncertainty.
     labels, dear = answers(channel(4, 0.9)[0], 50, np.random.default_rng(5))
     told = estimate(labels, dear, redraws=2)
     assert keeps(told, told, groups=np.zeros(len(labels), int)).says == "open"

@@ -3,22 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from simulator import kernel
 
 from taxel import SpikeTrains
-
-
-def kernel(cone, x):
-    """The kernel, x ms after an input (6.5; the Tempotron's); 0 up to the input itself."""
-    x = np.asarray(x, float)
-    late = np.maximum(x, 0)
-    if cone.neuron_.kernel == "alpha":
-        return np.where(x > 0, late / cone.neuron_.tau * np.exp(-late / cone.neuron_.tau), 0.0)
-    if cone.neuron_.kernel == "exponential":
-        return np.where(x > 0, np.exp(-late / cone.neuron_.tau), 0.0)
-    tau_s = cone.neuron_.tau / 4 if cone.neuron_.tau_s is None else cone.neuron_.tau_s
-    top = cone.neuron_.tau * tau_s / (cone.neuron_.tau - tau_s) * np.log(cone.neuron_.tau / tau_s)
-    shape = lambda t: np.exp(-t / cone.neuron_.tau) - np.exp(-t / tau_s)  # noqa: E731
-    return np.where(x > 0, shape(late) / shape(top), 0.0)
 
 
 def counts(cone, s, fired):
@@ -35,7 +22,7 @@ def row(cone, pattern, t, fired):
     out = np.zeros(len(pattern))
     for n, train in enumerate(pattern):
         heard = [s for s in train[train < t] if counts(cone, s, fired)]
-        out[n] = kernel(cone, t - np.array(heard)).sum()
+        out[n] = kernel(cone.neuron_, t - np.array(heard)).sum()
     return out
 
 

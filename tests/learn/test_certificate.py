@@ -43,7 +43,7 @@ def test_a_dozen_lines_of_numpy_see_the_same_proof():
         gap = np.minimum(problem.lb * g, problem.ub * g).sum() - proof.multipliers @ limits
         assert gap == pytest.approx(proof.gap, rel=1e-6)
         assert gap > 0
-        # No weights within the bounds meet the rows: tried at many places.
+        # Random search finds no weights within the bounds that satisfy the rows.
         random = np.random.default_rng(seed)
         equal = np.array([row.kind == "target" for row in proof.rows])
         for w in random.uniform(problem.lb, problem.ub, (200, len(g))):
@@ -76,7 +76,7 @@ def test_a_certificate_that_was_touched_is_refused():
     left = [k for k in range(len(proof.rows)) if k != target]
     less = dataclasses.replace(proof, rows=[proof.rows[k] for k in left], multipliers=proof.multipliers[left])
     assert not check_certificate(problem, less)
-    # Wider bounds, another problem: the proof does not carry over.
+    # The certificate is not valid for another problem, here one with wider bounds.
     patterns, targets = examples(1, trains=40, patterns=8, targets=1)
     other = ConeX(lb=-3, ub=3).fit(patterns, targets)
     assert other.status_ == "solved"
@@ -183,7 +183,7 @@ def test_the_same_inputs_asked_to_fire_and_to_be_silent_are_refuted_for_any_marg
         assert "pattern 1 shall fire" in said
         assert "Impossible at all" in said
         by_them_alone += "pattern 4, with the same inputs up to there, shall be silent" in said
-        # With another input in time there is nothing to refute: the neuron can tell them apart.
+        # With another input in time the problem is feasible, because the neuron can distinguish the patterns.
         apart = [*patterns[4]]
         apart[3] = np.sort(np.append(apart[3], targets[1][0] - 6.0))
         patterns[4] = SpikeTrains.from_lists(apart, stop=patterns[4].stop)

@@ -102,7 +102,7 @@ def test_what_cone_x_ends_with_is_not_corrected():
     cone = cone_x(margin=1e-4).fit([pattern], [wanted])
     assert cone.status_ == "solved"
     learner = HTP(window_ms=0.0, eta=1.0, epochs=1, **{**GIVEN, "theta_0": 0.3})
-    # A target is met to rounding, from below as well.
+    # A target is reached to rounding, also from below.
     assert not learner.change(cone.weights_ * (1 + 1e-9), pattern, wanted)[0].any()
 
 

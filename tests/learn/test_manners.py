@@ -18,7 +18,7 @@ from taxel.learn import ConeR, ConeX, OnlineConeR, Tempotron
 
 sklearn = pytest.importorskip("sklearn")
 
-#: What learners without defaults are given.
+#: Arguments of learners without defaults.
 GIVEN = {"eta": 0.05, "initial": (0.0, 0.5), "epochs": 50, "updates": "pattern", "tau": 10.0, "tau_s": 5.0}
 GIVEN |= {"theta_0": 1.0, "rule": "E", "tau_a": 5.0, "window_ms": 1.0}
 LEARNERS = {
@@ -94,7 +94,7 @@ def test_scores_lie_between_0_and_1_and_predictions_are_spikes(name):
     spikes = one.predict(patterns)
     assert [type(times) for times in spikes] == [np.ndarray] * 2
     assert 0.0 <= one.score(patterns, examples()[1]) <= 1.0
-    # What it says is what it is judged by.
+    # The learner's own prediction must agree with the score.
     assert one.score(patterns, spikes, window_ms=0.0) == 1.0
     assert one.score(patterns, [[1.0], [1.0]], window_ms=0.0) == 0.0
 

@@ -6,9 +6,10 @@ import threading
 
 import numpy as np
 import pytest
+from refusal import refused
 from rival_examples import patterns
 
-from taxel import ProblemError, SpikeTrains
+from taxel import SpikeTrains
 from taxel.learn import SKIM
 
 
@@ -168,6 +169,5 @@ def test_control_c_stops_it_promptly():
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
-    with pytest.raises(ProblemError, match=said) as error:
+    with refused(said):
         SKIM(**options)
-    assert "\n" not in str(error.value)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refused
 from rival_examples import kernel, patterns, summed
 
 from taxel import ProblemError, SpikeTrains
@@ -208,9 +209,8 @@ def test_spikingjelly_agrees_by_its_kept_numbers():
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
-    with pytest.raises(ProblemError, match=said) as error:
+    with refused(said):
         Tempotron(**options)
-    assert "\n" not in str(error.value)
 
 
 def test_labels_that_make_no_sense_are_one_clear_error():

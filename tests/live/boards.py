@@ -62,12 +62,6 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "taxel", *map(str, arguments)]
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        link.bind((LOOPBACK, 0))
-        return int(link.getsockname()[1])
-
-
 def listening(process: subprocess.Popen[str]) -> None:
     """Wait until a command says that it listens."""
     assert process.stderr is not None

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import free_port
 
 import taxel
 from taxel import Array, Events, Neuron, Readout, wire
@@ -18,7 +19,7 @@ from taxel.live import Live, send
 from taxel.simulate import Board, Scene, emulate
 from taxel.wire import Registers
 
-from .boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, touch
+from .boards import LOOPBACK, SMALL, command, listening, play, presses, touch
 
 
 def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path: Path) -> None:
@@ -112,7 +113,7 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, difference
     touch().save(tmp_path / "touch.json")
     files = ["--readout", tmp_path / "touch.json", "--record", tmp_path / "live.mcap"]
     arguments = command("live", *files, "--host", LOOPBACK, "--port", port, "--array", "4x4", "--json")
-    # The datagrams do not keep the board's time: here the host's clock moves nothing on.
+    # The datagrams' times do not follow the board's pace: the guard prevents the host's clock from advancing time here.
     arguments += ["--guard-frames", "1e6", *(["--differences"] if differences else [])]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
         while not (tmp_path / "live.mcap").exists():
@@ -144,7 +145,8 @@ def test_taxel_live_prints_a_line_a_detection_where_nobody_watches(tmp_path: Pat
         listening(process)
         play(presses(6), port)
         assert process.stdout is not None
-        # The guard lets each press be told by the next one; the last one is told at the end, where it had come by then.
+        # With this guard each press is reported when the next one arrives; the last one is reported at the end, if it
+        # had arrived by then.
         lines = [process.stdout.readline() for _ in range(5)]
         process.send_signal(signal.SIGINT)
         rest = process.stdout.read().splitlines()

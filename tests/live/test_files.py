@@ -7,11 +7,12 @@ import time
 from pathlib import Path
 
 import pytest
+from loopback import free_port
 
 import taxel
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL, command, free_port, listening, play, presses, recording, wait_for, wait_until
+from .boards import LOOPBACK, SMALL, command, listening, play, presses, recording, wait_for, wait_until
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is always full")
@@ -62,7 +63,7 @@ def test_an_earlier_recording_stays_where_nothing_came_to_replace_it(tmp_path: P
 def test_a_second_recorder_does_not_take_the_file_of_a_running_one(tmp_path: Path, kind: str, later: bool) -> None:
     port, file = free_port(), tmp_path / f"walk.{kind}"
     if later:
-        # The first replaces a file, and has not begun to: nothing has come.
+        # The first recorder may replace the file but has not begun to, because no datagram has arrived.
         file.write_bytes(b"an earlier one")
     with recording(file, port, "--overwrite") as first:
         listening(first)

@@ -60,7 +60,7 @@ def test_what_is_recorded_is_what_was_sent(tmp_path: Path) -> None:
 
 def test_detections_come_live_and_are_those_of_the_recording(tmp_path: Path) -> None:
     called: list[Detection] = []
-    # A machine that stalls makes datagrams late: here the host's clock moves nothing on.
+    # On a machine that stalls, datagrams are late: the guard prevents the host's clock from advancing time here.
     options = {"array": SMALL, "readout": touch(), "guard_frames": 1e6, "say": called.append}
     with Live(0, host=LOOPBACK, record=tmp_path / "said.mcap", **options) as live:
         thread = threading.Thread(target=play, args=(presses(6), live.address[1]), kwargs={"pace": 0.001})

@@ -10,11 +10,12 @@ import tty
 from pathlib import Path
 
 import pytest
+from loopback import free_port
 
 import taxel
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL, command, free_port, play, presses, touch, wait_for
+from .boards import LOOPBACK, SMALL, command, play, presses, touch, wait_for
 
 LONG_BEFORE_ANY = {"guard_frames": 1e6}
 KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "said_us", "said_ns"}

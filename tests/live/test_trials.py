@@ -7,22 +7,23 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+from loopback import free_port, until
 
 import taxel
 from taxel import Events, wire
 from taxel.live import Live
 
-from .boards import LOOPBACK, SMALL, free_port
+from .boards import LOOPBACK, SMALL
 
-#: What each taxel is told to hold once, before all else.
+#: The value that each taxel receives once, before all else.
 REST = 40 + np.arange(16)
-#: From one datagram to the next by the board's clock: its 6.5 s turn within a second of the test's.
+#: Interval between datagrams by the board's clock: a 6.5 s turn of its counter takes less than a second of the test.
 STEP_US = 5000
 
 
@@ -62,13 +63,6 @@ def board(port: int) -> Iterator[list[int]]:
     finally:
         over.set()
         thread.join()
-
-
-def until(what: Callable[[], bool]) -> None:
-    end = time.monotonic() + 30
-    while not what():
-        assert time.monotonic() < end
-        time.sleep(0.002)
 
 
 def steps(recording: taxel.Recording) -> list[int]:
@@ -168,7 +162,7 @@ def test_what_came_between_two_trials_is_in_neither_and_is_known_to_the_next(tmp
         hear(step(1))
         live.record(tmp_path / "b.mcap")
         hear(step(2))
-        # What is there already stays as it is, and what runs goes on.
+        # An existing file stays unchanged, and the running recording continues.
         with pytest.raises(FileExistsError):
             live.record(tmp_path / "a.mcap")
         assert live.records
@@ -240,7 +234,7 @@ def test_every_source_is_in_every_trial_and_each_of_its_lines_in_one(tmp_path: P
     paths = [tmp_path / f"{n}.mcap" for n in range(4)]
     sources = {"left": f"udp:{LOOPBACK}:0,array=4x4", "force": "given,columns=n"}
     with Live(0, host=LOOPBACK, array=SMALL, record_later=True, name="right", sources=sources) as live:
-        # What comes while nothing is recorded is heard and not kept.
+        # Datagrams and samples that arrive while nothing is recorded are counted but not stored.
         live.sample("force", [-1.0])
         with board(live.address[1]), board(live.source_address("left")[1]):
             until(lambda: heard(live) > 0)
@@ -274,7 +268,7 @@ def test_every_source_is_in_every_trial_and_each_of_its_lines_in_one(tmp_path: P
         notes = taxel.open(path).sources["right"].notes
         assert [note.text for note in notes] == [f"note {n}"]
         right = taxel.open(path).sources["right"].events.t
-        # Notes are on the recording's own clock, whatever the pipeline's is.
+        # Notes have the time of the recording's own clock, whatever the pipeline's time is.
         assert right[0] <= notes[0].t <= right[-1]
     assert lines == [float(n) for n in range(given)]
 

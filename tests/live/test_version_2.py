@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from loopback import until
 
 import taxel
 from taxel.encode import ChangeEvents
@@ -26,7 +27,7 @@ def test_a_recording_of_version_2_says_that_nothing_was_lost(tmp_path):
     repaired = summary.counters["wire_v2"]["repaired"]
     assert len(events) == report.changes + repaired
     one = play(acts, seed=1, tare_ms=20.0).events
-    # Version 1 tells the same changes, its times cut to 100 us.
+    # Version 1 contains the same changes, with times rounded down to 100 us.
     assert len(one) == report.changes
     assert [start for _, start in events.markers] == [True, False]
 
@@ -72,16 +73,16 @@ def test_resets_and_changes_of_version_are_marked_in_the_recording(tmp_path):
         play(2)
         speak(2)
         play(2)
-        wait_for(lambda: live.counters["wire_version"] == 2)
+        until(lambda: live.counters["wire_version"] == 2)
         board.reset()
         speak(2)
         play(3)
-        wait_for(lambda: live.counters["wire_v2"]["resets"] == 1)
+        until(lambda: live.counters["wire_v2"]["resets"] == 1)
         speak(1)
         live.expect_version(1)
-        wait_for(lambda: live.counters["decoded"] and live.next(0.05) is None)
+        until(lambda: live.counters["decoded"] and live.next(0.05) is None)
         play(3)
-        wait_for(lambda: live.counters["wire"]["changes"] == 4 * 4096)
+        until(lambda: live.counters["wire"]["changes"] == 4 * 4096)
         summary = live.stop()
     assert summary.counters["wire_refused"] == 0
     recording = taxel.open(path)
@@ -96,13 +97,6 @@ def test_resets_and_changes_of_version_are_marked_in_the_recording(tmp_path):
     assert taxel.open(again).board_changes == recording.board_changes
 
 
-def wait_for(done):
-    until = time.monotonic() + 30
-    while not done():
-        assert time.monotonic() < until
-        time.sleep(0.002)
-
-
 def test_what_comes_after_time_went_on_is_counted_late():
     board, decoder = Board(Registers(wire_version=2), version_2=Version2(states_us=0)), taxel.wire.Decoder(2)
     with udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as socket:
@@ -114,12 +108,12 @@ def test_what_comes_after_time_went_on_is_counted_late():
                 in_it = len(decoder.push(kept))
                 for datagram in sent[:-1]:
                     socket.sendto(datagram, live.address)
-                wait_for(lambda: live.counters["decoded"] == len(sent) - 1)  # noqa: B023
+                until(lambda: live.counters["decoded"] == len(sent) - 1)  # noqa: B023
                 time.sleep(0.02)
                 socket.sendto(sent[-1], live.address)
-                wait_for(lambda: live.counters["decoded"] == len(sent))  # noqa: B023
+                until(lambda: live.counters["decoded"] == len(sent))  # noqa: B023
                 socket.sendto(kept, live.address)
-                wait_for(lambda: live.counters["decoded"] == len(sent) + 1)  # noqa: B023
+                until(lambda: live.counters["decoded"] == len(sent) + 1)  # noqa: B023
                 counters = live.stop().counters
             assert counters["wire_late"] == (in_it if late else 0)
             assert counters["wire_v2"]["missing"] == 0

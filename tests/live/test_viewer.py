@@ -30,10 +30,11 @@ from .boards import LOOPBACK, SMALL, play, presses, touch, wait_for
 
 client = pytest.importorskip("websockets.sync.client", reason="the test extra brings websockets")
 
-#: How long what must happen may take on a busy machine, s.
+#: Timeout for an event on a busy machine, s.
 SOON = 60.0
 
-#: Of changes that come five times slower than their stamps say some fall together, as those of a board that stalls.
+#: Fraction of changes that must be shown: the datagrams are sent five times slower than their stamps, as by a board
+#: that stalls, and some changes coincide.
 SEEN = 0.98
 
 foxglove = pytest.mark.skipif(not importlib.util.find_spec("foxglove"), reason="pip install taxel[foxglove]")
@@ -116,7 +117,7 @@ def receiver(folder: Path, port: int) -> Iterator[subprocess.Popen[bytes]]:
 
     program = Path(rerun_cli.__file__).with_name("rerun")
     kept = folder / f"heard{len(list(folder.iterdir()))}.rrd"
-    # What it wants to know of its user it does not learn here.
+    # A fresh home folder, so that the viewer finds no user settings.
     environment = {**os.environ, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder), "RUST_LOG": "off"}
     command = [str(program), "--bind", LOOPBACK, "--port", str(port), "--save", str(kept)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
@@ -320,7 +321,7 @@ def test_foxglove_is_served_on_loopback_alone_and_one_that_never_reads_holds_nob
         page.meet()
         eventually(lambda: viewer.state.there)
         before = memory_mb(viewer._process.pid)
-        # He reads nothing from here on.
+        # The client reads nothing from here on.
         wait_for(live, play(events, live.address[1], pace=0.001))
         eventually(lambda: viewer.state.sent.get("spikes", 0) >= SEEN * len(events))
         assert listens(viewer._process.pid) == {"0100007F"}
@@ -346,12 +347,12 @@ def test_whatever_becomes_of_rerun_nothing_recorded_is_lost(fate: str, tmp_path:
         assert listens(viewer._process.pid) == set()
         if fate != "stopped":
             eventually(lambda: "no viewer at" in (viewer.state.trouble or ""))
-        # What has come is told 60 times a second.
+        # The viewer process reports its state 60 times a second.
         time.sleep(0.5)
         assert memory_mb(viewer._process.pid) < 600
         state = viewer.stop()
         assert viewer._process.returncode == 0
-        # All that the encoder said went there, or is counted.
+        # All spikes of the encoder were sent, or are counted as lost.
         total = state.sent.get("spikes", 0) + state.lost.get("spikes", 0)
         assert SEEN * len(events) <= total <= len(events)
     assert live.stop().lost == 0

@@ -82,7 +82,7 @@ def test_what_is_zeroed_is_heard_anew_live_and_from_the_recording(tmp_path: Path
     assert len(said) == 2
     np.testing.assert_array_equal(said.t, kept.detections.t)
     np.testing.assert_array_equal(said.known, kept.detections.known)
-    # Its events alone know nothing of it: the area stays at 2 from the drift on.
+    # The events alone do not contain the zeroing: the area stays at 2 from the drift on.
     assert len(taxel.detect.run(readout(), kept.events, tare=tare)) == 1
     for ending in (".mcap", ".npz", ".h5"):
         assert not [lost for lost in taxel.convert(kept, tmp_path / f"b{ending}") if "zeroed" in lost]

@@ -13,10 +13,10 @@ from taxel._base.parameters import described
 ROOT = Path(__file__).parents[2]
 NAMES = _core.metric_names()
 ARRAY = Array(2, 2, pitch_mm=2.0)
-#: What has no default.
+#: Metrics with required parameters.
 GIVEN = {"q": 0.2, "k": 0.5, "tau": 3.0, "array": ARRAY}
 each_metric = pytest.mark.parametrize("name", NAMES)
-#: The parts of the room that are no metrics.
+#: Modules of the package that are not metrics.
 OTHERS = {"matching", "pairwise"}
 
 

@@ -327,7 +327,7 @@ def test_an_input_at_a_crossing_to_rounding_comes_too_late_to_stop_it(kernel: st
             both = neuron.run_many([weights, [1.2, 0.0, 0.6]], trains)
             assert both[0] == pytest.approx(neuron.run(weights, trains), abs=1e-9)
             assert both[1] == pytest.approx(later, abs=1e-9)
-            # What came too late for this spike counts for the next one, unless a reset lost it.
+            # An input that was too late for this spike counts for the next one, unless a reset discards it.
             assert (len(later) > 1) == (after_spike != "reset")
     for early in (1e-8, 9e-7, 1e-5):
         stopped = SpikeTrains.from_lists([[0.0], [crossing - early]], stop=60.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 from taxel import Neuron, ProblemError, SpikeTrains
 
@@ -30,7 +31,7 @@ def problems(draw: st.DrawFn) -> tuple[Neuron, np.ndarray, SpikeTrains, float]:
         step_ms=draw(st.sampled_from([1.0, 0.3])),
     )
     lists = [np.sort(rng.uniform(-5.0, length, rng.poisson(length / 50))) for _ in range(inputs)]
-    if draw(st.booleans()):  # on points of the grid, many at a time
+    if draw(st.booleans()):  # on grid points, many at a time
         lists = [np.clip(np.round(times), -5.0, length) for times in lists]
     trains = SpikeTrains.from_lists(lists, -5.0, length)
     weights = rng.normal(draw(st.sampled_from([0.0, 0.3])), 0.8, (NEURONS, inputs))
@@ -71,7 +72,7 @@ def test_single_precision_is_read_as_it_stands(time: str) -> None:
 
 @pytest.mark.parametrize("time", ["grid", "continuous"])
 def test_a_trained_touch_counts_in_a_population_too(time: str) -> None:
-    # The weight lifts the maximum, at tau, just to the threshold: what a learner's equality asks for.
+    # The weight raises the maximum, at tau, exactly to the threshold, as a learner's equality does.
     neuron = Neuron(tau=10.0, time=time, theta_0=0.3)
     trains = SpikeTrains.from_lists([[0.0]], stop=50.0)
     many = neuron.run_many([[0.3 * np.e], [0.299 * np.e]], trains)
@@ -116,9 +117,8 @@ TRAINS = SpikeTrains.from_lists([[1.0], [2.0]], stop=10.0)
 )
 def test_weights_that_make_no_sense_are_one_error(weights: object, said: str) -> None:
     for time in ("grid", "continuous"):
-        with pytest.raises(ProblemError, match=said) as caught:
+        with refused(said):
             Neuron(time=time).run_many(weights, TRAINS)
-        assert "\n" not in str(caught.value)
 
 
 def test_other_arguments_that_make_no_sense_are_one_error() -> None:

@@ -29,7 +29,7 @@ def deep() -> list[object]:
     return own
 
 
-#: A billion values in the memory of one.
+#: A view of a billion equal values with the memory of one.
 REPEATED = np.broadcast_to(np.float64(1.0), 10**9)
 
 WRONG = {
@@ -71,7 +71,7 @@ def test_what_is_no_argument_is_refused_in_one_line(name, value):
     assert "\n" not in said
     assert len(said) < 300
     said.encode()
-    # Seconds where it takes some milliseconds: an array that is repeated took 20.
+    # The refusal must take milliseconds; copying a repeated array took 20 s.
     assert time.process_time() - begun < 10
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 from taxel import Array
 from taxel._core import ProblemError
@@ -68,9 +69,8 @@ def test_the_thesis_array_is_64_by_64() -> None:
     ],
 )
 def test_nonsense_is_one_error_that_names_the_argument(arguments: tuple, said: str) -> None:
-    with pytest.raises(ProblemError, match=said) as caught:
+    with refused(said):
         Array(*arguments)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(("x", "y"), [(8, 0), (-1, 0), (0, 8), ("a", 0), ([0, 1], [0, 1, 2]), (0.5, 0), (None, 0)])

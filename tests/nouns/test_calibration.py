@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Calibration, FormatError, Frames, Load, ProblemError
@@ -103,7 +104,7 @@ def test_the_law_finds_the_force_of_a_ball_that_the_emulated_board_felt():
     contacts, force = taxel.simulate.truth(acts)
     law = Calibration.law(events.array, sensor=sensor)
     pictures = Frames.from_events(events, 960, int(contacts[0].start_us), int(contacts[0].stop_us))
-    # A taxel that said nothing is at rest.
+    # A taxel without any event is at rest.
     rest = law.readings(frames(0.0, "N", events.array)).values[0]
     held = Frames(np.maximum(pictures.values, rest), pictures.t, unit="ticks", array=events.array)
     assert held.values.max() < 150
@@ -213,7 +214,7 @@ def test_a_recording_finds_the_calibration_beside_it(tmp_path, name):
     assert recording.calibration == calibration
     assert recording.calibrated().unit == "N"
     assert np.array_equal(recording.calibrated().values, calibration.apply(recording.frames()).values)
-    # Nothing turns into N unasked: what encoders and readouts hear stays as it was read.
+    # Values are converted to N only on request: encoders and readouts receive them as they were read.
     assert recording.frames().unit == "counts"
 
 
@@ -230,9 +231,8 @@ def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):
     with pytest.raises(ProblemError, match="the calibration is of another array"):
         other.apply(frames(1.0))
     recording = made_beside(tmp_path, other)
-    with pytest.raises(ProblemError, match=r"press.calibration.json: .* another array") as error:
+    with refused(r"press.calibration.json: .* another array"):
         recording.calibrated()
-    assert "\n" not in str(error.value)
 
 
 def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
@@ -273,9 +273,8 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
     ],
 )
 def test_what_makes_no_sense_is_said(call, said):
-    with pytest.raises(ProblemError, match=said) as error:
+    with refused(said):
         call()
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("entry", ["unit", "of", "curve", "array", "gain", "rest", "date", "floor", "loads", "taxel"])
@@ -284,7 +283,7 @@ def test_a_spoilt_file_is_one_line(tmp_path, entry, nonsense):
     said = json.loads(Calibration.fit([Load(frames(2.0), 6.0)], rest=np.ones(ARRAY.shape), date=DAY).to_json())
     file = tmp_path / "calibration.json"
     file.write_text(json.dumps(said | {entry: nonsense}))
-    # What is left out, or just as good.
+    # Missing entries and valid alternatives, with which the file still loads.
     if (entry, nonsense) in [("rest", None), ("loads", []), ("loads", {}), ("of", "x"), ("date", None)]:
         assert isinstance(Calibration.load(file), Calibration)
         return

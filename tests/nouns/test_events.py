@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Events, Frames
@@ -266,9 +267,8 @@ GOOD = {"t": [0, 5], "x": [1, 2], "y": [3, 4], "p": [True, False]}
 )
 def test_nonsense_in_a_column_is_one_error_that_names_it(name: str, value: object, said: str) -> None:
     arguments = {**GOOD, "array": GRID, name: value}
-    with pytest.raises(ProblemError, match=said) as caught:
+    with refused(said):
         Events(**arguments)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

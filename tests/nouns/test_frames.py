@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 from taxel import Array, Events, Frames
 from taxel._core import ProblemError
@@ -109,9 +110,8 @@ def test_frames_draw_themselves() -> None:
 )
 def test_nonsense_in_an_argument_is_one_error_that_names_it(arguments: dict, said: str) -> None:
     good = {"values": np.zeros((2, 2, 3)), "t": [0, 1]}
-    with pytest.raises(ProblemError, match=said) as caught:
+    with refused(said):
         Frames(**{**good, **arguments})
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refused
 
 import taxel
 from taxel import Array, Detections, Events, Frames, SpikeTrains, Tare
@@ -82,7 +83,7 @@ def taught(targets: Any) -> list[float]:
     return rule.fit([TRAINS], [targets]).weights_.tolist()
 
 
-#: Each place that takes times: a call, and the times that it takes, in us.
+#: Each function that takes times: a call, and its times, in us.
 PLACES: dict[str, tuple[Any, Any]] = {
     "trains": (lambda t: SpikeTrains(t, [0, 2], 0.0, 9.0), [1000, 3000]),
     "start": (lambda t: SpikeTrains([5.0], [0, 1], t, 9.0), 2000),
@@ -98,7 +99,7 @@ PLACES: dict[str, tuple[Any, Any]] = {
     "potential": (lambda t: NEURON.potential([0.5, 0.5], TRAINS, t).tolist(), [1000, 3000]),
     "score window": (lambda t: taxel.detect.score(FOUND, {"a": [1500]}, window_ms=t).to_dict(), 3000),
 }
-#: The same, of places that count in us.
+#: The same for functions with times in us.
 PLACES_US: dict[str, tuple[Any, Any]] = {
     "events": (lambda t: Events(t, [0, 1], [0, 0], [1, 0], array=ARRAY), [0, 5000]),
     "markers": (lambda t: Events([], [], [], [], array=ARRAY, markers=[(t, True)]), 2000),
@@ -152,9 +153,8 @@ def test_a_quantity_is_converted_or_refused_everywhere(place: tuple[Any, Any], u
         Mute(),
         nested(us, lambda _: Mute()),
     ):
-        with pytest.raises(ProblemError, match="a quantity that converts to it") as caught:
+        with refused("a quantity that converts to it"):
             call(wrong)
-        assert "\n" not in str(caught.value)
     if isinstance(us, list) and len(us) > 1:
         with pytest.raises(ProblemError, match="mixes quantities and numbers without a unit"):
             call([us[0], us[1] / 1e6 * S, *us[2:]])
@@ -174,9 +174,8 @@ def test_a_quantity_is_converted_or_refused_everywhere(place: tuple[Any, Any], u
     ],
 )
 def test_where_no_unit_is_meant_a_quantity_is_refused(call: Any) -> None:
-    with pytest.raises(ProblemError, match=r"must be a (plain number|number of ms)") as caught:
+    with refused(r"must be a (plain number|number of ms)"):
         call(3.0 * V)
-    assert "\n" not in str(caught.value)
 
 
 def test_what_has_no_dimension_is_a_plain_number() -> None:

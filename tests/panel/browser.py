@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -17,7 +16,7 @@ from queue import Empty, Queue
 
 import pytest
 
-#: How long anything may take on a machine at load 20, s.
+#: Timeout for any action on a machine at load 20, s.
 PATIENCE = 90
 FLAGS = [
     "--no-sandbox",
@@ -28,13 +27,6 @@ FLAGS = [
     "--autoplay-policy=no-user-gesture-required",
 ]
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-
-
-def free_port() -> int:
-    """Find a UDP port of loopback that nobody has."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
 
 
 class Process:

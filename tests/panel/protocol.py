@@ -12,7 +12,8 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from panel.browser import free_port, running
+from loopback import free_port
+from panel.browser import running
 
 websockets = pytest.importorskip("websockets", reason="the test extra brings websockets")
 
@@ -20,7 +21,7 @@ websockets = pytest.importorskip("websockets", reason="the test extra brings web
 client = pytest.importorskip("websockets.sync.client")
 
 
-#: How long what must happen may take on a busy machine, s.
+#: Timeout for an event on a busy machine, s.
 SOON = 60.0
 
 

@@ -82,7 +82,7 @@ def test_connections_that_say_nothing_are_so_many_and_no_more(live, panel):
         assert closed() == 600 - 511
         idle.close()
         while True:
-            # They are gone as soon as the server has seen it.
+            # The places of the disconnected clients are free as soon as the server has noticed.
             with contextlib.suppress(OSError, websockets.exceptions.InvalidHandshake), Client(panel) as other:
                 assert other.until("hello")["live"]
                 break

@@ -42,15 +42,15 @@ def test_the_command_stays_while_a_page_begins_its_board_anew(tmp_path):
         ) as page:
             for n in range(12):
                 assert page.ask("delta_intensity", on=n % 2 == 0)["type"] == "done"
-                # The command looks every tenth of a second, at any moment of it.
+                # The command checks for changes every tenth of a second, so each request may coincide with a check.
                 assert page.ask("listen", host="127.0.0.1", port=0)["type"] == "done"
-        # Nothing came; that is all there is to complain of.
+        # No datagram arrived; the exit code reports only that.
         assert server.end() == 3, "".join([*server.said, *iter(server.lines.get, "")])
 
 
 @pytest.mark.parametrize("version", [1, 2])
 def test_registers_are_read_again_when_the_board_was_reset(tmp_path, version):
-    # Version 2 tells of it by a new session, version 1 by nothing but the greeting on the board's line.
+    # Version 2 shows a reset by a new session, version 1 only by the greeting on the board's serial line.
     with page_of_a_board(tmp_path, "--wire", str(version), "--reset-every", "3") as page:
         page.send(type="credit", n=1)
         page.until("registers", known=True)

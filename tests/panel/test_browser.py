@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loopback import free_port
 from tests.detect.test_readout import recipe, tare, touches
-from tests.panel.browser import PATIENCE, chromium, free_port, running
+from tests.panel.browser import PATIENCE, chromium, running
 
 import taxel
 import taxel.device
@@ -120,7 +121,7 @@ def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
     floor = page.get_by_label("Noise floor", exact=True)
     floor.fill(str(floor_ticks))
     floor.press("Tab")
-    # What the board says counts, not what was typed.
+    # The page must show the value that the board reports, not the one that was typed.
     page.locator("#read-back").click()
     shows(page, "registers-why", "^$")
     until(lambda: floor.input_value() == str(floor_ticks), "the board holds the floor")
@@ -141,7 +142,7 @@ def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
     shows(page, "label-count", "^1 label")
     start = still(page)
     press(page, "Space")
-    # Something came in part of the two seconds only: what can be looked at may be as short.
+    # Datagrams arrived for only part of the two seconds, so the recording may be that short.
     until(lambda: clock(page) > start + 0.2, "it plays")
     file = taxel.open(folder / f"{name}7.mcap")
     assert len(file.events.t) > 0
@@ -208,7 +209,7 @@ def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> 
     shows(page, "register-step_period-reason", r"4 x step_period 4\.00 us is longer than line_read 3\.00 us \(rule 2\)")
     assert period.input_value() == "4"
     assert period.get_attribute("aria-invalid") == "true"
-    # A slower line makes it right: both are written together.
+    # A slower line period makes the value valid: both are written together.
     for name, value in (("Line period", "20"), ("Line read", "20")):
         page.get_by_label(name, exact=True).fill(value)
         page.get_by_label(name, exact=True).press("Enter")
@@ -284,7 +285,7 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
         until(lambda: server.heard().count(" lift ") >= 1, "the board has been heard")
         page.wait_for_timeout(1000)
         shows(page, "detection-count", f"^{len(printed())}$")
-        # The page lists what the terminal does, the last first, with the time and the latency of each.
+        # The page lists the detections of the terminal, the latest first, with the time and the latency of each.
         rows = page.locator("#detection-list li").all_inner_texts()
         assert all(re.search(r"\d+\.\d{3} s\s+-?\d[\d.]* (µs|ms|s)$", row) for row in rows), rows
         names = [re.match(r"\w+", row.strip()).group() for row in rows]  # type: ignore[union-attr]
@@ -297,7 +298,8 @@ def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, 
         shows(page, "state-word", "^Held$")
         assert not page.errors
         page.context.close()
-    # Where the machine holds the emulated board up, what was said too early is in the list too, and counted there.
+    # If the machine delays the emulated board, detections that were output too early are in the list too, and counted
+    # there.
     if " late" not in server.heard():
         assert names == ["lift", "contact"] * 6
         wanted = sorted(truth["contact"] + truth["lift"])
@@ -364,7 +366,7 @@ def test_a_sensor_of_any_shape_is_seen_pointed_at_and_saved(
         for k in range(10):
             source.push(np.full((rows, columns), 100 + 10 * k))
         until(lambda: "ticks" in page.locator("#taxel-value").inner_text(), "it is heard")
-        # A preset's, until somebody reads the registers: another sensor has other frames.
+        # The values of a preset, until the registers are read: another sensor has other frame rates.
         shows(page, "frames", r"\d\?$")
         box = page.locator("#pressure-frame").bounding_box()
         assert 40 <= box["height"] <= 450
@@ -385,7 +387,7 @@ def test_the_page_fits_a_phone_and_its_foot_hides_nothing(chromium: Any, live: S
     for tab in ("board", "record", "labels", "view"):
         page.locator(f"#tab-{tab}").click()
         assert page.evaluate("document.documentElement.scrollWidth") <= 390, tab
-    # The board is slow now: as wide as counters become.
+    # The counters' widest texts, as on a slow board.
     for name, text in {"events": "120,000", "frames": "20,833", "latency": "134 / 134,218", "lost": "12,345"}.items():
         page.locator(f"#{name}").evaluate("(place, text) => { place.textContent = text }", text)
     edge = page.evaluate(
@@ -464,7 +466,7 @@ def test_steps_leap_over_silence_both_ways(replay: Any) -> None:
         at = clock(replay)
         replay.keyboard.press("Shift+ArrowRight")
         until(lambda at=at: clock(replay) > at + 0.9, "a second on")
-    # Between two footfalls: a step goes to the last stamp of the one, or the first of the other.
+    # Between two footfalls a step moves to the last stamp of one, or to the first of the next.
     replay.keyboard.press("ArrowRight")
     at = still(replay)
     press(replay, ",")
@@ -487,12 +489,12 @@ def test_the_lanes_zoom_around_the_cursor_and_the_time_stays(replay: Any) -> Non
         replay.keyboard.press("z")
         shows(replay, "span", span)
         still(replay)
-    # What was pointed at is there still, and the map shows its time, as the end has left the window.
+    # The time that was pointed at is still selected, and the map shows it, because the end is outside the window.
     until(lambda: abs(clock(replay) - pointed) < 0.02, "the time pointed at")
     turn = [0]
 
     def is_there() -> bool:
-        # The lanes' picture comes after the clock, and only what moves points.
+        # The lanes' picture is drawn after the clock, and only a movement of the pointer selects points.
         turn[0] ^= 1
         replay.mouse.move(box["x"] + box["width"] * 0.6, box["y"] + 5 + turn[0])
         replay.wait_for_timeout(100)
@@ -509,7 +511,7 @@ def test_the_lanes_zoom_around_the_cursor_and_the_time_stays(replay: Any) -> Non
     still(replay)
     press(replay, "End")
     until(lambda: clock(replay) == pytest.approx(before, abs=1e-4), "the end again")
-    # All ten footfalls are in sight now.
+    # All ten footfalls are visible now.
     force = replay.evaluate("document.querySelector('#force-lane canvas').toDataURL().length")
     assert force > 0
     replay.locator("#zoom-in").click()
@@ -568,7 +570,7 @@ def test_a_flag_is_set_by_a_click_and_moved_by_a_drag(replay: Any) -> None:
     lane = replay.locator("#label-lane").bounding_box()
 
     def at_the_end(turn: list[int]) -> bool:
-        # The lanes may still show the beginning: their picture comes after the clock.
+        # The lanes may still show the beginning: their picture is drawn after the clock.
         turn[0] ^= 1
         replay.mouse.move(lane["x"] + lane["width"] * 0.3 + turn[0], lane["y"] + lane["height"] / 2)
         replay.wait_for_timeout(200)

@@ -9,14 +9,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.panel.browser import Process, free_port, running
+from loopback import free_port
+from tests.panel.browser import Process, running
 from tests.panel.protocol import Client
 
 import taxel
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 
-#: What is recorded is in the file within this, on a quiet machine; a busy one may take a few of them.
+#: Delay after which received data must be in the file, on a quiet machine; a busy one may take a few times as long.
 KEPT_US = 100_000
 
 
@@ -72,7 +73,7 @@ def test_whoever_is_killed_what_was_recorded_is_there(dies: str, turn: int, tmp_
                 board.process.kill()
                 board.process.wait()
             else:
-                # As a browser that crashes: no goodbye.
+                # The connection is cut without a closing handshake, as by a browser that crashes.
                 page.socket.socket.close()
             with Client(door_again(server, page)) as other:
                 other.send(type="credit", n=2)
@@ -84,7 +85,7 @@ def test_whoever_is_killed_what_was_recorded_is_there(dies: str, turn: int, tmp_
             assert not kept.truncated
             assert kept.verdict.startswith("nothing lost")
             if dies == "board":
-                # All that came: the board said nothing after that.
+                # Everything that was received is recorded: the board sent nothing after that.
                 assert kept.events.t[-1] == counters["board_us"]
             else:
                 assert kept.events.t[-1] > last["board_us"]
@@ -111,13 +112,13 @@ def test_memory_is_bounded_and_nothing_is_lost_over_time(tmp_path: Path) -> None
             for k, page in enumerate(pages):
                 page.send(type="credit", n=8)
                 if k % 2:
-                    # Who asks for everything, and narrow columns too, and never reads.
+                    # A client that requests everything, including narrow columns, and never reads.
                     page.send(type="zoom", column_us=125)
                     page.send(type="encode", encoder={"name": "fa1"})
                     page.send(type="credit", n=8)
             with Client(at) as page:
                 page.send(type="credit", n=2)
-                # The ring is full after its minute: from then on memory stands still.
+                # The ring buffer is full after a minute: from then on memory must be constant.
                 while_it_runs(page, 90.0)
                 early = rss_bytes(server)
                 counters = while_it_runs(page, 120.0)

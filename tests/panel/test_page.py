@@ -49,7 +49,7 @@ def test_the_page_asks_nobody_else_for_anything() -> None:
             text = (WEB / name).read_text().replace("http://www.w3.org/2000/svg", "")
             assert not re.search(r"https?://", text), name
     html = (WEB / "index.html").read_text()
-    # The content security policy has no place for these.
+    # The content security policy must not allow these.
     assert not re.search(r"\bstyle=|\bon[a-z]+=|<style|<script(?![^>]*\bsrc=)", html)
 
 

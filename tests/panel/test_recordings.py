@@ -30,7 +30,7 @@ def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # n
     clock = {"t": 7_000_000}
 
     def play():
-        # Beyond one turn of the board's clock, so that a recording begun now has to find its place.
+        # Later than one turn of the board's clock, so that a recording that starts now must determine the turn.
         while not playing.is_set():
             t = clock["t"] = clock["t"] + 1000
             send([word(t, t // 1000 % 64, 7, 40 + t // 1000 % 50)], *live.address, seconds=0.0005)
@@ -56,7 +56,7 @@ def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # n
         recording = taxel.open(tmp_path / "step1.mcap")
         assert recording.verdict.startswith("nothing lost")
         assert [(note.text, note.t) for note in recording.notes] == [("heel", None)]
-        # On the clock that the board was heard on, not from its own first stamp.
+        # Times are on the clock of the live board, not relative to the recording's first stamp.
         assert recording.events.t[0] > 6_553_600
         page.send(type="credit", n=2)
         assert page.ask("open", name="step1.mcap")["type"] == "done"
@@ -115,7 +115,7 @@ def test_a_recording_of_the_panel_holds_all_sources_of_the_board(tmp_path):
 @pytest.mark.parametrize("first", ["event", "marker"])
 def test_a_recording_of_a_later_wrap_has_the_times_of_the_page(live, tmp_path, first):
     with Panel(live, folder=tmp_path) as panel, Client(panel) as page:
-        # Version 1 says times modulo 6.5536 s: two wraps pass before it records.
+        # Version 1 has times modulo 6.5536 s: two turns pass before the recording starts.
         for n in range(7):
             say(live, word(2_000_000 * (n + 1), 3, 5, n + 1))
             heard(live, n + 1)
@@ -136,7 +136,8 @@ def test_a_recording_of_a_later_wrap_has_the_times_of_the_page(live, tmp_path, f
 
 
 def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
-    # Row 2 rises by 20 ticks at each whole second, and falls half a second later; a quiet row tells that it is there.
+    # Row 2 rises by 20 ticks at each whole second, and falls half a second later; a quiet row has one event, so that
+    # its taxels count as live.
     t = np.arange(0, 10_000_000, 500_000)
     p = np.arange(len(t)) % 2 == 0
     events = taxel.Events(t, 0 * t + 3, 0 * t + 2, p, intensity=np.where(p, 70, 50), array=taxel.Array(8, 8))
@@ -167,7 +168,7 @@ def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
                     assert raster[column - shown[0], 2] == ups | downs << 4, (column_us, t_us, column)
                     held = t[t <= min(t_us, (column + 1) * column_us - 1)]
                     assert sums[column - shown[0]] == (20 if len(held) and p[len(held) - 1] and held[-1] else 0)
-                # The first change has nothing to be compared with; that of now is a spike when its sample is over.
+                # The first change has no reference; the current one becomes a spike when its sample is complete.
                 changed = {int(k) for k in t[(t < t_us) & (t > 0)] // column_us} & set(shown)
                 assert spikes_of(page, changed) == {column: [2] for column in changed}
                 assert (
@@ -216,12 +217,12 @@ def test_a_taxel_is_zeroed_for_all_and_the_next_recording_begins_with_it(live, t
             assert page.ask("zero", taxels=wrong)["type"] == "refused"
         assert page.ask("zero", taxels=[[3, 5]])["type"] == "done"
         for one in (page, other):
-            # It may have been told before the command was answered.
+            # The message may have been sent before the command was answered.
             while not (all_told := [m for m in one.said if m["type"] == "zeroed" and m["taxels"]]):
                 one.until("zeroed")
             (told,) = all_told[-1]["taxels"]
             assert (told["taxel"], told["rest"], told["before"]) == ([3, 5], 90.0, None)
-        # The picture's rest is the new one, and a lower value does not move it.
+        # The picture's rest is the new one, and a lower value does not change it.
         say(live, word(6000, 3, 5, 80), word(7000, 3, 5, 95))
         heard(live, 4)
         page.send(type="credit", n=8)

@@ -54,7 +54,7 @@ def test_a_source_that_stalled_is_shown_at_its_own_time_again(live, panel):
         heard(live, 39)
         t_us = 0
         while t_us < 900_000:
-            # Time goes on by the host's clock where nothing comes.
+            # Without datagrams, time advances by the host's clock.
             page.send(type="credit", n=1)
             t_us = head(page.until("picture"))[0]["t_us"]
         send([word(400_000, 4, 5, 99)], *live.address, seconds=0.01)
@@ -67,7 +67,7 @@ def test_a_source_that_stalled_is_shown_at_its_own_time_again(live, panel):
         assert t_us >= 400_000, "not before what was heard"
         assert head(page.pictures[-1])[0]["flags"] & 4, "columns that never were are forgotten"
         assert section(page.pictures[-1], 0, "<u2").reshape(64, 64)[5, 4] == 99
-        # Its time goes on from there, and does not leap to what the host's clock would make of it.
+        # The board's time continues from there, and does not jump to the host's estimate.
         for _ in range(8):
             t_us = head(page.until("picture"))[0]["t_us"]
         assert 400_000 < t_us < 600_000 + 1e6 * (time.monotonic() - since)
@@ -123,7 +123,7 @@ def test_narrow_and_wide_columns_follow_the_board_too(live, panel):
                     seen = {}
                 raster = section(picture, 2, "u1").reshape(-1, 64)
                 seen.update((about["first"] + k, raster[k, 5]) for k in range(about["count"]))
-                # The next one has what came while this one was made.
+                # The next picture contains the events that arrived while this one was made.
                 if about["events"] >= sent and len(page.pictures) > complete + 2:
                     break
                 if about["events"] < sent:
@@ -161,18 +161,18 @@ def test_a_dead_taxel_of_a_board_of_version_2_is_found_though_states_tell_of_it(
         datagrams = board.frame(ticks)
         say(live, *datagrams)
         sent += len(datagrams)
-        # A frame at a time: nothing is lost on a busy machine.
+        # One frame at a time, so that a busy machine loses nothing.
         while live.counters["capture"]["datagrams"] < sent:
             assert time.monotonic() < until, live.counters
             time.sleep(0.001)
     with Client(panel) as page:
         page.send(type="credit", n=1)
-        # A state has told what the dead one holds.
+        # Waits until a state has reported the value of the dead taxel.
         while section(page.until("picture"), 0, "<u2").reshape(64, 64)[7, 4] != 0:
             pass
         dead = []
         for _ in range(200):
-            # Until the others have spoken often enough to be told from it.
+            # Until the other taxels have had enough events to be distinguished from the dead one.
             assert page.ask("health")["type"] == "done"
             dead = next(m for m in reversed(page.said) if m["type"] == "health")["dead"]
             if dead:

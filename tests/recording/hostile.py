@@ -31,10 +31,10 @@ from recording.making import record, some_events, some_frames
 from taxel import formats
 from taxel.cli import main
 
-#: What a small file may cost: memory above what the program holds itself, bytes; work for all of a run, s a file.
+#: Limits for a small file: memory beyond the program's own, bytes; processor time for all of a run, s per file.
 MEMORY, WORK_S = 3 << 29, 2.0
 
-#: Every kind of file that taxel.open and the loaders read, with what writes a sound one into a folder.
+#: Every kind of file that taxel.open and the loaders read, with a function that writes a valid one into a folder.
 KINDS: dict[str, Callable[[Path], Path]] = {}
 
 
@@ -233,7 +233,7 @@ def spoil_mcap(rng: np.random.Generator, data: bytes) -> bytes:
         if opcode == 6:
             data[at + 33 : at + 37] = bytes(4)
             if rng.random() < 0.2:
-                # What it says that it unpacks to.
+                # The unpacked size that the chunk states.
                 data[at + 25 : at + 33] = struct.pack("<Q", int(rng.choice([0, 1, 2**16, 2**26, 2**29, 2**30, 2**60])))
         at += 9 + size
     numbers = list(re.finditer(rb"(?<=[:,\[ ])-?\d+(\.\d+)?(?=[,}\]])", bytes(data)))
@@ -321,7 +321,7 @@ def work(name: str, seed: int, first: int, count: int, folder: Path) -> list[str
             file.write_bytes(data)
         file = files[int(rng.integers(len(files)))]
         file.write_bytes(spoilt(rng, name, sound[file]))
-        # Where the process is killed, the last line says on which file.
+        # If the process is killed, the last line names the file.
         print(json.dumps({"at": number}), flush=True)
         if name in formats.FORMATS:
             said = load(name, path)

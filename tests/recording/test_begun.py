@@ -56,7 +56,8 @@ def tare() -> taxel.Tare:
     return taxel.Tare.take(walk(0), stop_us=STEP_US)
 
 
-#: Those whose past is what the taxels hold; others remember more (a displacement since a touch began, an adaptation).
+#: Encoders whose state is the taxels' values alone; others have more (a displacement since a touch began, an
+#: adaptation).
 ENCODERS = [
     ChangeEvents(),
     LevelCrossing([60.0, 90.0, 120.0]),
@@ -85,7 +86,7 @@ def test_from_its_first_stamp_on_the_spikes_are_those_of_the_whole(
     want = after(encoder.encode(whole), at)
     assert len(want) > 20
     assert after(encoder.encode(later), at) == want
-    # The events alone do not know it.
+    # The events alone do not contain the initial values.
     assert after(encoder.encode(later.events), at) != want
 
 
@@ -97,7 +98,7 @@ def test_a_readout_says_of_it_what_it_says_of_the_whole(tmp_path: Path) -> None:
     readout = Readout(LevelCrossing([60.0, 90.0, 120.0]), {"touch": (Neuron(tau=2.0, refractory=5.0), weights)})
     whole = taxel.detect.run(readout, taxel.open(tmp_path / "whole.mcap"))
     later = taxel.detect.run(readout, begun(events, at, tmp_path / "later.mcap"))
-    # What a neuron remembers has faded by then.
+    # The neuron's potential has decayed by then.
     behind = at + 50_000
     assert (whole.known > behind).sum() > 5
     np.testing.assert_array_equal(later.t[later.known > behind], whole.t[whole.known > behind])

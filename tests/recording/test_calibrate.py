@@ -42,7 +42,7 @@ def test_a_weight_laid_on_the_array_makes_newtons_of_events(tmp_path: Path) -> N
     assert after["pressure"]["peak"]["most"] == pytest.approx(1.5)
     assert after["pressure"]["area_mm2"] == before["pressure"]["area_mm2"]
     assert "calibration         ticks to N" in run("info", path).stdout
-    # The file is for people, too.
+    # The file is also meant to be read by people.
     said = json.loads(place.read_text())
     assert (said["unit"], said["of"], said["date"], said["note"]) == ("N", "ticks", "2026-11-21", "scale")
 

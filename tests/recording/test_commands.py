@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from shell import run
 
 import taxel
 
 from .making import record, some_events
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "taxel", *map(str, arguments)], check=False, capture_output=True, text=True
-    )
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +98,9 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
         (("convert", "WALK", "nowhere/a.csv"), "nowhere: no such folder"),
         (("convert", "WALK", "a.mcap", "--compression", "gzip"), "compression is 'gzip'"),
         (("convert", "WALK", "a.csv", "--frames", "-3"), "frames_hz is -3.0"),
+        (("cut", "WALK", "a.mcap", "--from", "99"), "walk.mcap lasts from 0.0001 to 0.0635 s; must be at most its end"),
+        (("cut", "WALK", "a.mcap", "--to", "0.0001"), "--to 0.0001: "),
+        (("cut", "WALK", "a.csv", "--from", "2", "--to", "1"), "start must not lie after stop"),
     ],
 )
 def test_wrong_input_ends_in_one_line_and_exit_code_2(
@@ -116,6 +112,17 @@ def test_wrong_input_ends_in_one_line_and_exit_code_2(
     assert said in done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_a_cut_within_a_recording_may_be_of_silence_and_reaches_its_last_event(walk: Path, tmp_path: Path) -> None:
+    for name, start, stop, events in (
+        ("silence", 0.001, 0.00101, 0),
+        ("last", 0.0635, 99, 2),
+        ("first", -1, 0.000101, 1),
+    ):
+        file = tmp_path / f"{name}.mcap"
+        assert run("cut", walk, file, "--from", start, "--to", stop).returncode == 0
+        assert len(taxel.open(file).events) == events
 
 
 @pytest.mark.parametrize("command", ["info", "convert"])

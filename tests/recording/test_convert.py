@@ -113,9 +113,9 @@ def test_what_a_target_cannot_hold_is_said(tmp_path: Path) -> None:
     record(one, some_events())
     lost = {kind: " | ".join(taxel.convert(one, tmp_path / f"x{kind}")) for kind in (".lsa", ".npz", ".csv")}
     assert lost[".npz"] == "raw datagrams with their arrival times"
-    for word in ("arrival times", "2 notes", "1 detections", "registers"):
+    for word in ("arrival times", "2 notes", "1 detection", "registers"):
         assert word in lost[".lsa"]
-    for word in ("raw datagrams", "sensor", "2 markers", "2 notes", "1 detections", "registers"):
+    for word in ("raw datagrams", "sensor", "2 markers", "2 notes", "1 detection", "registers"):
         assert word in lost[".csv"]
     fine = taxel.Events([0, 192], [1, 2], [3, 4], [True, False], array=THESIS)
     assert taxel.convert(fine, tmp_path / "fine.lsa") == ["times finer than 100 us"]

@@ -32,7 +32,7 @@ def test_a_small_file_cut_at_every_byte_gives_what_is_left(small: Path, tmp_path
     for cut in range(len(whole), 0, -1):
         os.truncate(path, cut)
         if cut < header:
-            # Before the end of the first record there is nothing to read.
+            # Before the end of the first record no file is readable.
             with pytest.raises(FormatError, match=r"cut\.mcap"):
                 taxel.open(path)
             continue
@@ -93,7 +93,7 @@ def test_a_bad_chunk_is_skipped_counted_and_said(tmp_path: Path) -> None:
     path.write_bytes(damaged)
     rec = taxel.open(path)
     assert rec.rebuilt["bad_chunks"] == 1
-    assert rec.verdict.startswith("LOST in the file: 1 bad chunks skipped")
+    assert rec.verdict.startswith("LOST in the file: 1 bad chunk skipped")
     assert not rec.truncated
     assert len(rec.events) < 1000
 

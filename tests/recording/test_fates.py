@@ -28,7 +28,7 @@ from taxel.recording.stored import stored
 from taxel.wire import Registers
 
 ARRAY = Array(8, 10, 2.0, name="mat")
-#: When the board's time was 0, by the host's clock: whole us.
+#: The host's clock at the board's time 0: whole us.
 BEGAN = 1_700_000_000_000_000_000
 KINDS = (".mcap", ".lsa", ".npz", ".csv", ".h5")
 
@@ -101,7 +101,7 @@ def test_every_field_is_decided_for_every_function() -> None:
         assert not lost or name in LINES, f"{name}: is lost somewhere, so a line says so"
 
 
-#: Each function of the table, from contents to contents.
+#: Each function of the table, from the contents before to those after.
 FUNCTIONS: dict[str, Callable[[Contents, Path], Contents]] = {
     "between": lambda of, _: between(of, 1000.0, 200_000.0),
     "region": lambda of, _: region(of, slice(1, 5), slice(None)),
@@ -236,7 +236,7 @@ class Model:
     verdict: bool = True
     counts: bool = True
     source: bool = True
-    #: Words of the lines that must be in `lost` from now on.
+    #: Words that the lines in `lost` must contain from now on.
     lost: set[str] = field(default_factory=set)
 
 
@@ -386,7 +386,7 @@ def test_in_any_chain_of_steps_nothing_goes_lost_unsaid(tmp_path: Path, seed: in
                 moved = [r[0] for r in rows_of(recording)]
                 by = moved[0] - m.rows[0][0] if moved else 0
                 assert all(abs(b - r[0] - by) <= 2 for b, r in zip(moved, m.rows, strict=True)), where
-                # The clock's fit is exact to 2 us only, so the model goes on from the times that taxel computed.
+                # The fit of the clock is exact to 2 us only, so the model continues with the times that taxel computed.
                 exact = taxel.recording.recording.Recording(recording._contents)
                 m.rows = rows_of(exact)
                 m.zeroed = [(z.t, z.x, z.y, z.rest) for z in exact.zeroings]

@@ -108,7 +108,8 @@ def test_silence_in_noise_at_the_floor_is_no_death(version: int, seed: int) -> N
     dead, stuck = rng.random((2, 64, 64)) < 0.003
     stuck &= ~dead
     sent = noisy_board(version, seed, dead, stuck)
-    # Joined in mid-stream, some live taxels are as silent as dead ones while all around them speak.
+    # When the recording starts in mid-stream, some live taxels have as few events as dead ones while all around them
+    # have many.
     quiet = heard(version, sent[300:780])
     spoke = np.zeros((64, 64), bool)
     own = np.ones(len(quiet), bool) if quiet.repaired is None else ~quiet.repaired
@@ -118,13 +119,14 @@ def test_silence_in_noise_at_the_floor_is_no_death(version: int, seed: int) -> N
     if version == 1:
         assert not found.dead.any(), "nothing shows which"
     else:
-        # The board told what each holds.
+        # The board's states reported every taxel's value.
         assert (found.dead == dead).all()
-    # A touch shows it; of version 1 one that shows one value for ever is as silent as a dead one.
+    # A touch reveals dead taxels; with version 1, a taxel that always reads one value cannot be distinguished from a
+    # dead one.
     found = taxel.health(heard(version, sent[300:]))
     assert (found.dead == (dead | stuck if version == 1 else dead)).all()
     assert (found.stuck == (stuck & (version == 2))).all()
-    # From the start on each live one spoke.
+    # From the start on, every live taxel has had an event.
     found = taxel.health(heard(version, sent))
     assert (found.dead == dead).all()
     assert not found.noisy.any()

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from refusal import refused
 
 import taxel
 from taxel import formats
@@ -60,10 +61,9 @@ def test_a_thousand_spoilt_files_are_read_or_refused_in_one_line(name: str, tmp_
 # files that ask for far more than they hold
 
 
-def refused(path: Path, said: str) -> None:
-    with pytest.raises(FormatError, match=said) as caught:
+def unreadable(path: Path, said: str) -> None:
+    with refused(said, FormatError):
         assert taxel.open(path).events is not None
-    assert "\n" not in str(caught.value)
 
 
 def npz(path: Path, name: str, member: bytes) -> Path:
@@ -83,39 +83,39 @@ def described(descr: str, shape: str) -> bytes:
 
 
 def test_a_declared_shape_of_a_million_millions_is_refused(tmp_path: Path) -> None:
-    refused(npz(tmp_path / "a.npz", "t", described("<i8", f"({10**12},)")), "array t: claims 8000000000000")
-    refused(npz(tmp_path / "a.npz", "t", described("<i8", "(1000,)")), r"array t: .* 8000 bytes .* there are 0")
+    unreadable(npz(tmp_path / "a.npz", "t", described("<i8", f"({10**12},)")), "array t: claims 8000000000000")
+    unreadable(npz(tmp_path / "a.npz", "t", described("<i8", "(1000,)")), r"array t: .* 8000 bytes .* there are 0")
 
 
 def test_a_huge_text_in_a_description_is_refused(tmp_path: Path) -> None:
     huge = described("<U500000000", "()")
-    refused(npz(tmp_path / "a.npz", "about", huge), "array about: claims 2000000000 .* at most 268435456")
-    refused(npz(tmp_path / "a.npz", "about", described("<U2000000000", "()")), "cannot be unpacked")
+    unreadable(npz(tmp_path / "a.npz", "about", huge), "array about: claims 2000000000 .* at most 268435456")
+    unreadable(npz(tmp_path / "a.npz", "about", described("<U2000000000", "()")), "cannot be unpacked")
 
 
 def test_a_sensor_that_is_too_large_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, t=[0], x=[60_000], y=[60_000], p=[True])
-    refused(path, f"60001 x 60001 taxels; at most {limits.TAXELS}")
+    unreadable(path, f"60001 x 60001 taxels; at most {limits.TAXELS}")
     huge = {"rows": 65_535, "columns": 65_535, "pitch_mm": 1.0, "name": ""}
     with pytest.raises(taxel.ProblemError, match="65535 x 65535 taxels; at most"):
         record(tmp_path / "a.mcap", some_events(), header={"array": huge})
     packed(tmp_path / "b.mcap", 1, array=huge)
-    refused(tmp_path / "b.mcap", "65535 x 65535 taxels; at most")
+    unreadable(tmp_path / "b.mcap", "65535 x 65535 taxels; at most")
 
 
 def test_a_time_out_of_all_reason_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(f"t_us,x,y,p\n0,1,1,1\n{2**62},1,1,0\n")
-    refused(path, "time 1: .* must lie within .*142 years")
+    unreadable(path, "time 1: .* must lie within .*142 years")
 
 
 def test_a_table_of_very_many_columns_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t_us" + ",a" * 3_000_000 + "\n")
-    refused(path, f"line 1: 3000001 columns; at most {limits.COLUMNS}")
+    unreadable(path, f"line 1: 3000001 columns; at most {limits.COLUMNS}")
     path.write_text("t_us,x0y0,x2000y2000\n" + "".join(f"{k},1,1\n" for k in range(1000)))
-    refused(path, "most are missing")
+    unreadable(path, "most are missing")
 
 
 def say_size(path: Path, chunk: int, size: int) -> None:
@@ -142,7 +142,7 @@ def test_a_chunk_that_says_it_unpacks_to_more_than_a_chunk_may_is_left_out_and_s
     say_size(path, 0, size)
     rec = taxel.open(path)
     assert rec.rebuilt["large_chunks"] == 1
-    assert "1 chunks skipped that say they unpack to more than 64 MiB" in rec.verdict
+    assert "1 chunk skipped, stated to unpack to more than 64 MiB" in rec.verdict
 
 
 def packed(path: Path, count: int, **told: object) -> None:
@@ -165,7 +165,7 @@ def test_datagrams_that_unpack_to_far_more_than_the_file_are_refused(tmp_path: P
     path = tmp_path / "trap.mcap"
     packed(path, 1500)
     assert path.stat().st_size < 200_000
-    refused(path, r"the datagrams up to here unpack to more than \d+ bytes \(100 times the file and 64 MiB\)")
+    unreadable(path, r"the datagrams up to here unpack to more than \d+ bytes \(100 times the file and 64 MiB\)")
 
 
 def test_what_is_just_within_the_limits_is_read(tmp_path: Path) -> None:

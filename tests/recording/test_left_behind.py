@@ -59,7 +59,7 @@ def test_a_part_of_the_sensor_is_read_out_at_the_pace_of_the_whole(slow: taxel.R
         assert again.registers is not None
         assert (again.registers, again.registers.array) == (slow.registers, slow.array)
         assert known(again) == known(slow)
-    # The events alone know of no board.
+    # The events alone have no board.
     assert known(part.events) != known(part)  # type: ignore[arg-type]
 
 
@@ -113,7 +113,7 @@ def test_two_parts_that_agree_are_merged_whole_and_two_that_do_not_say_so(tmp_pa
     for name in ("registers", "register_changes", "board_changes", "zeroings", "counts", "verdict"):
         assert getattr(whole, name) == getattr(recording, name), name
     np.testing.assert_array_equal(whole.held, recording.held)
-    assert whole.lost == ("1 notes without a time", "raw datagrams")
+    assert whole.lost == ("1 note without a time", "raw datagrams")
     assert whole.clock is not None
     both = taxel.merge([recording, other], gap_us=1000)
     said = " | ".join(both.lost)

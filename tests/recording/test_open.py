@@ -176,7 +176,7 @@ def test_a_recording_gives_all_that_was_recorded(rec: taxel.Recording) -> None:
     assert rec.counts["missing_numbers"] == 0
     assert rec.counts["decoder"]["changes"] == 400
     assert repr(rec).startswith("Recording(walk.mcap: 400 events, ")
-    assert "2 notes, 1 detections" in repr(rec)
+    assert "2 notes, 1 detection" in repr(rec)
 
 
 def test_the_clock_finds_offset_and_delay(rec: taxel.Recording) -> None:

@@ -16,6 +16,7 @@ import pytest
 from formats import making
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from shell import run
 
 import taxel
 from taxel._core import FormatError, ProblemError
@@ -23,12 +24,6 @@ from taxel._core import FormatError, ProblemError
 from .making import record, some_events, some_frames
 
 QUIET = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
-def run(*arguments: object, **how: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "taxel", *map(str, arguments)], check=False, capture_output=True, text=True, **how
-    )
 
 
 # .h5

@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 import tty
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loopback import until
 
 import taxel
 from taxel import _core
@@ -38,13 +38,6 @@ def play(events: taxel.Events, address: tuple[str, int]) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         for t in events.t:
             link.sendto(taxel.wire.encode(events[events.t == t]), address)
-
-
-def until(what: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not what():
-        assert time.monotonic() < end, "never came"
-        time.sleep(0.005)
 
 
 def lines(live: Live, name: str) -> int:
@@ -263,7 +256,7 @@ def test_the_command_says_what_came_of_each_source(tmp_path: Path) -> None:
     with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as command:
         assert command.stdin is not None
         assert command.stdout is not None
-        # More than is read at once.
+        # More lines than are read at once.
         command.stdin.write("t_us,ax\n" + "".join(f"{10_000 + k},0.25\n" for k in range(900)))
         command.stdin.flush()
         said = command.stdout.read()
@@ -291,7 +284,7 @@ def mcap(path: Path, clocks: dict[str, tuple[float, int]], seconds: float, rate:
 @settings(max_examples=12, deadline=None)
 @given(
     drift=st.floats(-200, 200),
-    # Within the hour a counter of 32 bits turns over.
+    # A 32-bit counter wraps around within the hour.
     begin=st.integers(0, 2**32 - 1),
     seconds=st.sampled_from([1.0, 3.0, 10.0]),
     seed=st.integers(0, 2**32 - 1),
@@ -387,7 +380,7 @@ def test_two_boards_that_drift_are_put_on_one_clock(tmp_path: Path) -> None:
         truth = began[name] + last * 1000 / (1 + drifts[name] * 1e-6)
         print(f"{name}: {clock.host_ns(last) - truth:.0f} ns, {clock.drift_ppm:+.2f} ppm")
         assert abs(clock.host_ns(last) - truth) < 1e6
-        # The host's clock against the board's: the other way round.
+        # The host's clock relative to the board's: the reverse conversion.
         assert abs(clock.drift_ppm + drifts[name]) < 50
     left = recording.sources["left"].clock
     at = int(left.board_us[-1])

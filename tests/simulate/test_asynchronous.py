@@ -45,7 +45,7 @@ def cut(frames: np.ndarray, registers: Registers, columns: int) -> list[tuple[fl
 def test_each_step_is_told_when_a_straight_line_reaches_it(seed):
     random, array = np.random.default_rng(seed), taxel.Array(4, 6)
     registers = Registers(array=array, wire_version=2, noise_floor=int(random.integers(0, 6)))
-    # A walk with rests and jumps, still at the end so that all is out.
+    # A random walk with rests and jumps, constant at the end so that all events are sent.
     steps = random.integers(-25, 26, (60, 24)) * (random.random((60, 24)) < 0.4)
     walk = np.clip(60 + np.cumsum(steps, axis=0), 0, registers.ramp).astype(np.uint16)
     walk = np.concatenate([walk, np.repeat(walk[-1:], 2, axis=0)])
@@ -106,7 +106,7 @@ def test_an_array_by_itself_hears_the_same_touch_as_a_scanned_one():
     assert [p for _, p in alone.events.markers] == [p for _, p in scanned.events.markers] == [True, False]
     for played in (scanned, alone):
         touched = played.events.t[(played.events.t > contact) & played.events.p]
-        # Half a frame, the fabric's 50 us and the foam's first touch.
+        # Half a frame, the fabric's 50 us and the first contact of the foam.
         assert 0 < touched[0] - contact < 2000
         assert played.words == 0 < played.bytes
     assert abs(np.percentile(alone.events.t, 50) - np.percentile(scanned.events.t, 50)) < 30_000

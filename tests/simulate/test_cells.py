@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refused
 
 from taxel import Array, ProblemError, SceneError
 from taxel.simulate import Layer, Scene, SceneFile, Silence, play, truth
@@ -224,9 +225,8 @@ def test_a_scene_whose_cells_are_too_few_says_so_once(tmp_path):
 def test_cells_that_make_no_sense_get_one_line_with_the_place(tmp_path, cells, said):
     place = tmp_path / "scene.toml"
     place.write_text(NARROW.replace("cells_per_pitch = 1", f"cells_per_pitch = {cells}"))
-    with pytest.raises(SceneError, match=said) as caught:
+    with refused(said, SceneError) as caught:
         SceneFile.open(place)
-    assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(str(place))
 
 

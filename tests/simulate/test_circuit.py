@@ -152,7 +152,7 @@ def test_a_line_whose_amplifier_saturates_is_held_no_longer(seed, wire_ohm):
     wanted = every(g, ground=lines, saturates=True)
     got = lines.volts(g)
     assert got == pytest.approx(wanted, rel=2e-6, abs=1e-9)
-    # It can fail: what lines that stay held would give is another thing.
+    # Check of the test itself: lines that are held would give a different result.
     held = np.clip(VirtualGround(**{**lines.get_params(), "rail_v": 1e9}).volts(g), 0, 5.0)
     assert 3 < np.count_nonzero(wanted >= 5.0) < 28
     assert np.abs(held - wanted).max() > 1e-3

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refused
 
 from taxel import FormatError, ProblemError
 from taxel.report import installed_sources
@@ -29,7 +30,7 @@ from taxel.simulate.fem import (
 from taxel.simulate.fem.contact import Contact
 from taxel.simulate.fem.solids import Solids
 
-#: Seconds, not minutes.
+#: Chosen so that the tests take seconds, not minutes.
 COARSE = {"mesh_mm": 0.25, "step_um": 25.0}
 #: Programs by engine, and the Python that runs each: GetFEM lives in the system's.
 ENGINES = {
@@ -266,9 +267,8 @@ def test_75_paths_serve_the_300_conditions():
     ],
 )
 def test_nonsense_is_one_clear_error(make, said):
-    with pytest.raises(ProblemError, match=said) as error:
+    with refused(said):
         make()
-    assert "\n" not in str(error.value)
 
 
 def test_no_folder_is_made_unasked(tmp_path):

@@ -74,7 +74,7 @@ def test_ctrl_c_ends_a_long_call(name: str) -> None:
             with pytest.raises(subprocess.TimeoutExpired):
                 child.wait(1.5)  # still in the call
             child.send_signal(signal.SIGINT)
-            # Half a second on a quiet machine; a call that does not ask would go on for minutes.
+            # Half a second on a quiet machine; a call that never checks would continue for minutes.
             assert child.wait(20) == 0
             assert child.stdout.read() == "interrupted\n"
         finally:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusal import refused
 from scipy.linalg import expm
 
 from taxel import Array, ProblemError, SceneError
@@ -188,6 +189,5 @@ def test_a_footprint_of_many_taxels_is_solved_as_one_of_few():
     ],
 )
 def test_nonsense_gets_one_clear_line(wrong, error, said):
-    with pytest.raises(error, match=said) as caught:
+    with refused(said, error):
         wrong()
-    assert "\n" not in str(caught.value)

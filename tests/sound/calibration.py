@@ -12,7 +12,7 @@ LAID = taxel.Load(FRAMES, 9.81)
 CALIBRATION = taxel.Calibration.table(ARRAY, [5.0, 50.0], [1.0, 9.0], unit="N")
 CALIBRATION_HOW = {"gain": 1.0, "rest": TARE, "floor": 0.5, "date": "2026-11-21", "note": "bench 2"}
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.Calibration.law": plain(
         taxel.Calibration.law, array=ARRAY, ramp=150.0, sensor={"exponent": 0.8}, unit="N", **CALIBRATION_HOW
@@ -54,8 +54,8 @@ SOUND: dict[str, Sound] = {
     ),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {}
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

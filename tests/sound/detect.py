@@ -22,7 +22,7 @@ def judged(folds: Any) -> taxel.detect.Judged:
     return taxel.detect.judge([EXAMPLE, EXAMPLE], RECIPE, folds)
 
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.Readout": plain(
         taxel.Readout,
@@ -112,7 +112,7 @@ SOUND: dict[str, Sound] = {
     ),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.detect.Judged": lambda: judged(2),
     "taxel.detect.Trained": lambda: judged(2).trained[0],
@@ -121,5 +121,5 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.detect.Outcome": lambda: taxel.detect.Outcome("walk", EXAMPLE, FOUND),
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

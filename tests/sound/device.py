@@ -43,7 +43,7 @@ def connect(opened: type[Cable] | type[Device], name: str | None = None) -> Call
     return call
 
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.device.Cable": lambda: (connect(Cable), {"place": line(), "baud": 115_200, "timeout": 30.0}),
     "taxel.device.Cable.command": plain(connect(Cable, "command"), command=Command(4, 140)),
@@ -58,12 +58,12 @@ SOUND: dict[str, Sound] = {
     "taxel.device.Device.record": plain(connect(Device, "record"), start=False),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.device.Greeting": connect(Cable, "greeting"),
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {
     "taxel.device.Port": "a result of taxel.device.ports, and a machine may have no serial port",
 }

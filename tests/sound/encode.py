@@ -8,7 +8,7 @@ from encode import test_laws as laws
 import taxel
 from sound.things import ARRAY, FRAMES, LEVELS, TARE, Sound, fresh, method, plain
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.encode.Encoder.encode": method(LEVELS, "encode", x=FRAMES),
     "taxel.encode.Encoder.from_json": plain(taxel.encode.Encoder.from_json, text=LEVELS.to_json()),
@@ -32,14 +32,14 @@ SOUND: dict[str, Sound] = {
     "taxel.encode.Encoder.fit": method(LEVELS, "fit", recordings=[FRAMES], targets=None),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.encode.Afferents": lambda: taxel.encode.Skin().afferents(ARRAY),
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}
 
 for encoder in laws.ENCODERS.values():
-    # One sound call of each encoder of the registry: its first example.
+    # One valid call of each encoder of the registry: its first example.
     SOUND.setdefault(f"taxel.encode.{type(encoder).__name__}", plain(type(encoder), **encoder.get_params(deep=False)))

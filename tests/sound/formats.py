@@ -8,7 +8,7 @@ import numpy as np
 import taxel
 from sound.things import EVENTS, Sound, every, plain
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.formats.trials": every(taxel.formats.trials, path="pdb", format="gaitpdb"),
     "taxel.formats.Trial": plain(
@@ -26,10 +26,10 @@ SOUND: dict[str, Sound] = {
     ),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.formats.Format": lambda: taxel.formats.FORMATS["gaitpdb"],
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

@@ -27,7 +27,7 @@ def answer() -> taxel.information.Answer:
     return taxel.information.answer(TOUCHES, window_ms=5.0, draws=1, folds=2, shuffles=1)
 
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.information.confusion_matrix": plain(
         taxel.information.confusion_matrix, labels=["a", "b"], responses=["a", "a"], classes=["a", "b"]
@@ -201,7 +201,7 @@ SOUND: dict[str, Sound] = {
     ),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.information.Answer": answer,
     "taxel.information.Code": lambda: taxel.information.RankOrder(window_ms=10.0),
@@ -213,5 +213,5 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.information.ZeroTest": lambda: answer().zero,
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

@@ -42,7 +42,7 @@ RIVALS: list[tuple[Any, dict[str, Any]]] = [
     (taxel.learn.HTP, {**EPOCHS, "window_ms": 1.0}),
 ]
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     **{f"taxel.learn.{rule.__name__}": plain(rule, **arguments) for rule, arguments in RIVALS},
     "taxel.learn.SKIM": plain(
@@ -146,12 +146,12 @@ SOUND: dict[str, Sound] = {
     "taxel.learn.STDP.fit": fresh(taxel.learn.STDP, "fit", patterns=[PLAIN], targets=None),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.learn.Certificate": lambda: REFUTED.certificate_,
     "taxel.learn.Margin": lambda: SOLVED.margin_,
     "taxel.learn.Row": lambda: REFUTED.certificate_.rows[0],
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

@@ -38,7 +38,7 @@ def panel(**arguments: Any) -> None:
     taxel.live.Panel(**arguments).stop()
 
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.live.Source": plain(
         taxel.live.Source, array=ARRAY, rate=100.0, bits=8, noise_floor=3, to="127.0.0.1:9", board=1
@@ -98,12 +98,12 @@ SOUND: dict[str, Sound] = {
     "taxel.live.heard": plain(taxel.live.heard, said=[taxel.Detection("a", 5, 6)]),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.live.Summary": lambda: taxel.live.Live(0, host="127.0.0.1").stop(),
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {
     "taxel.live.Live.source_address": "needs two boards each time; tried in tests/recording/test_sources.py",
     "taxel.live.Live.zero": "waits for events, each time anew; tried in tests/live/test_zero.py",

@@ -8,7 +8,7 @@ from sound.things import UNSIGNED, Sound, plain
 from taxel import _core
 from taxel._base.parameters import described
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.metrics.matching": plain(taxel.metrics.matching, spikes=[[1.0, 2.0]], targets=[[1.5]], window_ms=5.0),
     "taxel.metrics.f1": plain(taxel.metrics.f1, spikes=[[1.0, 2.0]], targets=[[1.5]], window_ms=5.0),
@@ -55,12 +55,12 @@ SOUND: dict[str, Sound] = {
     ),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.metrics.Matching": lambda: taxel.metrics.matching([[1.0]], [[1.5]], window_ms=5.0),
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}
 
 for metric in _core.metric_names():

@@ -11,7 +11,7 @@ from sound.things import ARRAY, EVENTS, FOUND, FRAMES, TARE, TRAINS, Sound, meth
 
 CLOCK = taxel.Clock(np.array([0, 1000]), np.array([5, 1_000_005]))
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.Array": plain(taxel.Array, rows=4, columns=4, pitch_mm=1.0, exists=np.ones((4, 4)), name="small"),
     "taxel.Array.index": method(ARRAY, "index", x=1, y=2),
@@ -75,11 +75,11 @@ SOUND: dict[str, Sound] = {
     "taxel.Clock.board_us_at": method(CLOCK, "board_us_at", host_ns=[500_000]),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.Clock": lambda: CLOCK,
     "taxel.Detection": lambda: FOUND[0],
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

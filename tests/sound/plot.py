@@ -11,7 +11,7 @@ from sound.things import EVENTS, FOUND, FRAMES, TRAINS, Sound, plain
 #: Drawn on again and again; where it is None a new one is made, which pyplot keeps.
 AXES = Figure().add_subplot()
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.plot.detections": plain(taxel.plot.detections, found=FOUND, ax=AXES),
     "taxel.plot.event_picture": plain(taxel.plot.event_picture, events=EVENTS, ax=AXES),
@@ -26,8 +26,8 @@ SOUND: dict[str, Sound] = {
     "taxel.plot.raster": plain(taxel.plot.raster, trains=TRAINS, ax=AXES),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {}
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

@@ -6,7 +6,7 @@ from typing import Any
 import taxel
 from sound.things import ARRAY, EVENTS, TARE, Sound, plain
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.open": plain(taxel.open, path="here_events.npz", array=ARRAY, pairing="direct", differences=False),
     "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
@@ -48,7 +48,7 @@ SOUND: dict[str, Sound] = {
     "taxel.Recording.on_clock": lambda: (taxel.open("here_clock.mcap").on_clock, {"name": "host"}),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.BoardChange": lambda: taxel.open("here_clock.mcap").board_changes[0],
     "taxel.Datagrams": lambda: taxel.open("here_clock.mcap").datagrams(),
@@ -56,5 +56,5 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.Zeroing": lambda: taxel.open("here_clock.mcap").zeroings[0],
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

@@ -53,7 +53,7 @@ def pipe() -> IO[bytes]:
     return os.fdopen(read, "rb")
 
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.simulate.Board": plain(
         taxel.simulate.Board,
@@ -182,7 +182,7 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.emulate": lambda: (taxel.simulate.emulate, EMULATED),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.simulate.Contact": lambda: MOTION.contacts[0],
     "taxel.simulate.EmulatorReport": lambda: taxel.simulate.emulate("127.0.0.1:9", [taxel.simulate.Silence(1.0)]),
@@ -195,5 +195,5 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.simulate.circuit.Trace": lambda: CIRCUIT.Converter().trace([1.4, 1.5, 2.0, 2.5], every_us=0.1, stop_us=6.0),
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

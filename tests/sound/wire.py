@@ -32,7 +32,7 @@ def status() -> Any:
     return decoder.status
 
 
-#: A sound call of everything public that takes anything, by its full name.
+#: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.wire.described": plain(taxel.wire.described, registers=REGISTERS),
     "taxel.wire.Registers.from_words": plain(
@@ -65,12 +65,12 @@ SOUND: dict[str, Sound] = {
     "taxel.wire.encode": plain(taxel.wire.encode, events=EVENTS),
 }
 
-#: How a call returns one of each type that taxel alone makes.
+#: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.wire.Counts": lambda: taxel.wire.Decoder().counts,
     "taxel.wire.Received": received,
     "taxel.wire.Status": status,
 }
 
-#: What is not tried, and why.
+#: Names that are not tested, and the reason.
 LEFT_OUT: dict[str, str] = {}

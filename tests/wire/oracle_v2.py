@@ -100,7 +100,7 @@ class Reader:
             self.offset[session] = self.latest - base if self.sessions else 0
             self.counts["resets"] += bool(self.sessions)
             self.sessions = [*self.sessions[-3:], session]
-            # From the board's reset on a taxel holds 0; who joins later has to be told.
+            # After the board's reset every taxel's value is 0; a receiver that joins later must be told the values.
             self.held, self.held_at, self.whole = {}, {}, sequence == 0
             self.seen[session] = set()
         if sequence in self.seen[session]:
@@ -194,7 +194,7 @@ def decode(datagrams, rows, columns):
     for data in datagrams:
         reader.push(data)
     for numbers in reader.seen.values():
-        # Modulo 2^32: numbers that are far apart lie on both sides of the wrap.
+        # Modulo 2^32: numbers that are far apart are on opposite sides of the wrap.
         wrapped = max(numbers) - min(numbers) > 2**31
         line = [n + 2**32 if wrapped and n < 2**31 else n for n in numbers]
         reader.counts["missing"] += max(line) - min(line) + 1 - len(line)

@@ -87,7 +87,7 @@ def test_a_whole_stream_says_what_the_slow_reader_hears(seed, valued_from, state
             body = words(kind, events, base=base, stride=4)
         sent = datagram(kind, body, sequence=sequence, base=base, stride=4)
         slow.push(sent)
-        # What is none may promise more than there is, to the end of the stream.
+        # Bytes that are not a datagram may state a length beyond the end of the stream, and so delay the decoding.
         noise = draw.choice([b"\xff" * draw.randrange(4), draw.randrange(30, 1400).to_bytes(2, "little") + b"\x54\x21"])
         stream, skipped = stream + noise + len(sent).to_bytes(2, "little") + sent, skipped + len(noise)
     reader = StreamReader()
@@ -167,7 +167,7 @@ def test_any_order_of_any_sessions_reads_as_the_slow_reader_does(seed, sessions,
                 flags=flags,
                 span=draw.choice([0, 9]),
             )
-            # Sessions begin in turn; any datagram may come late, or never.
+            # Sessions begin in order; any datagram may be late or lost.
             sent.append((session + (draw.choice([0, 0, 0, 1, 2]) if sequence else 0), draw.random(), data))
     given_ = [data for _, _, data in sorted(sent, key=lambda s: s[:2]) if draw.random() < 0.9]
     decoder, slow = Decoder(array=taxel.Array(16, 16)), Reader(16, 16)
@@ -208,7 +208,7 @@ def test_differences_joined_in_mid_stream_say_what_is_right_or_nothing(seed):
     unknown = 0
     for ours, right in heard:
         told = {row[:3]: row[4] for row in right}
-        # A state of a taxel that was not heard of is an event to who joined, and to nobody else.
+        # The state of a taxel without any event so far is an event for a receiver that joined late, and for no other.
         assert [row[:3] for row in ours if not row[5]] == [row[:3] for row in right if not row[5]]
         assert [row[4] for row in ours if row[4] is not None and not row[5] and row[4] != told[row[:3]]] == []
         unknown += sum(row[4] is None for row in ours)

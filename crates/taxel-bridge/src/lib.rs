@@ -1,7 +1,7 @@
-//! Datagrams to and from other computers, over Zenoh.
+//! Sends datagrams to other computers and receives them, over Zenoh.
 //!
-//! Transports the parcels of taxel unchanged. Of their format it knows only the position of the base time, so that tests can offset
-//! the clock of this computer. Endpoints are explicit: no multicast, no gossip, no discovery.
+//! The bridge transports taxel's parcels unchanged. It reads one field of their format, the base time, so that tests
+//! can offset the clock of this computer. Endpoints are explicit: no multicast, no gossip, no discovery.
 
 mod keys;
 mod publisher;

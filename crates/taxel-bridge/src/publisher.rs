@@ -40,7 +40,7 @@ impl Lane {
         // A lane that waits for a slow subscriber blocks neither the other lane nor the caller.
         let thread = std::thread::Builder::new().name("taxel-lane".to_owned()).spawn(move || {
             for parcel in waiting {
-                // Lost parcels show in the numbers of later ones.
+                // The numbers of later parcels reveal lost ones.
                 if publisher.put(parcel).wait().is_ok() {
                     counted.fetch_add(1, Ordering::Relaxed);
                 }
@@ -98,7 +98,7 @@ impl Publisher {
 
 #[pymethods]
 impl Publisher {
-    /// Begins to publish as `name`: listens at and connects to HOST:PORT. `about` describes the sensor, for queries.
+    /// Starts to publish as `name`: listens on and connects to HOST:PORT. `about` describes the sensor, for queries.
     /// For tests the published clock is ahead by `ahead_ns`, and runs faster by `drift_ppm`.
     #[new]
     #[pyo3(signature = (name, listen, connect, about, ahead_ns = 0, drift_ppm = 0.0))]
@@ -159,7 +159,7 @@ impl Publisher {
         })
     }
 
-    /// Sends what waits, and ends.
+    /// Sends the parcels in the queues, and closes the session.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| {
             let Some(mut open) = self.open.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };

@@ -48,11 +48,11 @@ fn config(listen: &[String], connect: &[String]) -> PyResult<String> {
     written.map(|()| config).map_err(|e| PyValueError::new_err(e.to_string()))
 }
 
-/// Endpoints as Zenoh writes them.
+/// Formats endpoints in Zenoh's syntax.
 fn places(places: &[String]) -> PyResult<String> {
     let mut said = vec![];
     for place in places {
-        // No character that could end the JSON text around it.
+        // Characters that could end the surrounding JSON text are refused.
         if !place.chars().all(|c| c.is_ascii_alphanumeric() || "-_.:[]%".contains(c)) || !place.contains(':') {
             return Err(PyValueError::new_err(format!("{place:?}: must be HOST:PORT")));
         }

@@ -1,4 +1,4 @@
-//! Subscriber: the computer that receives a board of another one.
+//! Subscriber: a computer that receives the data of a board connected to another computer.
 
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -28,7 +28,7 @@ struct Listening {
     _subscriber: pubsub::Subscriber<()>,
 }
 
-/// Receives what another computer publishes.
+/// Receives the publications of another computer.
 #[pyclass(frozen)]
 pub(crate) struct Subscriber {
     session: Session,
@@ -47,7 +47,7 @@ impl Subscriber {
             .express(true)
             .timeout(PATIENCE)
             .callback(move |reply: Reply| {
-                // Stamped in the callback, before any other thread has to wake.
+                // The time is taken in the callback, before another thread has to wake up.
                 let back = now_ns();
                 let answer = reply.result().ok().map(|sample| sample.payload().to_bytes().into_owned());
                 let _ = sender.try_send((answer, back));
@@ -130,7 +130,7 @@ impl Subscriber {
         Ok(message.map(|sample| PyBytes::new(py, &sample.payload().to_bytes())))
     }
 
-    /// A round trip to the clock of `name`: asked, came, answered, back, ns since 1970; None without an answer.
+    /// A round trip to the clock of `name`: times asked, came, answered, back, ns since 1970; None without an answer.
     fn compare(&self, py: Python<'_>, name: &str) -> PyResult<Option<(i64, i64, i64, i64)>> {
         py.detach(|| self.ask_clock(name)).map_err(|e| PyConnectionError::new_err(first_line(&e)))
     }
@@ -138,7 +138,8 @@ impl Subscriber {
     /// Closes the session.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| {
-            // First, so that no callback waits for a full queue; a reader ends by its timeout.
+            // The queue is closed first, so that no callback waits for it while it is full; a reader ends by its
+            // timeout.
             *self.listening.lock().unwrap_or_else(PoisonError::into_inner) = None;
             self.session.close().wait().map_err(|e| PyConnectionError::new_err(first_line(&e)))
         })

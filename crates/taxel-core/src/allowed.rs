@@ -1,20 +1,20 @@
-//! The allowed values of parameters and the messages for others: a table for each noun that has parameters.
+//! The allowed values of parameters, and the error messages for others: a table for each type that has parameters.
 //!
-//! Checks and their messages read it, and so do the documentation of the Python classes and the tests that try wrong
-//! values.
+//! The checks and their messages read the table, and so do the documentation of the Python classes and the tests of
+//! invalid values.
 
 use std::fmt;
 
 use crate::{Result, problem};
 
-/// A range of values. An end at infinity that does not belong to the range means that the value must be finite.
+/// A range of values. If an infinite end is excluded, the value must be finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     pub(crate) least: f64,
     pub(crate) least_in: bool,
     pub(crate) most: f64,
     pub(crate) most_in: bool,
-    /// The value is a whole number of these; 0 where it need not be.
+    /// The value must be a multiple of this; 0 if it need not be.
     step: f64,
 }
 
@@ -26,11 +26,11 @@ impl Range {
     pub const ABOVE_0: Self = Self { least: 0.0, ..Self::FINITE };
     /// 0 or more and finite.
     pub const FROM_0: Self = Self { least_in: true, ..Self::ABOVE_0 };
-    /// 0 or more, infinity too.
+    /// 0 or more, including infinity.
     pub const COST: Self = Self { most_in: true, ..Self::FROM_0 };
     /// A time in ms that is a whole number of us, 1 or more.
     pub const WHOLE_US: Self = Self { least: 1e-3, step: 1e-3, ..Self::FROM_0 }.below(1e12);
-    /// The same in s.
+    /// A time in s that is a whole number of us, 1 or more.
     pub const WHOLE_US_IN_S: Self = Self { least: 1e-6, step: 1e-6, ..Self::FROM_0 }.below(1e9);
     /// 1 or more.
     pub const FROM_1: Self = Self { least: 1.0, ..Self::FROM_0 };
@@ -41,25 +41,25 @@ impl Range {
         Self { least, ..Self::FINITE }
     }
 
-    /// Both ends in.
+    /// From the first value to the second, both included.
     #[must_use]
     pub const fn within(least: f64, most: f64) -> Self {
         Self { least, least_in: true, most, most_in: true, step: 0.0 }
     }
 
-    /// The same, up to a largest value.
+    /// The same range with this largest value, included.
     #[must_use]
     pub const fn at_most(self, most: f64) -> Self {
         Self { most, most_in: true, ..self }
     }
 
-    /// The same, up to but not at a value.
+    /// The same range with this upper end, excluded.
     #[must_use]
     pub const fn below(self, most: f64) -> Self {
         Self { most, most_in: false, ..self }
     }
 
-    /// Whether a value lies in it; NaN never does.
+    /// Whether a value is in the range; NaN never is.
     #[must_use]
     pub fn holds(&self, value: f64) -> bool {
         (if self.least_in { value >= self.least } else { value > self.least })
@@ -71,7 +71,7 @@ impl Range {
     }
 }
 
-/// As an error words it behind "must be".
+/// The range as an error message writes it after "must be".
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (least, most) = (written(self.least), written(self.most));
@@ -89,7 +89,7 @@ impl fmt::Display for Range {
     }
 }
 
-/// A number as a reader writes it.
+/// A number as a person writes it.
 fn written(value: f64) -> String {
     if value != 0.0 && value.is_finite() && !(1e-3..1e7).contains(&value.abs()) {
         format!("{value:e}")
@@ -101,20 +101,20 @@ fn written(value: f64) -> String {
 /// A parameter that must lie in a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
-    /// As the caller writes it.
+    /// The name as the caller writes it.
     pub name: &'static str,
-    /// Of its value; empty where it has none.
+    /// The unit of the value; empty if it has none.
     pub unit: &'static str,
-    /// Which values it may have, each entry where it is a list.
+    /// The valid values; if the parameter is a list, those of each entry.
     pub range: Range,
 }
 
 impl Parameter {
-    /// Refuses a value that lies outside.
+    /// Refuses a value outside the range.
     ///
     /// # Errors
     ///
-    /// `Problem`, naming the parameter, its value and what would be right.
+    /// `Problem`, naming the parameter, its value and what is valid.
     pub fn check(&self, value: &dyn Numbers) -> Result<()> {
         let mut outcome = Ok(());
         value.each(&mut |place, value| {
@@ -133,9 +133,9 @@ impl Parameter {
     }
 }
 
-/// The numbers in a parameter, with their places where it is a list.
+/// The numbers in a parameter, with their indices if it is a list.
 pub trait Numbers {
-    /// Calls `look` with each number and its place.
+    /// Calls `look` with each number and its index.
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64));
 }
 
@@ -176,11 +176,11 @@ impl Numbers for Vec<f64> {
     }
 }
 
-/// Gives a noun its table `RANGES`, and `check_ranges`, which reads it. A name in parentheses after a parameter's is the
-/// method that gives its value where it is left out.
+/// Defines a type's table `RANGES`, and `check_ranges`, which reads it. A name in parentheses after a parameter is the
+/// method that returns its value if the parameter is left out.
 macro_rules! ranges {
     ($($name:ident $(($method:ident))?: $unit:literal, $range:expr;)*) => {
-        /// Which values its parameters may have.
+        /// The valid values of its parameters.
         pub const RANGES: &'static [$crate::allowed::Parameter] = &[
             $($crate::allowed::Parameter { name: stringify!($name), unit: $unit, range: $range },)*
         ];
@@ -207,7 +207,7 @@ pub fn above_0(name: &'static str, value: f64, unit: &'static str) -> Result<()>
     Parameter { name, unit, range: Range::ABOVE_0 }.check(&value)
 }
 
-/// Refuses weights that are not one a train, each finite.
+/// Refuses weights unless there is one finite weight per train.
 ///
 /// # Errors
 ///

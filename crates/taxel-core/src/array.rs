@@ -10,15 +10,15 @@ use crate::{Result, problem};
 /// A taxel's index is `row * columns + column`; `x` is the column, `y` the row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Array {
-    /// Taxels from top to bottom.
+    /// Number of rows, from top to bottom.
     pub rows: u16,
-    /// Taxels from left to right.
+    /// Number of columns, from left to right.
     pub columns: u16,
     /// Distance between the centres of neighbours, mm.
     pub pitch_mm: f64,
-    /// What people call it.
+    /// Name of the sensor.
     pub name: String,
-    /// Which taxels exist, by index; `None` where all do.
+    /// Which taxels exist, by index; `None` if all do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exists: Option<Vec<bool>>,
 }
@@ -28,7 +28,7 @@ impl Array {
     ///
     /// # Errors
     ///
-    /// `Problem` where there is no row or no column, or the pitch is not above 0.
+    /// `Problem` if there is no row or no column, or the pitch is not above 0.
     pub fn new(rows: u16, columns: u16, pitch_mm: f64, name: &str) -> Result<Self> {
         if rows == 0 || columns == 0 {
             return Err(problem!("array of {rows} x {columns} taxels: needs 1 row and 1 column or more"));
@@ -47,7 +47,7 @@ impl Array {
     ///
     /// # Errors
     ///
-    /// `Problem` where there is no row or no column, the pitch is not above 0, or `exists` has another length.
+    /// `Problem` if there is no row or no column, the pitch is not above 0, or `exists` has another length.
     pub fn check(&self) -> Result<()> {
         Self::new(self.rows, self.columns, self.pitch_mm, "")?;
         match &self.exists {
@@ -58,19 +58,19 @@ impl Array {
         }
     }
 
-    /// How many places the grid has, whether a taxel exists there or not.
+    /// Number of places in the grid, whether a taxel exists there or not.
     #[must_use]
     pub fn len(&self) -> usize {
         usize::from(self.rows) * usize::from(self.columns)
     }
 
-    /// Never: an array has one taxel or more.
+    /// Always false: an array has at least one taxel.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The index of the taxel at column `x`, row `y`; both must lie inside.
+    /// The index of the taxel at column `x`, row `y`; both must be on the array.
     #[must_use]
     pub fn index(&self, x: u16, y: u16) -> usize {
         usize::from(y) * usize::from(self.columns) + usize::from(x)

@@ -1,11 +1,12 @@
-//! The emulated board, as a state machine: trip times and commands in, datagrams and status lines out.
+//! The emulated board, as a state machine: its inputs are trip times and commands, its outputs datagrams and status
+//! lines.
 //!
-//! It follows the contract between board and logic word for word (reference, section 3, "What makes an event"), so that
-//! host, emulator and logic agree. It has no clock of its own: each frame moves its time on.
+//! It implements the contract between board and logic literally (reference, section 3, "What makes an event"), so that
+//! host, emulator and logic agree. It has no clock of its own: each frame advances its time.
 //!
-//! This file has the board's parts and how it is made and reset; `frame` runs them once a frame, `commands` answers the
-//! host. Of the parts `scan` has the order of taxels, `comparator`, `afferents` and `asynchronous` find events, `link`
-//! makes datagrams of them and queues these, `refresh` repeats values and totals.
+//! This file defines the board's parts, and how it is created and reset; `frame` runs the parts once per frame, and
+//! `commands` answers the host. `scan` defines the order of taxels, `comparator`, `afferents` and `asynchronous` find
+//! events, `link` encodes them as datagrams and queues these, `refresh` repeats values and totals.
 
 mod afferents;
 mod asynchronous;
@@ -68,27 +69,27 @@ pub struct Board {
     previous: Previous,
     intensity: IntensityWord,
     version_2: Version2,
-    /// Which reset this is, and the version of the wire after a reset.
+    /// Number of the session, drawn at reset, and the version of the wire after a reset.
     session: u16,
     first_version: u8,
-    /// As written, and as the scan uses them: taken over at a frame's edge.
+    /// Registers as written by the host, and as the scan uses them: changes take effect at the end of a frame.
     written: Registers,
     active: Registers,
     reader: CommandReader,
     scan: Scan,
-    /// Since reset, 10 ns.
+    /// Time since reset, 10 ns.
     time: u64,
     comparators: Comparators,
-    /// The comparators' model with `mechanoreceptor`.
+    /// The afferent model, used instead of the comparators with `mechanoreceptor`.
     afferents: Afferents,
-    /// The taxels' own comparators, on a board that scans nothing.
+    /// The taxels' own comparators, if the board does not scan.
     asynchronous: Option<Asynchronous>,
     link: Link,
     refresh: Refresh,
     counts: BoardCounts,
     /// The counts at the last reset.
     at_reset: BoardCounts,
-    /// The counts of the last status lines, by fault.
+    /// The counts in the last status lines, by fault.
     reported: [u64; 3],
 }
 
@@ -97,7 +98,7 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// `Device` where the registers break a rule; `Problem` where the array has more positions than version 2 can name.
+    /// `Device` if the registers break a rule; `Problem` if the array has more positions than version 2 can name.
     pub fn new(registers: Registers, array: &Array) -> Result<Self> {
         registers.check(array)?;
         let (version_2, intensity) = (Version2::default(), IntensityWord::default());
@@ -129,18 +130,19 @@ impl Board {
     ///
     /// # Errors
     ///
-    /// None that [`Board::new`] had not: the array is the same.
+    /// Those of [`Board::new`], for the same array.
     pub fn version_2(mut self, version_2: Version2) -> Result<Self> {
         (self.version_2, self.session) = (version_2, version_2.seed);
         self.link.reset(self.settings(), &self.array)?;
         Ok(self)
     }
 
-    /// Resets the board: registers, values and time as at the start, in a new session; what waits is still sent.
+    /// Resets the board: registers, values and time as at the start, in a new session; datagrams that wait are still
+    /// sent.
     ///
     /// # Errors
     ///
-    /// None that [`Board::new`] had not.
+    /// Those of [`Board::new`].
     pub fn reset(&mut self) -> Result<()> {
         let registers = Registers::at_reset(&self.array, self.written.channels);
         let registers = Registers { wire_version: self.first_version, ..registers };
@@ -155,20 +157,20 @@ impl Board {
         self.link.reset(self.settings(), &self.array)
     }
 
-    /// What the datagrams of version 2 have in common now.
+    /// The settings that all datagrams of version 2 share at present.
     fn settings(&self) -> Settings {
         let frame_sync = self.active.frame_sync && self.asynchronous.is_none();
         self.version_2.settings(&Registers { frame_sync, ..self.active }, self.intensity, self.session)
     }
 
-    /// Chooses what a new value is compared with.
+    /// Sets the reference with which a new value is compared.
     #[must_use]
     pub fn previous(mut self, previous: Previous) -> Self {
         self.previous = previous;
         self
     }
 
-    /// Chooses what an intensity word holds.
+    /// Sets the content of an intensity word.
     #[must_use]
     pub fn intensity(mut self, intensity: IntensityWord) -> Self {
         self.intensity = intensity;
@@ -176,17 +178,18 @@ impl Board {
         self
     }
 
-    /// Lets each taxel compare by itself with the value of its last event: no scan, and stamps of 1 us (thesis 4.5,
+    /// Lets each taxel compare its value with that of its last event by itself: no scan, and stamps of 1 us (thesis
+    /// 4.5,
     /// Table 7.1).
     ///
-    /// Each step of `noise_floor + 1` ticks is an event, at the time at which the taxel reaches it. The reading of a taxel
-    /// is known once a frame, at the time of its line; between two readings the value counts as a straight line, so events
-    /// leave a frame after they happened. At reset the reading of each taxel is sent. The order of lines plays no part;
-    /// while `mechanoreceptor` is set later, lines are scanned.
+    /// Each step of `noise_floor + 1` ticks is an event, at the time at which the taxel's value reaches it. A taxel is
+    /// read once per frame, at the time of its line, and its value is interpolated linearly between two readings, so
+    /// events are sent a frame after they happened. At reset the reading of each taxel is sent. The order of lines has
+    /// no effect. If `mechanoreceptor` is set later, lines are scanned while it is set.
     ///
     /// # Errors
     ///
-    /// `Problem` where the registers hold version 1 of the wire, whose stamps are of 100 us, or `mechanoreceptor`, or the
+    /// `Problem` if the registers hold version 1 of the wire, whose stamps are of 100 us, or `mechanoreceptor`, or the
     /// board compares with the last sample.
     pub fn asynchronous(mut self) -> Result<Self> {
         if self.written.wire_version != 2 {
@@ -203,25 +206,25 @@ impl Board {
         Ok(self)
     }
 
-    /// Whether taxels compare by themselves.
+    /// Whether taxels compare their values by themselves.
     fn is_asynchronous(&self) -> bool {
         self.asynchronous.is_some() && !self.active.mechanoreceptor
     }
 
-    /// Bounds the queue, in words; below 2 nothing gets through.
+    /// Sets the capacity of the queue, in words; below 2 no event can be sent.
     #[must_use]
     pub fn queue(mut self, words: usize) -> Self {
         self.link.bound(words);
         self
     }
 
-    /// The registers as written; the scan takes them over at the next frame's edge.
+    /// The registers as written; the scan applies them from the next frame on.
     #[must_use]
     pub fn registers(&self) -> &Registers {
         &self.written
     }
 
-    /// What the board did and lost so far.
+    /// Counts of what the board did and lost so far.
     #[must_use]
     pub fn counts(&self) -> &BoardCounts {
         &self.counts
@@ -233,7 +236,7 @@ impl Board {
         self.time as f64 / 100.0
     }
 
-    /// Up to where everything was sent on version 2, us: where taxels compare by themselves a frame less than the time.
+    /// Time up to which all events of version 2 were sent, us: with asynchronous taxels one frame less than the time.
     fn now(&self) -> u64 {
         let behind = if self.is_asynchronous() { self.active.frame_10ns() } else { 0 };
         self.time.saturating_sub(behind) / 100

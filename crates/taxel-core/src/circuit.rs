@@ -1,9 +1,11 @@
-//! The array's circuit: from what each taxel conducts to the ticks of its counter (thesis 3.4.2, 4.3.2, Appendix 1).
+//! The array's circuit: from the conductance of each taxel to the ticks of its counter (thesis 3.4.2, 4.3.2, Appendix
+//! 1).
 //!
-//! A [`fabric`] conducts more the harder it is pressed. All taxels share their lines, so the current of one is the
-//! others' too: [`grid`] solves that network exactly. A [`readout`] holds its lines, and by its amplifiers or resistors
-//! each sense line becomes a voltage; a [`converter`] multiplexes these onto its comparators, whose [`ramp`] turns them
-//! into ticks, and may be an [`adaptive`] one. [`chain`] is all of it, as an emulated board can have it.
+//! The conductance of a [`fabric`] rises with pressure. The taxels share their lines, so the current of one affects the
+//! others: [`grid`] solves this network exactly. A [`readout`] holds the lines at their voltages, and its amplifiers or
+//! resistors convert the current of each sense line to a voltage; a [`converter`] multiplexes these voltages to its
+//! comparators, whose [`ramp`] converts them to ticks and may be [`adaptive`]. [`chain`] combines all of these, for an
+//! emulated board.
 //!
 //! "Driven line" and "sense line" as for the board: columns are driven, one after the other, and all rows are read.
 

@@ -1,12 +1,12 @@
-//! Simulated touch: what a ball on foam does to the taxels beneath, frame by frame.
+//! Simulated touch: the effect of a ball on foam on the taxels beneath, frame by frame.
 //!
-//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], `trajectory`, [`track`]), pushed back by a law that is tabulated once
-//! ([`push`]). The foam under them has one of two models, which a scene chooses: `layer`, foam bonded to the
-//! board, for any bodies ([`bonded`]); `columns`, independent columns whose pressure the layer smooths, for one ball that
-//! moves straight up and down on foam that hardly widens (Poisson ratio up to 0.1): there it lies within a few per cent
-//! of the layer, and is the fastest ([`foam`], [`footprint`]). Fabric, amplifier and ramp turn stress at the foam's base
-//! into ticks of the converter ([`sensor`]); a [`stage`] plays scenes into frames. The touch itself is known to a
-//! fraction of a frame, so that detections can be held against it.
+//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], `trajectory`, [`track`]); the
+//! reaction force follows a law that is tabulated once ([`push`]). The scene chooses one of two models of the foam:
+//! `layer`, foam bonded to the board, for any bodies ([`bonded`]); or `columns`, independent columns whose pressure the
+//! layer smooths, for one ball that moves vertically on foam with a Poisson ratio of up to 0.1. Within these limits
+//! `columns` agrees with `layer` within a few per cent and is faster ([`foam`], [`footprint`]). Fabric, amplifier and
+//! ramp convert stress at the base of the foam to ticks of the converter ([`sensor`]); a [`stage`] plays scenes as
+//! frames. The times of touches are known to a fraction of a frame, so that detections can be scored against them.
 
 use crate::allowed::{Parameter, Range};
 use crate::{Error, Result};
@@ -44,7 +44,7 @@ pub use stage::{Prepared, Stage};
 pub use touch::{Contact, TouchKind};
 pub use track::Track;
 
-/// Refuses a value of a scene that lies outside its range; `place` names its owner.
+/// Checks that a value of a scene is within its range; `place` names its owner in the error.
 fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range: Range) -> Result<()> {
     Parameter { name, unit, range }.check(&value).map_err(|error| match error {
         Error::Problem(text) => Error::Scene(format!("{place}: {text}")),

@@ -1,4 +1,4 @@
-//! Spikes to detections, and their score.
+//! Detections from spikes, and their scores.
 
 mod frame_clock;
 mod readout;
@@ -19,21 +19,22 @@ use serde::{Deserialize, Serialize};
 pub struct Detection {
     /// The label of the neuron that fired.
     pub label: String,
-    /// When the event was, us of the board's clock: the crossing less the encoder's latency and the trained delay.
+    /// The time of the event by the board's clock, us: the crossing minus the encoder's latency and the trained delay.
     pub t: i64,
-    /// When it could first be known, us of the board's clock: the end of the frame in which the potential crosses.
+    /// The earliest time by the board's clock at which the host can know, us: the end of the frame of the crossing.
     pub known: i64,
-    /// How steeply the potential rose above its threshold, mV/ms: a measure of how sure.
+    /// The slope of potential minus threshold at the crossing, mV/ms: a measure of confidence.
     pub slope: f64,
-    /// Whether it may rest on values that states of version 2 repaired: then the event may have happened before `t`.
+    /// Whether the detection may rest on values that states of version 2 repaired: the event may then have happened
+    /// before `t`.
     pub repaired: bool,
 }
 
-/// An event that took place, by a reference.
+/// An event that took place, according to a reference.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reference {
-    /// What happened.
+    /// The label of the event.
     pub label: String,
-    /// When, us of the board's clock.
+    /// The time of the event by the board's clock, us.
     pub t: i64,
 }

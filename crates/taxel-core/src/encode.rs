@@ -1,4 +1,4 @@
-//! Events or frames to spikes, live or whole: the same spikes either way.
+//! Encodes events or frames as spikes, live or as a whole recording, with identical spikes.
 
 mod blocks;
 mod bracket;
@@ -31,7 +31,8 @@ use crate::reading::{self, Unfit};
 use crate::spikes::ms;
 use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeTrains, Stop, problem};
 
-/// The registry: a line an encoder, `NAME: Kind`, whose file is `encode/NAME.rs` and whose name in JSON is `NAME`.
+/// The registry: one line per encoder, `NAME: Kind`; the encoder's file is `encode/NAME.rs`, and its name in JSON is
+/// `NAME`.
 macro_rules! encoders {
     ($($(#[$about:meta])* $name:ident: $Kind:ident,)*) => {
         $(pub mod $name;)*
@@ -44,7 +45,7 @@ macro_rules! encoders {
             $($(#[$about])* $Kind($Kind),)*
         }
 
-        /// The names of all encoders, as JSON has them.
+        /// The names of all encoders, as in JSON.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
         impl Encoder {
@@ -56,7 +57,7 @@ macro_rules! encoders {
                 match self { $(Self::$Kind(e) => e,)* }
             }
 
-            /// Reads the parameters of the encoder of a name; none where there is none of that name.
+            /// Parses the parameters of the encoder with this name; none if there is no such encoder.
             fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
                 $(if name == stringify!($name) {
                     return Some(reading::from_value(parameters).map(Self::$Kind));
@@ -76,7 +77,7 @@ macro_rules! encoders {
     };
 }
 
-// Rustfmt finds no modules in a macro: the Makefile names their files to it.
+// Rustfmt does not find modules in a macro, so the Makefile passes it their files.
 encoders! {
     /// Changes since the last sent value, with 1 to 10 bits.
     change_events: ChangeEvents,
@@ -86,22 +87,22 @@ encoders! {
     threshold_izhikevich: ThresholdIzhikevich,
     /// The FA-1 afferent of equations 5.1 to 5.5.
     fa1: Fa1,
-    /// The SA-1 afferent, whose rate follows the force as long as a taxel is pressed.
+    /// The SA-1 afferent, whose rate follows the force while a taxel is pressed.
     sa1: Sa1,
     /// The SA-2 afferent, which fires steadily under a held load.
     sa2: Sa2,
     /// The FA-2 afferent, which responds to vibration and to the moment of contact.
     fa2: Fa2,
-    /// Afferents of all four types in places of their own.
+    /// Afferents of all four types, each at its own position.
     skin: Skin,
-    /// How many taxels are loaded.
+    /// The number of loaded taxels.
     contact_area: ContactArea,
-    /// How large a touch is, how hard, and where its centre has gone.
+    /// The area and force of a touch, and the displacement of its centre.
     moments: Moments,
 }
 
 impl Encoder {
-    /// Reads an encoder from JSON and checks every parameter; what is left out has its default.
+    /// Parses an encoder from JSON and checks every parameter; missing parameters have their defaults.
     ///
     /// # Errors
     ///
@@ -125,7 +126,7 @@ impl Encoder {
     /// The encoder with all its parameters, as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
-        // Numbers were checked to be finite, and nothing else in here can fail to be written.
+        // `check` guarantees finite numbers, and no other value of an encoder can fail to serialise.
         serde_json::to_string(self).unwrap_or_default()
     }
 
@@ -133,40 +134,40 @@ impl Encoder {
     ///
     /// # Errors
     ///
-    /// `Problem`, naming the parameter, its value and what would be right.
+    /// `Problem`, naming the parameter, its value and what is valid.
     pub fn check(&self) -> Result<()> {
         self.law().check()
     }
 
-    /// Begins to encode what an array feels.
+    /// Starts a stream that encodes the input of an array.
     ///
     /// # Errors
     ///
-    /// `Problem` where a parameter makes no sense, or an encoder that reads a tare has none or another array's.
+    /// `Problem` if a parameter is out of range, or if an encoder that needs a tare has none or one of another array.
     pub fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         self.check()?;
         self.law().stream(array)
     }
 
-    /// How much later than the touch itself a spike comes, ms: what the encoder's own rule costs.
+    /// The latency that the encoder's own algorithm adds between a touch and its spike, ms.
     #[must_use]
     pub fn latency_ms(&self) -> f64 {
         self.law().latency_ms()
     }
 
-    /// The number of spike trains that the encoder makes of an array.
+    /// The number of spike trains of the encoder for an array.
     #[must_use]
     pub fn trains(&self, array: &Array) -> usize {
         self.law().trains(array)
     }
 
-    /// Whether its spikes carry a signed value, so that a neuron receives each train as two, ON and OFF.
+    /// Whether the spikes carry a signed value, so that a neuron receives each train as two, ON and OFF.
     #[must_use]
     pub fn signed(&self) -> bool {
         self.law().signed()
     }
 
-    /// The same encoder with this tare; one that reads none stays as it is.
+    /// The same encoder with this tare; an encoder that uses no tare is returned unchanged.
     #[must_use]
     pub fn with_tare(&self, tare: &Tare) -> Self {
         let mut with = self.clone();
@@ -176,15 +177,15 @@ impl Encoder {
 
     /// Encodes a whole recording of events.
     ///
-    /// The window begins at the first stamp and ends one period and the latency after the last, with the last values
-    /// held until then.
+    /// The window begins at the first stamp and ends one period plus the latency after the last stamp; the last values
+    /// hold until then.
     ///
     /// # Errors
     ///
-    /// As [`Encoder::stream`] and [`Stream::push_events`]; `Problem` too where an event lies too far behind one before
-    /// it ([`EventsView::check_order`]); `Interrupted` where asked to stop.
+    /// As [`Encoder::stream`] and [`Stream::push_events`]; `Problem` also if an event is too far behind an earlier one
+    /// ([`EventsView::check_order`]); `Interrupted` if asked to stop.
     pub fn encode_events(&self, events: EventsView<'_>, stop: Stop<'_>) -> Result<SpikeTrains> {
-        /// Events between two looks at `stop`.
+        /// Events between two checks of `stop`.
         const PIECE: usize = 65_536;
         let mut stream = self.stream(events.array)?;
         events.check()?;
@@ -201,7 +202,7 @@ impl Encoder {
     ///
     /// # Errors
     ///
-    /// As [`Encoder::stream`], [`FramesView::check`] and [`Stream::push_frame`]; `Interrupted` where asked to stop.
+    /// As [`Encoder::stream`], [`FramesView::check`] and [`Stream::push_frame`]; `Interrupted` if asked to stop.
     pub fn encode_frames(&self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<SpikeTrains> {
         let mut stream = self.stream(frames.array)?;
         frames.check()?;

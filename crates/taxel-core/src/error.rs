@@ -1,17 +1,17 @@
-//! The one family of errors, and the flag by which a caller stops a long call.
+//! The error type of the crate, and the flag by which a caller stops a long call.
 
-/// What can go wrong, in kinds that a caller can tell apart.
+/// An error, in kinds that a caller can distinguish.
 ///
-/// Each text is one line: the place, what is there, what would be right.
+/// Each text is one line: the place, the value there, and what is valid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// Bytes or files that do not hold what they should.
+    /// Bytes or files with invalid content.
     #[error("{0}")]
     Format(String),
-    /// Arguments, spike trains or a learning problem that make no sense.
+    /// Arguments, spike trains or a learning problem that are not valid.
     #[error("{0}")]
     Problem(String),
-    /// The board, its registers or its commands.
+    /// An error of the board, its registers or its commands.
     #[error("{0}")]
     Device(String),
     /// A simulated scene that cannot be played.
@@ -22,7 +22,7 @@ pub enum Error {
     Interrupted,
 }
 
-/// The result of everything in this crate that can fail.
+/// The result of each function in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Makes an [`Error::Problem`] from a format string.
@@ -31,14 +31,14 @@ macro_rules! problem {
     ($($text:tt)*) => { $crate::Error::Problem(format!($($text)*)) };
 }
 
-/// Asks the caller, now and then, whether a long call should end early.
+/// Checks at intervals whether the caller asked a long call to end early.
 ///
-/// A loop that can take longer than a tenth of a second calls [`Stop::check`] every few milliseconds of work.
+/// A loop that can take longer than a tenth of a second must call [`Stop::check`] every few milliseconds of work.
 #[derive(Clone, Copy)]
 pub struct Stop<'a>(&'a (dyn Fn() -> bool + Sync));
 
 impl<'a> Stop<'a> {
-    /// Stops when `asked` gives true.
+    /// Stops when `asked` returns true.
     #[must_use]
     pub fn when(asked: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self(asked)
@@ -56,11 +56,11 @@ impl<'a> Stop<'a> {
         (self.0)()
     }
 
-    /// Ends the call where the caller asked to stop.
+    /// Ends the call if the caller asked to stop.
     ///
     /// # Errors
     ///
-    /// [`Error::Interrupted`] where it did.
+    /// [`Error::Interrupted`] if the caller asked to stop.
     pub fn check(&self) -> Result<()> {
         if self.asked() { Err(Error::Interrupted) } else { Ok(()) }
     }

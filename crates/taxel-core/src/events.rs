@@ -1,58 +1,58 @@
-//! What changed, when.
+//! Events: changes at taxels, with their times.
 
 use crate::{Array, Result, problem};
 
-/// How far an event may lie behind the one before it and still count, us: datagrams overtake each other.
+/// How far an event may be behind an earlier one and still be valid, us: the network may reorder datagrams.
 pub const FARTHEST_BACK_US: i64 = 100_000;
 
-/// The intensity words that belong to events.
+/// The values of the intensity words that belong to events.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Intensities {
-    /// Ticks of the converter's counter (1/300 us), one an event; 0 where none is present.
+    /// Ticks of the converter's counter (1/300 us), one per event; 0 if none is present.
     pub ticks: Vec<u16>,
-    /// Whether the event came with an intensity.
+    /// Whether the event has an intensity.
     pub present: Vec<bool>,
 }
 
-/// Start or stop of a recording, as the board marked it.
+/// Start or stop of a recording, as marked by the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Marker {
-    /// us, unwrapped.
+    /// Time, us, unwrapped.
     pub t: i64,
     /// Start (true) or stop.
     pub start: bool,
 }
 
-/// Changes at taxels, in the order in which they came; one column a field.
+/// Changes at taxels, in order of arrival; one column per field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Events {
     /// The sensor.
     pub array: Array,
-    /// us, unwrapped.
+    /// Time, us, unwrapped.
     pub t: Vec<i64>,
     /// Column.
     pub x: Vec<u16>,
     /// Row.
     pub y: Vec<u16>,
-    /// More pressure (true) or less.
+    /// Polarity: true if the pressure rose.
     pub p: Vec<bool>,
-    /// The held values that came with the changes, or none at all.
+    /// The taxels' values at the changes; none if no event has a value.
     pub intensity: Option<Intensities>,
-    /// Whether a state of version 2 gave the event, because its value differed from the held one: what it tells happened
-    /// some time before. None where no event is of that kind.
+    /// Whether the event was decoded from a state of version 2, because the state's value differed: the change itself
+    /// happened some time before. None if there is no such event.
     pub repaired: Option<Vec<bool>>,
     /// Starts and stops, by time.
     pub markers: Vec<Marker>,
 }
 
 impl Events {
-    /// No event yet.
+    /// A table without events.
     #[must_use]
     pub fn empty(array: Array) -> Self {
         Self { array, t: vec![], x: vec![], y: vec![], p: vec![], intensity: None, repaired: None, markers: vec![] }
     }
 
-    /// How many events.
+    /// Number of events.
     #[must_use]
     pub fn len(&self) -> usize {
         self.t.len()
@@ -64,7 +64,7 @@ impl Events {
         self.t.is_empty()
     }
 
-    /// The columns where they lie.
+    /// A view of the columns.
     #[must_use]
     pub fn view(&self) -> EventsView<'_> {
         EventsView {
@@ -79,13 +79,13 @@ impl Events {
         }
     }
 
-    /// Whether a state gave an event.
+    /// Whether event `k` was decoded from a state.
     #[must_use]
     pub fn is_repaired(&self, k: usize) -> bool {
         self.view().is_repaired(k)
     }
 
-    /// Sees to it that there is a column of intensities: none for the events so far.
+    /// Adds a column of intensities, if it is missing, in which the events so far have none.
     #[inline]
     pub(crate) fn complete_intensities(&mut self) {
         let n = self.len();
@@ -96,7 +96,7 @@ impl Events {
         }
     }
 
-    /// Says of the events from place `from` on, which were added just now, whether states gave them.
+    /// Marks the events from index `from` on, which were just added, as decoded from states or not.
     #[inline]
     pub(crate) fn mark_repaired(&mut self, from: usize, repaired: bool) {
         let n = self.len();
@@ -108,8 +108,8 @@ impl Events {
         }
     }
 
-    /// Appends the first `n` events of others of the same array, and all their markers; a column that only one side has
-    /// is filled up.
+    /// Appends the first `n` events of a table of the same array, and all its markers; a column that only one table has
+    /// is filled for the other.
     pub fn append(&mut self, more: &Self, n: usize) {
         let rows = self.len();
         self.t.extend_from_slice(&more.t[..n]);
@@ -140,7 +140,7 @@ impl Events {
         }
     }
 
-    /// Takes the events from place `rows` on away, and the markers from place `markers` on.
+    /// Splits off the events from index `rows` on, and the markers from index `markers` on.
     #[must_use]
     pub fn split_off(&mut self, rows: usize, markers: usize) -> Self {
         let intensity = self.intensity.as_mut();
@@ -157,7 +157,7 @@ impl Events {
         }
     }
 
-    /// Forgets all events and markers but keeps the columns' memory, to be filled again.
+    /// Removes all events and markers but keeps the columns' memory, to be filled again.
     pub fn clear(&mut self) {
         self.t.clear();
         self.x.clear();
@@ -181,20 +181,20 @@ pub struct IntensitiesView<'a> {
     pub present: &'a [bool],
 }
 
-/// Events wherever their columns lie: in an [`Events`], or in the memory of a caller, who may not change them meanwhile.
+/// A view of events whose columns are in an [`Events`], or in memory of a caller, who must not change them meanwhile.
 #[derive(Debug, Clone, Copy)]
 pub struct EventsView<'a> {
     /// The sensor.
     pub array: &'a Array,
-    /// us, unwrapped.
+    /// Time, us, unwrapped.
     pub t: &'a [i64],
     /// Column.
     pub x: &'a [u16],
     /// Row.
     pub y: &'a [u16],
-    /// More pressure (true) or less.
+    /// Polarity: true if the pressure rose.
     pub p: &'a [bool],
-    /// The held values that came with the changes, or none at all.
+    /// The taxels' values at the changes; none if no event has a value.
     pub intensity: Option<IntensitiesView<'a>>,
     /// As [`Events::repaired`].
     pub repaired: Option<&'a [bool]>,
@@ -203,7 +203,7 @@ pub struct EventsView<'a> {
 }
 
 impl<'a> EventsView<'a> {
-    /// How many events.
+    /// Number of events.
     #[must_use]
     pub fn len(&self) -> usize {
         self.t.len()
@@ -215,13 +215,13 @@ impl<'a> EventsView<'a> {
         self.t.is_empty()
     }
 
-    /// Whether a state gave an event.
+    /// Whether event `k` was decoded from a state.
     #[must_use]
     pub fn is_repaired(&self, k: usize) -> bool {
         self.repaired.is_some_and(|repaired| repaired[k])
     }
 
-    /// The events of a range of places, without markers.
+    /// The events of a range of indices, without markers.
     #[must_use]
     pub fn piece(&self, range: std::ops::Range<usize>) -> Self {
         let part = |i: IntensitiesView<'a>| IntensitiesView {
@@ -240,16 +240,17 @@ impl<'a> EventsView<'a> {
         }
     }
 
-    /// The same events `count` at a time, without markers.
+    /// Splits the events into views of `count` events each, without markers.
     pub fn pieces(self, count: usize) -> impl Iterator<Item = Self> {
         (0..self.len()).step_by(count).map(move |begin| self.piece(begin..self.len().min(begin + count)))
     }
 
-    /// Checks that the events of a whole recording came in order, but for what [`FARTHEST_BACK_US`] allows.
+    /// Checks that the events of a whole recording are in order, except for the reordering that [`FARTHEST_BACK_US`]
+    /// allows.
     ///
     /// # Errors
     ///
-    /// `Problem`, naming the first event that lies farther back.
+    /// `Problem`, naming the first event that is farther behind.
     pub fn check_order(&self) -> Result<()> {
         let (mut latest, mut row) = (i64::MIN, 0);
         for (k, &t) in self.t.iter().enumerate() {
@@ -265,7 +266,7 @@ impl<'a> EventsView<'a> {
         Ok(())
     }
 
-    /// Checks that columns are equally long and that every event lies on the array.
+    /// Checks that columns are equally long and that every event is on the array.
     ///
     /// # Errors
     ///

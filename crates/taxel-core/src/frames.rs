@@ -1,20 +1,20 @@
-//! Pictures of the whole array over time, wherever they lie.
+//! Views of pictures of the whole array over time.
 
 use crate::{Array, Result, problem};
 
-/// Pictures in the memory of a caller (a file, NumPy), who may not change them meanwhile: nothing here ever holds many.
+/// Pictures in memory of a caller (a file, NumPy), who must not change them meanwhile; this crate never copies many.
 #[derive(Debug, Clone, Copy)]
 pub struct FramesView<'a> {
     /// The sensor.
     pub array: &'a Array,
-    /// When each was taken, us, ascending.
+    /// Time of each picture, us, ascending.
     pub t: &'a [i64],
-    /// Picture after picture, row by row, in the sensor's unit.
+    /// Values, picture after picture, row by row, in the sensor's unit.
     pub values: &'a [f32],
 }
 
 impl<'a> FramesView<'a> {
-    /// Checks that there are as many values as pictures have taxels.
+    /// Checks that the number of values is that of pictures times taxels.
     ///
     /// # Errors
     ///

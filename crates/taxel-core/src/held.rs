@@ -1,4 +1,4 @@
-//! What each taxel holds: the value of its latest event that came with one.
+//! The current value of each taxel: the value of its latest event that has one.
 
 use crate::events::IntensitiesView;
 use crate::{Array, Events, EventsView, Intensities, Result, problem};
@@ -6,31 +6,31 @@ use crate::{Array, Events, EventsView, Intensities, Result, problem};
 /// The value of a taxel without any event so far, and of a change without a value.
 pub const UNKNOWN: u16 = u16::MAX;
 
-/// The latest value of each taxel, by index.
+/// The current value of each taxel, by index.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Held<V = u16> {
     values: Vec<V>,
 }
 
 impl<V: Copy> Held<V> {
-    /// Every one of `taxels` holds `value`.
+    /// Sets every one of `taxels` to `value`.
     #[must_use]
     pub fn all(taxels: usize, value: V) -> Self {
         Self { values: vec![value; taxels] }
     }
 
-    /// By taxel index.
+    /// The values by taxel index.
     #[must_use]
     pub fn values(&self) -> &[V] {
         &self.values
     }
 
-    /// By taxel index, to be replaced.
+    /// The values by taxel index, for writing.
     pub fn values_mut(&mut self) -> &mut [V] {
         &mut self.values
     }
 
-    /// Sets the value of a taxel; returns the former one.
+    /// Sets the value of a taxel; returns the previous one.
     #[inline(always)]
     pub fn set(&mut self, taxel: usize, value: V) -> V {
         std::mem::replace(&mut self.values[taxel], value)
@@ -38,7 +38,7 @@ impl<V: Copy> Held<V> {
 }
 
 impl<V: Copy + From<u16>> Held<V> {
-    /// Sets the values that events on the same array came with.
+    /// Applies the values of events on the same array.
     pub fn push(&mut self, events: EventsView<'_>) {
         for (_, taxel, ticks) in events.values() {
             self.set(taxel, V::from(ticks));
@@ -53,25 +53,25 @@ impl<V> From<Vec<V>> for Held<V> {
 }
 
 impl Held {
-    /// No taxel had an event so far.
+    /// Whether no taxel had an event so far.
     #[must_use]
     pub fn unknown(taxels: usize) -> Self {
         Self::all(taxels, UNKNOWN)
     }
 
-    /// Forgets all values.
+    /// Sets all values to unknown.
     pub fn clear(&mut self) {
         self.values.fill(UNKNOWN);
     }
 
-    /// The values as a picture shows them, in which 0 is also a taxel without any event so far.
+    /// The values as a picture shows them, in which a taxel without any event so far is 0.
     pub fn picture(&self) -> impl Iterator<Item = u16> {
         self.values.iter().map(|&value| if value == UNKNOWN { 0 } else { value })
     }
 }
 
-/// Events at `t` us that report what the taxels of an array hold, unless that is unknown. They are marked as repaired: they are no
-/// changes.
+/// Events at `t` us that report the known values of an array's taxels. They are marked as repaired, because they are
+/// not changes.
 #[must_use]
 pub fn as_events(held: &[u16], t: i64, array: &Array) -> Events {
     let known: Vec<usize> = (0..held.len()).filter(|&taxel| held[taxel] != UNKNOWN).collect();
@@ -90,7 +90,7 @@ pub fn as_events(held: &[u16], t: i64, array: &Array) -> Events {
 }
 
 impl EventsView<'_> {
-    /// Of each event that came with a value its row, its taxel's index and the value, ticks.
+    /// For each event with a value its row, its taxel's index and the value, ticks.
     pub fn values(&self) -> impl Iterator<Item = (usize, usize, u16)> {
         let (ticks, present) =
             self.intensity.map_or((&[][..], &[][..]), |IntensitiesView { ticks, present }| (ticks, present));
@@ -99,7 +99,7 @@ impl EventsView<'_> {
     }
 }
 
-/// A value that a taxel takes on at a time.
+/// A value that a taxel has from a time on.
 #[derive(Debug, Clone, Copy)]
 struct Change<V> {
     t: i64,
@@ -107,28 +107,30 @@ struct Change<V> {
     value: V,
 }
 
-/// What taxels hold at any time, by a whole recording.
+/// The taxels' values at any time of a whole recording.
 ///
-/// States are stored as time is first passed, so that an earlier time is found again without a walk from the beginning; they take
-/// as much memory as the changes at most.
+/// The state is saved at intervals when a time is first passed, so that an earlier time is reached without starting
+/// from the beginning. The saved states use at most as much memory as the changes.
 #[derive(Debug, Clone)]
 pub struct HeldOverTime<V> {
-    /// By time; those of one time in the order in which they came.
+    /// The changes by time; those of equal time in order of arrival.
     changes: Vec<Change<V>>,
-    /// The state before every `stride`-th change, as far as time was passed.
+    /// The state before every `stride`-th change, up to the latest time that was passed.
     states: Vec<Held<V>>,
     stride: usize,
     held: Held<V>,
-    /// How many changes the state has.
+    /// Number of changes applied to the current state.
     applied: usize,
 }
 
 impl<V: Copy + From<u16>> HeldOverTime<V> {
-    /// What the taxels `chosen` (by index; all where `None`) hold by the values of events; before their first event, `begins`.
+    /// The values of the `chosen` taxels (by index; all if `None`) from the events' values; before its first event, a
+    /// taxel has the value in `begins`.
     ///
     /// # Errors
     ///
-    /// `Problem` where columns are unequal, a taxel lies outside the array, or there is not one value in `begins` a chosen taxel.
+    /// `Problem` if columns are unequal, a taxel is outside the array, or `begins` does not have one value per chosen
+    /// taxel.
     pub fn new(events: EventsView<'_>, chosen: Option<&[u32]>, begins: Vec<V>) -> Result<Self> {
         events.check()?;
         let values = events.values().map(|(k, taxel, ticks)| (events.t[k], taxel, V::from(ticks)));
@@ -141,7 +143,7 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
         chosen: Option<&[u32]>,
         begins: Vec<V>,
     ) -> Result<Self> {
-        /// The place of a taxel that was not chosen.
+        /// Marks a taxel that was not chosen.
         const NONE: u32 = u32::MAX;
         let places = chosen.map(|chosen| {
             let mut places = vec![NONE; array.len()];
@@ -156,7 +158,7 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
         if begins.len() != wanted {
             return Err(problem!("{} values to begin with: must be {wanted}, one a taxel", begins.len()));
         }
-        // An array of recordings has 2^22 taxels at most.
+        // Readers limit an array to 2^22 taxels, so an index fits in 32 bits.
         let place = |taxel: usize| places.as_ref().map_or(taxel as u32, |places| places[taxel]);
         let changes = values.map(|(t, taxel, value)| Change { t, place: place(taxel), value });
         let mut changes: Vec<Change<V>> = changes.filter(|change| change.place != NONE).collect();
@@ -164,7 +166,7 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
         Ok(Self { changes, states: vec![], stride: begins.len().max(4096), held: begins.into(), applied: 0 })
     }
 
-    /// How many taxels were chosen.
+    /// Number of chosen taxels.
     #[must_use]
     pub fn taxels(&self) -> usize {
         self.held.values.len()
@@ -175,7 +177,7 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
         self.changes.iter().map(|change| change.t)
     }
 
-    /// What is held at `t` us, by the events up to and at that time.
+    /// The values at `t` us, after the events up to and at that time.
     pub fn at(&mut self, t: i64) -> &[V] {
         if self.applied > 0 && self.changes[self.applied - 1].t > t {
             let earlier = self.changes.partition_point(|change| change.t <= t) / self.stride;
@@ -198,7 +200,8 @@ impl<V: Copy + From<u16>> HeldOverTime<V> {
 }
 
 impl HeldOverTime<f32> {
-    /// As [`HeldOverTime::new`] where events came without values: a taxel begins with 0, and each event is a step of 1 up or down.
+    /// As [`HeldOverTime::new`], for events without values: each taxel begins with 0, and each event is a step of 1 up
+    /// or down.
     ///
     /// # Errors
     ///

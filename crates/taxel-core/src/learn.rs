@@ -1,7 +1,8 @@
-//! Weights from examples: patterns of input spikes, and the times at which the neuron shall fire.
+//! Learning weights from examples: patterns of input spikes, and the target times at which the neuron must fire.
 //!
-//! `statement` says once what the thesis' equations 6.9 to 6.14 ask of the weights; `engines` minimise over rows that they are
-//! handed; `cone` holds the learners CONE-X and CONE-R, `online` the window that slides; `rivals` the rules of others.
+//! `statement` turns the thesis' equations 6.9 to 6.14 into rows and an objective; `engines` are the solvers, which
+//! know rows only; `cone` has the learners CONE-X and CONE-R, `online` the sliding window; `rivals` has learning rules
+//! by other authors.
 
 mod cone;
 mod engines;

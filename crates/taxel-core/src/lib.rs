@@ -1,15 +1,16 @@
-//! What taxel computes, from bytes to timed decisions.
+//! The computations of taxel, from bytes to timed detections.
 //!
-//! The modules stand in the order that data takes them. Nothing here opens a socket or a file, looks at a clock or
-//! knows of Python, so the same bytes give the same result on a machine, however often and in however many threads.
+//! The modules are listed in the order of processing. No module opens a socket or a file, reads a clock or depends on
+//! Python, so the same bytes give the same result on a machine, however often they are processed and in however many
+//! threads.
 //!
-//! Of the nouns only `Frames` is not here but as a view: pictures are read one by one where they lie (a file, NumPy), so
-//! nothing here ever holds many.
+//! `Frames` exists here as a view only: pictures are read one by one from memory of the caller (a file, NumPy), so this
+//! crate never holds many.
 //!
-//! On another machine, decoding, the board and whatever adds and multiplies by [`vectors`]' plain loops give the same
-//! bits too. What takes an exponential from the platform's library (neurons, smoothed metrics, scenes), and learners,
-//! whose sums are fused and ordered as the machine's vectors are, can differ there in the last places of an `f64`; each
-//! fit's proof is reckoned on the machine that made it and holds by itself.
+//! On another machine, the decoder, the board and everything that adds and multiplies in [`vectors`]' plain loops give
+//! the same bits too. Computations that use an exponential of the platform's library (neurons, smoothed metrics,
+//! scenes), and learners, whose sums are fused and ordered by the machine's vector width, can differ there in the last
+//! digits of an `f64`. The certificate of each fit is computed on the machine that made the fit and is valid by itself.
 
 pub mod allowed;
 pub mod error;

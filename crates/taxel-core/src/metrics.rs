@@ -1,8 +1,8 @@
 //! Distances between spike trains, and between patterns of many trains.
 //!
-//! A metric is a value of [`Metric`]; [`Metric::distance`] takes two patterns, [`Metric::pairwise`] makes matrices. A
-//! distance between two trains becomes one between patterns as the sum over trains of the same number; the metrics with
-//! `spatial` or `multi_unit` in their names know of the other trains themselves.
+//! A metric is a value of [`Metric`]; [`Metric::distance`] compares two patterns, [`Metric::pairwise`] computes
+//! matrices. A distance between trains is extended to patterns as the sum over trains with the same number; the metrics
+//! with `spatial` or `multi_unit` in their names use other trains as well.
 
 mod edges;
 mod law;
@@ -27,20 +27,21 @@ use crate::parameters::Described;
 use crate::reading::{self, Unfit};
 use crate::{Error, Result, Stop, problem};
 
-/// The registry: a line a metric, `NAME: Kind`, whose file is `metrics/NAME.rs` and whose name in JSON is `NAME`.
+/// The registry: one line for each metric, `NAME: Kind`, with its file `metrics/NAME.rs` and `NAME` as its name in
+/// JSON.
 macro_rules! metrics {
     ($($(#[$about:meta])* $name:ident: $Kind:ident,)*) => {
         $(mod $name;)*
         $(pub use $name::$Kind;)*
 
-        /// A distance with its parameters.
+        /// A metric with its parameters.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "name", rename_all = "snake_case")]
         pub enum Metric {
             $($(#[$about])* $Kind($Kind),)*
         }
 
-        /// The names of all metrics, as JSON has them.
+        /// The names of all metrics in JSON.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
         impl Metric {
@@ -48,7 +49,7 @@ macro_rules! metrics {
                 match self { $(Self::$Kind(metric) => metric,)* }
             }
 
-            /// Reads the parameters of the metric of a name; none where there is none of that name.
+            /// Reads the parameters of the metric with this name; `None` if there is no such metric.
             fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
                 $(if name == stringify!($name) {
                     return Some(reading::from_value(parameters).map(Self::$Kind));
@@ -56,7 +57,7 @@ macro_rules! metrics {
                 None
             }
 
-            /// The parameters of a metric, by its name, with their defaults and ranges.
+            /// The parameters of a metric with their defaults and ranges, by the metric's name.
             #[must_use]
             pub fn described(name: &str) -> Option<Described> {
                 $(if name == stringify!($name) {
@@ -68,28 +69,28 @@ macro_rules! metrics {
     };
 }
 
-// Rustfmt finds no modules in a macro: the Makefile names their files to it.
+// Rustfmt does not find modules declared in a macro, so the Makefile lists their files for it.
 metrics! {
-    /// The cheapest way to turn one train into the other.
+    /// The least cost of turning one train into the other.
     victor_purpura: VictorPurpura,
-    /// The same where a spike may also change its train.
+    /// The least cost of turning one pattern into the other, if a spike may also change its train.
     victor_purpura_multi_unit: VictorPurpuraMultiUnit,
-    /// Euclidean distance of trains smoothed by an exponential.
+    /// Euclidean distance between trains smoothed by an exponential.
     van_rossum: VanRossum,
-    /// Time integral, or sum, of the absolute difference of trains smoothed by an exponential.
+    /// Time integral, or sum, of the absolute difference between trains smoothed by an exponential.
     van_rossum_absolute: VanRossumAbsolute,
-    /// Euclidean distance of patterns smoothed in time and over the array.
+    /// Euclidean distance between patterns smoothed in time and over the array.
     van_rossum_spatial: VanRossumSpatial,
-    /// Sum over taxels and time of the absolute difference of patterns smoothed in time and over the array.
+    /// Sum over taxels and time of the absolute difference between patterns smoothed in time and over the array.
     van_rossum_spatial_absolute: VanRossumSpatialAbsolute,
-    /// How much the intervals between spikes differ.
+    /// The difference between the trains' interspike intervals, averaged over time.
     isi_distance: IsiDistance,
-    /// How far spikes are from their nearest ones, over the intervals between spikes.
+    /// The distance of spikes to the nearest spikes of the other train, averaged over time.
     spike_distance: SpikeDistance,
 }
 
 impl Metric {
-    /// Reads a metric from JSON: an object whose `name` says which.
+    /// Reads a metric from JSON: an object with the metric's `name`.
     ///
     /// # Errors
     ///
@@ -103,7 +104,8 @@ impl Metric {
             let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
             return Err(problem!("metric is '{name}': must be one of {}", names.join(", ")));
         };
-        // A metric may hold another's parameters, whose reader would let unknown ones pass.
+        // A metric may contain the parameters of another type, whose reader ignores unknown keys, so all keys are
+        // checked here.
         let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
         if let Some(unknown) = given.keys().find(|key| !known.contains(&key.as_str())) {
             return Err(problem!("{unknown}: {name} takes {}", known.join(", ")));
@@ -126,16 +128,16 @@ impl Metric {
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters or times that make no sense, or another number of trains; `Interrupted`.
+    /// `Problem` for parameters or times that are not valid, or different numbers of trains; `Interrupted`.
     pub fn distance(&self, a: &Patterns<'_>, b: &Patterns<'_>, stop: Stop<'_>) -> Result<f64> {
         self.prepare(a, Some(b))?.between((a, 0), (b, 0), stop)
     }
 
-    /// The distances of all patterns of `a` from all of `b`, row by row; without `b` from each other.
+    /// The distances of all patterns of `a` to all of `b`, row by row; without `b`, among the patterns of `a`.
     ///
     /// # Errors
     ///
-    /// As [`Self::distance`].
+    /// Those of [`Self::distance`].
     pub fn pairwise(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let ready = self.prepare(a, b)?;
         let matrix = Matrix::new(a.count, b.map(|b| b.count));
@@ -146,7 +148,7 @@ impl Metric {
         Ok(matrix.finish())
     }
 
-    /// Checks parameters and patterns; works out what all pairs share.
+    /// Checks parameters and patterns, and computes what all pairs share.
     fn prepare(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + '_>> {
         self.check()?;
         a.check()?;

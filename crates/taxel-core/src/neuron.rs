@@ -1,4 +1,4 @@
-//! Spikes to spikes: the SRM0 neuron (thesis 6.3.1).
+//! The SRM0 neuron (thesis 6.3.1): output spikes from input spikes.
 //!
 //! [`Neuron`] holds the parameters, [`NeuronStream`] runs it spike by spike, in continuous time or on a grid;
 //! [`Neuron::run`] is the same stream fed with whole trains, so live and recorded inputs give the same spikes.

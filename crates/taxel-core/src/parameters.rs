@@ -1,26 +1,27 @@
-//! The parameters of a noun as other languages read them: names, defaults, ranges.
+//! The parameters of a type, as other languages read them: names, defaults, ranges.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::allowed::Parameter;
 
-/// The parameters of a noun: their defaults, those without a default, and their ranges.
+/// The parameters of a type: the defaults, the names without a default, and the ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Described {
     /// The defaults by name.
     pub defaults: Map<String, Value>,
     /// Names without a default.
     pub required: Vec<&'static str>,
-    /// The ranges, of numbers alone.
+    /// The ranges of numeric parameters.
     pub ranges: Vec<Parameter>,
 }
 
 impl Described {
-    /// Describes a noun by one that has all its defaults; names in `required` have no default, whatever the noun holds there.
+    /// Describes a type by a value with all its defaults; names in `required` have no default, whatever the value
+    /// contains.
     #[must_use]
     pub fn by(defaults: &impl Serialize, required: &[&'static str], ranges: &[Parameter]) -> Self {
-        // Parameters are plain structs of numbers, words and lists: nothing in them can fail to be written.
+        // Parameters are plain structs of numbers, strings and lists, which cannot fail to serialise.
         let mut defaults = match serde_json::to_value(defaults) {
             Ok(Value::Object(defaults)) => defaults,
             _ => Map::new(),
@@ -31,14 +32,14 @@ impl Described {
         Self { defaults, required: required.to_vec(), ranges: ranges.to_vec() }
     }
 
-    /// The same with one more parameter, which is null where it is left out.
+    /// The same description with one more parameter, which is null by default.
     #[must_use]
     pub fn or_nothing(mut self, name: &'static str) -> Self {
         self.defaults.insert(name.to_owned(), Value::Null);
         self
     }
 
-    /// The same with one more parameter.
+    /// The same description with one more parameter and its default.
     #[must_use]
     pub fn with(mut self, parameter: Parameter, default: impl Into<Value>) -> Self {
         self.defaults.insert(parameter.name.to_owned(), default.into());
@@ -46,8 +47,8 @@ impl Described {
         self
     }
 
-    /// The description as JSON: `{"defaults": {…}, "required": […], "ranges": {name: {"unit", "must_be", "least", …}}}`;
-    /// `least` and `most` are left out where there is none, `infinite` stands where infinity will do.
+    /// The description as JSON: `{"defaults": {…}, "required": […], "ranges": {name: {"unit", "must_be", "least",
+    /// …}}}`; `least` and `most` are omitted if there is no limit, and `infinite` is present if infinity is valid.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let ranges: Map<String, Value> = self

@@ -1,27 +1,27 @@
-//! JSON read into parameters; what does not fit is reported in one line in the words of all messages, not in a parser's.
+//! Parses JSON into parameters; errors are one line in taxel's own terms, not in the parser's.
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use serde_json::error::Category;
 
-/// What of a JSON text does not fit: where, what is there, what would be right.
+/// The part of a JSON text that is not valid: its place, its value, and what is valid.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unfit {
-    /// From the outermost name to the innermost, as `neuron.lambdas[2]`; empty where it is the whole.
+    /// Path from the outermost name to the innermost, as `neuron.lambdas[2]`; empty for the whole text.
     place: String,
-    /// Goes on from the place.
+    /// The message, which continues after the place.
     message: String,
 }
 
 impl Unfit {
-    /// The whole error, of what was read.
+    /// The whole error for a text that describes `what`.
     #[must_use]
     pub fn of(&self, what: &str) -> String {
         let colon = if self.message.starts_with(" is ") && self.place.is_empty() { "" } else { ": " };
         format!("{what}{colon}{}{}", self.place, self.message)
     }
 
-    /// The same for whoever wrote the parameter and knows its name alone, not the groups that it lies in.
+    /// The error for a caller who passed the parameter by its own name and does not know the groups that contain it.
     #[must_use]
     pub fn by_name(mut self) -> Self {
         self.place = self.place.rsplit('.').next().unwrap_or_default().to_owned();
@@ -29,16 +29,16 @@ impl Unfit {
     }
 }
 
-/// Reads a text.
+/// Parses a text.
 ///
 /// # Errors
 ///
-/// [`Unfit`] where it is no JSON, or not what is wanted.
+/// [`Unfit`] if the text is not JSON, or not a valid `T`.
 pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
     let value = serde_json::from_str(text).map_err(|error| {
         let message = match error.classify() {
             Category::Eof => "not JSON: it ends too early".to_owned(),
-            // Serde names the sign that it waited for, which is seldom the one that is wrong.
+            // Serde names the token that it expected, which is seldom the wrong one.
             _ => format!("not JSON: see line {}, column {}", error.line(), error.column()),
         };
         Unfit { place: String::new(), message }
@@ -46,11 +46,11 @@ pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
     from_value(value)
 }
 
-/// Reads a value.
+/// Converts a JSON value.
 ///
 /// # Errors
 ///
-/// [`Unfit`] where it is not what is wanted.
+/// [`Unfit`] if the value is not a valid `T`.
 pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
     serde_path_to_error::deserialize(&value).map_err(|error| {
         let place = error.path().to_string();
@@ -67,7 +67,7 @@ pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
     })
 }
 
-/// Says in words what serde says; its texts are the only thing that an error of serde_json gives.
+/// Rewrites an error of serde_json in plain terms; its text is the only information that serde_json gives.
 fn in_words(place: String, there: Option<&Value>, message: &str) -> Unfit {
     let quoted = |start: &str| message.strip_prefix(start).and_then(|rest| rest.split('`').nth(1));
     let wanted = message.split_once(", expected ").map_or("", |(_, wanted)| wanted);
@@ -95,7 +95,8 @@ fn in_words(place: String, there: Option<&Value>, message: &str) -> Unfit {
     Unfit { place, message }
 }
 
-/// The place of a name that its group does not know; some groups end the place with it, some before it.
+/// The place of a name that its group does not contain; for some types the path ends with the name, for others before
+/// it.
 fn beside(place: &str, name: &str) -> String {
     match place.strip_suffix(name).unwrap_or(place).trim_end_matches('.') {
         "" => name.to_owned(),
@@ -103,14 +104,14 @@ fn beside(place: &str, name: &str) -> String {
     }
 }
 
-/// Of several names in backticks the one that is meant by another, where one is near.
+/// The closest of several names in backticks, if one is similar enough.
 fn nearest<'a>(name: &str, wanted: &'a str) -> Option<&'a str> {
     let most = 1 + name.chars().count() / 4;
     let near = wanted.split('`').skip(1).step_by(2).map(|known| (edits(name, known), known));
     near.filter(|(edits, _)| *edits <= most).min_by_key(|(edits, _)| *edits).map(|(_, known)| known)
 }
 
-/// How many letters must be put in, taken out or changed to make one word of another (Levenshtein).
+/// The Levenshtein distance: the number of insertions, deletions and substitutions that turn one word into the other.
 fn edits(from: &str, to: &str) -> usize {
     let to: Vec<char> = to.chars().collect();
     let mut row: Vec<usize> = (0..=to.len()).collect();
@@ -126,7 +127,7 @@ fn edits(from: &str, to: &str) -> usize {
     row[to.len()]
 }
 
-/// A value as an error shows it: as JSON has it, not long, None for nothing.
+/// A value as an error shows it: as JSON, shortened, with None for null.
 fn shown(value: &Value) -> String {
     let message = match value {
         Value::Null => "None".to_owned(),
@@ -135,7 +136,7 @@ fn shown(value: &Value) -> String {
     if message.chars().count() <= 60 { message } else { message.chars().take(57).chain("...".chars()).collect() }
 }
 
-/// One of several names: `"a"`, `"b"` or `"c"`.
+/// Formats a choice of names: `"a"`, `"b"` or `"c"`.
 fn choice(wanted: &str) -> String {
     let names: Vec<String> = wanted.split('`').skip(1).step_by(2).map(|name| format!("\"{name}\"")).collect();
     match names.split_last() {
@@ -145,7 +146,7 @@ fn choice(wanted: &str) -> String {
     }
 }
 
-/// What is wanted, without the names of Rust's types.
+/// The expected type, without the names of Rust's types.
 fn kind(wanted: &str, there: Option<&Value>) -> String {
     let most = match wanted {
         "u8" => Some(u64::from(u8::MAX)),

@@ -1,22 +1,22 @@
-//! What taxels read at rest, and what of a value stands above it.
+//! The taxels' values at rest, and the part of a value above its rest.
 
 use std::collections::BTreeSet;
 
-/// Half a tick, by which a value must exceed the noise floor: the rest is a mean, and values are whole ticks.
+/// Half a tick, which is added to the noise floor as a threshold: the rest is a mean, and values are whole ticks.
 const HALF_TICK: f64 = 0.5;
 
-/// The least value of a touched taxel that rests at `rest`, for a board's noise floor; all in the sensor's unit.
+/// The smallest value of a touched taxel with this `rest`, for a board's noise floor; all in the sensor's unit.
 #[must_use]
 pub fn touched_from(rest: f64, noise_floor: f64) -> f64 {
     rest + noise_floor + HALF_TICK
 }
 
-/// A number in which taxels are read.
+/// A numeric type of taxels' values.
 pub trait Value: Copy + PartialOrd {
-    /// The rest of a taxel whose rest is unknown: no value lies above it.
+    /// The rest of a taxel whose rest is unknown: no value is above it.
     const NO_REST: Self;
 
-    /// This value less the rest; 0 where it is lower, or where either is unknown.
+    /// This value minus the rest; 0 if it is lower, or if either is unknown.
     #[must_use]
     fn less(self, rest: Self) -> Self;
 }
@@ -26,7 +26,7 @@ impl Value for u16 {
 
     #[inline(always)]
     fn less(self, rest: Self) -> Self {
-        // No branch: which taxels are pressed is unpredictable.
+        // Branch-free: a processor cannot predict which taxels are pressed.
         if self == crate::held::UNKNOWN { 0 } else { self.saturating_sub(rest) }
     }
 }
@@ -44,44 +44,44 @@ impl Value for f64 {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rest<V> {
     values: Vec<V>,
-    /// Whether it follows the lowest value.
+    /// Whether the rest follows the lowest value.
     lowest: bool,
-    /// Taxels whose rest was set one by one: a lower value does not change it.
+    /// Taxels whose rest was set individually: lower values do not change it.
     zeroed: BTreeSet<usize>,
 }
 
 impl<V: Value> Rest<V> {
-    /// The lowest value of each taxel so far, and from now on; [`Value::NO_REST`] of one without any.
+    /// A rest that follows the lowest value of each taxel; [`Value::NO_REST`] before its first value.
     #[must_use]
     pub fn lowest(values: Vec<V>) -> Self {
         Self { values, lowest: true, zeroed: BTreeSet::new() }
     }
 
-    /// Measured values, which do not change; [`Value::NO_REST`] where none is known, which the taxel's first value replaces.
+    /// Measured rests, which do not change; [`Value::NO_REST`] if unknown, which the taxel's first value replaces.
     #[must_use]
     pub fn measured(values: Vec<V>) -> Self {
         Self { lowest: false, ..Self::lowest(values) }
     }
 
-    /// Whether it follows the lowest value.
+    /// Whether the rest follows the lowest value.
     #[must_use]
     pub fn is_lowest(&self) -> bool {
         self.lowest
     }
 
-    /// By taxel index.
+    /// The rests by taxel index.
     #[must_use]
     pub fn values(&self) -> &[V] {
         &self.values
     }
 
-    /// Sets the rest of one taxel, whatever its values are from now on.
+    /// Sets the rest of one taxel permanently: its later values do not change it.
     pub fn set(&mut self, taxel: usize, rest: V) {
         self.values[taxel] = rest;
         self.zeroed.insert(taxel);
     }
 
-    /// Takes note of a taxel's value, which is not unknown; returns whether that changes its rest.
+    /// Updates the rest with a taxel's value, which must be known; returns whether the rest changed.
     #[inline(always)]
     pub fn follow(&mut self, taxel: usize, value: V) -> bool {
         let rest = self.values[taxel];
@@ -92,7 +92,7 @@ impl<V: Value> Rest<V> {
         lower
     }
 
-    /// How far a taxel's value stands above its rest; 0 where it is lower, or where either is unknown.
+    /// Difference of a taxel's value from its rest; 0 if it is lower, or if either is unknown.
     #[inline(always)]
     #[must_use]
     pub fn above(&self, taxel: usize, value: V) -> V {
@@ -101,7 +101,7 @@ impl<V: Value> Rest<V> {
 }
 
 impl Rest<u16> {
-    /// As [`Rest::above`], and 0 up to the noise floor: in whole ticks the same as [`touched_from`].
+    /// As [`Rest::above`], but 0 up to the noise floor; for whole ticks equivalent to [`touched_from`].
     #[inline(always)]
     #[must_use]
     pub fn above_noise(&self, taxel: usize, value: u16, noise_floor: u16) -> u16 {

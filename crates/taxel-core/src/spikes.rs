@@ -1,4 +1,4 @@
-//! Times by train.
+//! Spike trains: times of spikes, by train.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -6,26 +6,26 @@ use std::collections::binary_heap::PeekMut;
 
 use crate::{Result, Stop, problem};
 
-/// A time of the wire, us, as neurons count it, ms.
+/// Converts a time of the wire, us, to that of neurons, ms.
 #[must_use]
 pub fn ms(us: i64) -> f64 {
     us as f64 / 1000.0
 }
 
-/// A time of neurons, ms, as the wire counts it, us; not rounded.
+/// Converts a time of neurons, ms, to that of the wire, us; not rounded.
 #[must_use]
 pub fn us(ms: f64) -> f64 {
     ms * 1000.0
 }
 
-/// One spike on its way, as encoders hand them on.
+/// One spike, as encoders emit it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spike {
-    /// ms.
+    /// Time, ms.
     pub t: f64,
-    /// Which train it belongs to.
+    /// Index of its train.
     pub train: u32,
-    /// Signed value: polarity or bits; 1 where the encoder has none.
+    /// Signed value: polarity or bits; 1 if the encoder's spikes have none.
     pub value: f32,
 }
 
@@ -34,13 +34,13 @@ pub struct Spike {
 pub struct SpikeTrains {
     /// All times, train after train, ascending in each; ms.
     pub times: Vec<f64>,
-    /// Where each train begins, and at last where all end: trains + 1 entries.
+    /// Index of each train's first spike, and at the end the number of spikes: trains + 1 entries.
     pub offsets: Vec<usize>,
-    /// A signed value a spike, where the encoder has one.
+    /// A signed value per spike, if the encoder's spikes have one.
     pub values: Option<Vec<f32>>,
-    /// The window that was listened to; ms.
+    /// Start of the observed window; ms.
     pub start: f64,
-    /// Its end; ms.
+    /// End of the observed window; ms.
     pub stop: f64,
 }
 
@@ -49,7 +49,7 @@ impl SpikeTrains {
     ///
     /// # Errors
     ///
-    /// `Problem` where a spike names a train that is not there, or lies outside the window.
+    /// `Problem` if a spike's train does not exist, or if a spike is outside the window.
     pub fn from_spikes(spikes: &[Spike], trains: usize, signed: bool, start: f64, stop: f64) -> Result<Self> {
         let mut offsets = vec![0_usize; trains + 1];
         for s in spikes {
@@ -95,7 +95,7 @@ impl SpikeTrains {
     ///
     /// # Errors
     ///
-    /// `Problem` as [`SpikeTrains::check`]; `Interrupted` where the caller stops it.
+    /// `Problem` as [`SpikeTrains::check`]; `Interrupted` if the caller stops it.
     pub fn copy_of(
         times: &[f64],
         offsets: Vec<usize>,
@@ -113,13 +113,13 @@ impl SpikeTrains {
         Ok(trains)
     }
 
-    /// How many trains.
+    /// Number of trains.
     #[must_use]
     pub fn len(&self) -> usize {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// Whether there is no train at all.
+    /// Whether there are no trains.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -135,7 +135,7 @@ impl SpikeTrains {
     ///
     /// # Errors
     ///
-    /// `Interrupted` where the caller stops it.
+    /// `Interrupted` if the caller stops it.
     pub fn by_time(&self, stop: Stop<'_>) -> Result<Vec<Spike>> {
         let spike = |n: usize, k: usize| Spike {
             t: self.times[k],
@@ -152,7 +152,7 @@ impl SpikeTrains {
             all.sort_by(|a, b| a.t.total_cmp(&b.t));
             return Ok(all);
         }
-        // Trains are merged, as a sort of this many spikes could not be interrupted.
+        // Trains are merged instead of sorted, because a sort of this many spikes could not be interrupted.
         let next = |n: usize, k: usize| (k < self.offsets[n + 1]).then(|| Reverse(Next { t: self.times[k], n, k }));
         let mut heads: BinaryHeap<_> = (0..self.len()).filter_map(|n| next(n, self.offsets[n])).collect();
         while let Some(mut head) = heads.peek_mut() {
@@ -169,7 +169,7 @@ impl SpikeTrains {
         Ok(all)
     }
 
-    /// Signed trains as twice as many unsigned ones: first all ON (value above 0), then all OFF.
+    /// Splits signed trains into twice as many unsigned ones: first all ON (value above 0), then all OFF.
     #[must_use]
     pub fn split_by_sign(&self) -> Self {
         let Some(values) = &self.values else { return self.clone() };
@@ -194,10 +194,10 @@ impl SpikeTrains {
     }
 }
 
-/// So many spikes are copied, sorted or merged between two checks for Ctrl-C.
+/// Number of spikes that are copied, sorted or merged between two checks for Ctrl-C.
 const BETWEEN_CHECKS: usize = 1 << 18;
 
-/// The next spike of train `n`, number `k` of all; ordered by time, then by train.
+/// The next spike of train `n`, with index `k` among all; ordered by time, then by train.
 #[derive(Debug, Clone, Copy)]
 struct Next {
     t: f64,
@@ -225,7 +225,7 @@ impl PartialEq for Next {
 
 impl Eq for Next {}
 
-/// [`SpikeTrains::check`] for columns wherever they lie; of the values their number matters.
+/// [`SpikeTrains::check`] for borrowed columns; of the values only their number is checked.
 ///
 /// # Errors
 ///

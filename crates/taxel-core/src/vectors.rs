@@ -1,8 +1,8 @@
-//! Vector instructions: what the machine has, how a function is compiled for it, and eight numbers at once.
+//! Vector instructions: the sets of this machine, functions compiled for each set, and vectors of eight numbers.
 //!
-//! Two ways in. `wide!` compiles a plain loop for each width and changes nothing else, so all machines give the same
-//! bits. `kernel!` compiles a function over `Vector`s, whose `Vector::add_product` rounds once where the machine
-//! fuses multiply and add, so its sums differ between machines in their last places.
+//! There are two macros. `wide!` compiles a plain loop for each vector width without changing the arithmetic, so
+//! every machine computes the same bits. `kernel!` compiles a function over `Vector`s, whose `Vector::add_product`
+//! rounds once where the machine has fused multiply-add, so its sums differ between machines in the last digits.
 
 mod aligned;
 mod eight;

@@ -1,4 +1,4 @@
-//! Held values and rest, against a search through all events.
+//! Compares held values and rests with a search through all events.
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -6,7 +6,7 @@ use taxel_core::held::{Held, HeldOverTime, UNKNOWN, as_events};
 use taxel_core::rest::{Rest, Value, touched_from};
 use taxel_core::{Array, Events, Intensities};
 
-/// Events with and without values, out of order, several of one time.
+/// Random events with and without values, out of order, several at one time.
 fn events(random: &mut StdRng, array: &Array, n: usize) -> Events {
     let column = |random: &mut StdRng, most: u16| (0..n).map(|_| random.random_range(0..most)).collect();
     Events {
@@ -28,7 +28,7 @@ fn latest(events: &Events, taxel: usize, t: i64) -> Option<u16> {
     let its = |k: &usize| {
         events.t[*k] <= t && intensity.present[*k] && events.array.index(events.x[*k], events.y[*k]) == taxel
     };
-    // Of events of one time the last one counts.
+    // Of several events at one time, the last one is valid.
     (0..events.len()).filter(its).max_by_key(|&k| (events.t[k], k)).map(|k| intensity.ticks[k])
 }
 

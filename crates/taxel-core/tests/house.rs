@@ -1,14 +1,14 @@
-//! The house: modules import only from floors below theirs, and none in a circle.
+//! Tests the layers of the crate: a module imports only from layers below its own, and there are no circular imports.
 //!
-//! A module is a file. It depends on what its `use` declarations and its paths name, seen through re-exports, and on what
-//! it re-exports and names itself: so a parent that only declares and re-exports is on nobody's way. A registry's macro
-//! depends on the files that it lists. Tests do not count.
+//! A module is a file. It depends on the modules that its `use` declarations and paths name, resolved through
+//! re-exports. A re-export alone is not a dependency: only the names that a parent itself uses count. A registry's
+//! macro depends on the files that it lists. Tests do not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Floors from the ground up; those of one line do not know of each other.
+/// Layers from the lowest upwards; modules in one layer must not depend on each other.
 const FLOORS: [(&str, &[&[&str]]); 4] = [
     (
         "taxel-core",
@@ -92,14 +92,14 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
 
 type Name = Vec<String>;
 
-/// What a file declares of others: where names that it re-exports come from, and what it uses.
+/// The declarations of a file: the origin of names that it re-exports, and what it uses.
 #[derive(Default)]
 struct Module {
     exports: BTreeMap<String, Name>,
     uses: Vec<Name>,
 }
 
-/// A crate's modules by name; the root has none.
+/// A crate's modules by name; the root's name is empty.
 struct House(BTreeMap<Name, Module>);
 
 impl House {
@@ -118,7 +118,7 @@ impl House {
         Self(texts.iter().map(|(name, text)| (name.clone(), read(name, text, &names))).collect())
     }
 
-    /// The module that a path leads to.
+    /// The module to which a path resolves.
     fn home(&self, path: &[String], depth: usize) -> Name {
         let inside = (0..=path.len()).rev().find(|&k| self.0.contains_key(&path[..k])).unwrap_or(0);
         let (module, rest) = path.split_at(inside);
@@ -128,7 +128,7 @@ impl House {
         }
     }
 
-    /// Whom each module depends on.
+    /// The modules on which each module depends.
     fn edges(&self) -> BTreeMap<Name, BTreeSet<Name>> {
         let mut edges = BTreeMap::new();
         for (name, module) in &self.0 {
@@ -191,7 +191,7 @@ fn read(name: &Name, text: &str, names: &BTreeSet<Name>) -> Module {
     module
 }
 
-/// Each word of a text, with what stands before and behind it.
+/// Each word of a text, with the text before and after it.
 fn words(text: &str) -> impl Iterator<Item = (&str, &str, &str)> {
     let part = |c: char| c.is_alphanumeric() || c == '_';
     let starts = text.char_indices().filter(move |&(at, c)| part(c) && !text[..at].ends_with(part));
@@ -201,8 +201,8 @@ fn words(text: &str) -> impl Iterator<Item = (&str, &str, &str)> {
     })
 }
 
-/// Types named and functions called: a parent that does so with what it re-exports uses it. Not what an `enum` lists, a
-/// line each.
+/// The types and called functions in a text: a parent that names one of its re-exports uses it. The variants of an
+/// `enum`, one per line, do not count.
 fn named(text: &str) -> impl Iterator<Item = &str> {
     let used = |&(before, word, behind): &(&str, &str, &str)| match word.chars().next() {
         Some(first) if first.is_uppercase() => {
@@ -214,12 +214,12 @@ fn named(text: &str) -> impl Iterator<Item = &str> {
     words(text).filter(used).map(|(_, word, _)| word)
 }
 
-/// The files of a registry, `name: Kind`, which its macro declares and names.
+/// The files of a registry, `name: Kind`, which its macro declares.
 fn listed(text: &str) -> impl Iterator<Item = &str> {
     words(text).filter(|(_, _, behind)| behind.starts_with(": ")).map(|(_, word, _)| word)
 }
 
-/// Where the next `use` declaration begins.
+/// The position of the next `use` declaration.
 fn next_use(text: &str) -> Option<usize> {
     text.match_indices("use ").map(|(at, _)| at).find(|&at| {
         let line = text[..at].rfind('\n').map_or(0, |line| line + 1);
@@ -228,7 +228,7 @@ fn next_use(text: &str) -> Option<usize> {
     })
 }
 
-/// The single paths of a declaration with braces.
+/// Expands a declaration with braces into single paths.
 fn spread(tree: &str) -> Vec<String> {
     let Some((before, inside)) = tree.split_once('{') else {
         return vec![tree.split(" as ").next().unwrap_or_default().trim().to_owned()];
@@ -248,7 +248,7 @@ fn spread(tree: &str) -> Vec<String> {
     parts.flat_map(|part| spread(part.trim())).map(|part| format!("{}{part}", before.trim())).collect()
 }
 
-/// A path from the crate's root, where it is one of this crate.
+/// The path from the crate's root, if it is in this crate.
 fn absolute(name: &Name, path: &str, names: &BTreeSet<Name>) -> Option<Name> {
     let mut steps: Vec<String> = path.split("::").map(str::to_owned).collect();
     match steps[0].as_str() {
@@ -265,7 +265,7 @@ fn absolute(name: &Name, path: &str, names: &BTreeSet<Name>) -> Option<Name> {
     }
 }
 
-/// Modules that reach each other, in order of their names.
+/// Groups of modules that depend on each other in a circle, ordered by name.
 fn circles(edges: &BTreeMap<Name, BTreeSet<Name>>) -> BTreeSet<Vec<String>> {
     let reach = |from: &Name| {
         let (mut seen, mut next) = (BTreeSet::new(), vec![from.clone()]);

@@ -1,5 +1,5 @@
-//! Laws of the way from board to host over any network: what arrives whole is decoded, once (version 2) or as often as it
-//! came (version 1), and all counts close.
+//! Property tests of the path from board to host over a faulty network: each datagram that arrives whole is decoded,
+//! once (version 2) or each time it arrives (version 1), and all counts add up.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ fn rows(events: &Events) -> Vec<Row> {
     (0..events.len()).map(|k| (events.t[k], events.x[k], events.y[k], events.p[k], value(k))).collect()
 }
 
-/// A board's datagrams: some taxels move each frame, and now and then the whole array.
+/// A board's datagrams: some taxels change in each frame, and sometimes the whole array.
 fn sent(random: &mut StdRng, registers: Registers, frames: u32) -> (Vec<Vec<u8>>, Board) {
     let array = Array::thesis();
     let how = Version2 {
@@ -44,7 +44,7 @@ fn sent(random: &mut StdRng, registers: Registers, frames: u32) -> (Vec<Vec<u8>>
     (datagrams, board)
 }
 
-/// A network drawn at random, from a quiet one to one of which next to nothing comes out.
+/// A random network, from one without faults to one that delivers almost nothing.
 fn network(random: &mut StdRng) -> Network {
     let mut share = || [0.0, 0.01, 0.15][random.random_range(0..3)];
     let (lost, repeated, reordered, cut, corrupted) = (share(), share(), share(), share(), share());
@@ -78,7 +78,7 @@ fn of_version_2_every_intact_datagram_is_decoded_once_and_all_counts_close() {
                 Outcome::Refused(_) => refused += 1,
             }
         }
-        // Which arrived whole is known here by comparing bytes, not by any checksum.
+        // The test identifies intact datagrams by comparing bytes, not by a checksum.
         let by_bytes: BTreeMap<&[u8], u32> = (0..).zip(&sent).map(|(k, d)| (&d[..], k)).collect();
         let whole: Vec<u32> = arrived.iter().filter_map(|d| by_bytes.get(&d[..]).copied()).collect();
         let mut expected = whole.clone();
@@ -94,7 +94,7 @@ fn of_version_2_every_intact_datagram_is_decoded_once_and_all_counts_close() {
         let ends = expected.first().map_or(0, |&first| u64::from(first))
             + expected.last().map_or(sent.len() as u64, |&last| sent.len() as u64 - 1 - u64::from(last));
         assert_eq!(c.intact + c.missing + ends, sent.len() as u64, "seed {seed}");
-        // Of each one, what it tells alone; states only tell what differs.
+        // The events of one datagram decoded alone; states only give events for values that differ.
         let alone = |k: u32| {
             let mut one = Events::empty(Array::thesis());
             v2::Decoder::new(Array::thesis()).push(&sent[k as usize], None, &mut one);
@@ -129,7 +129,7 @@ fn of_version_1_every_whole_word_is_decoded_and_counts_close_to_the_byte() {
             decoder.push_into(datagram, None, &mut events);
             decoder.end_of_datagram_into(&mut events);
         }
-        // The same bytes, read slowly: a word is a byte with its top bit set and four without.
+        // A slow reference decoder: a word is a byte with its top bit set and four without.
         let all = arrived.concat();
         let mut at = 0;
         while at < all.len() {
@@ -162,13 +162,14 @@ fn of_version_1_every_whole_word_is_decoded_and_counts_close_to_the_byte() {
     }
 }
 
-/// Plays an hour of the board's time, with pauses, over a network that loses and damages; time must stay monotone and true.
+/// Plays an hour of the board's time, with pauses, over a network that drops and damages datagrams; time must be
+/// monotone and correct.
 fn soak(registers: Registers, faults: Faults, seed: u64) {
     let array = Array::thesis();
     let mut random = StdRng::seed_from_u64(seed);
     let mut board = Board::new(registers, &array).unwrap();
     let mut network = Network::new(faults).unwrap();
-    let mut receiver = wire::Receiver::new(Decoder::new(array.clone()), 1);
+    let mut decoder = wire::SenderDecoder::new(Decoder::new(array.clone()), 1);
     let mut events = Events::empty(array);
     let (mut ticks, mut still, mut heard, mut latest) = (vec![40_u16; 4096], 0_u32, 0_u64, 0_i64);
     let frame_us = registers.frame_us();
@@ -183,7 +184,7 @@ fn soak(registers: Registers, faults: Faults, seed: u64) {
         }
         let (now, begun) = (board.time_us(), events.len());
         let mut hear = |datagram: &[u8]| {
-            receiver.push(datagram, Some((now + frame_us) as i64), &mut events);
+            decoder.push(datagram, Some((now + frame_us) as i64), &mut events);
         };
         board
             .frame(&ticks, |datagram| {
@@ -193,13 +194,13 @@ fn soak(registers: Registers, faults: Faults, seed: u64) {
             .unwrap();
         heard += (events.len() - begun) as u64;
         for &t in &events.t[begun..] {
-            // A datagram is overtaken by eight others at most, so what comes is not older than the silence before them.
+            // At most eight other datagrams overtake one, so an event is at most eight pauses old.
             assert!(t >= latest - 8 * 6_300_000, "{t} after {latest}");
             latest = latest.max(t);
         }
         if let Some(&t) = events.t[begun..].iter().max() {
             let late = if faults.reordered > 0.0 { 8.0 * 6.3e6 } else { 100.0 };
-            // States are told at the end of a frame.
+            // States are sent at the end of a frame.
             assert!(t as f64 <= now + frame_us + 1.0 && t as f64 >= now - late, "{t} at {now}");
         }
         events.clear();
@@ -211,14 +212,14 @@ fn soak(registers: Registers, faults: Faults, seed: u64) {
     if *network
         == (taxel_core::board::NetworkCounts { given: network.given, delivered: network.given, ..Default::default() })
     {
-        assert_eq!(heard, counts.changes + receiver.two().counts().repaired);
+        assert_eq!(heard, counts.changes + decoder.two().counts().repaired);
     } else {
         assert!(heard > counts.changes / 2);
     }
     assert!(latest as f64 > 3590e6, "over {} turns of version 1's clock", 3600.0 / 6.5536);
 }
 
-/// Frames of 64 ms: an hour is 56 250 of them.
+/// Registers with frames of 64 ms: an hour has 56 250 of them.
 fn slow() -> Registers {
     Registers { line_period: 100_000, line_read: 100_000, ..Registers::default() }
 }

@@ -1,4 +1,5 @@
-//! A neuron fed piece by piece fires as one fed with whole trains, bit for bit, wherever time is cut.
+//! Tests that a neuron fed piece by piece fires at bit-identical times as one fed with whole trains, wherever the input
+//! is cut.
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -59,7 +60,7 @@ fn a_stream_cut_anywhere_fires_as_the_whole() {
         let trains = random_trains(&mut random, 30, round % 2 == 0);
         let weights: Vec<f64> = (0..30).map(|_| random.random_range(-0.2..0.5)).collect();
         let mut cuts: Vec<f64> = (0..random.random_range(0..200)).map(|_| random.random_range(0.0..220.0)).collect();
-        // Cuts on input spikes and on grid points are the ones that could matter.
+        // Cuts at input spikes and at grid points are the most likely to cause a difference.
         cuts.extend(trains.times.iter().step_by(3));
         cuts.extend((0..40).map(|k| f64::from(k) * 5.0));
         cuts.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! The shared vectors of the wire: every implementation gives each file the meaning that its JSON says.
+//! The shared vectors of the wire: every implementation must decode each file as its JSON file states.
 
 use serde::Deserialize;
 use taxel_core::vectors::Instructions;
@@ -13,7 +13,7 @@ struct Vector {
     rows: u16,
     pairing: Pairing,
     differences: bool,
-    /// Bytes, arrival, whether a datagram ends.
+    /// Number of bytes, arrival time, and whether a datagram ends there.
     pieces: Vec<(usize, Option<i64>, bool)>,
     counts: Counts,
     markers: Vec<(i64, bool)>,

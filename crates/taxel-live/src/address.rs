@@ -1,4 +1,4 @@
-//! Names of hosts to addresses, the same for senders and receivers.
+//! Resolves names of hosts to addresses, identically for senders and receivers.
 
 use std::net::{SocketAddr, ToSocketAddrs};
 
@@ -6,12 +6,12 @@ use taxel_core::problem;
 
 use crate::Result;
 
-/// The address of a host, given by name or number, and a port. Of several it is the first of IPv4, so that "localhost" is
-/// the same place to a board that sends and to a host that listens.
+/// The address of a host, given by name or number, and a port. The first IPv4 address is preferred, so that "localhost"
+/// resolves to the same address for a board that sends and for a host that listens.
 ///
 /// # Errors
 ///
-/// `Core(Problem)` where there is no such host.
+/// `Core(Problem)` if there is no such host.
 pub fn of_host(host: &str, port: u16) -> Result<SocketAddr> {
     let found: Vec<SocketAddr> = (host, port).to_socket_addrs().map_or_else(|_| vec![], Iterator::collect);
     let Some(first) = found.iter().find(|address| address.is_ipv4()).or(found.first()) else {
@@ -20,11 +20,11 @@ pub fn of_host(host: &str, port: u16) -> Result<SocketAddr> {
     Ok(*first)
 }
 
-/// The address that a text such as "127.0.0.1:5208", "localhost:5208" or "`[::1]`:5208" names.
+/// Parses an address such as "127.0.0.1:5208", "localhost:5208" or "`[::1]`:5208".
 ///
 /// # Errors
 ///
-/// `Core(Problem)` where it names none.
+/// `Core(Problem)` if the text is not an address.
 pub fn of_text(text: &str) -> Result<SocketAddr> {
     let (host, port) = text.rsplit_once(':').unwrap_or_default();
     let host = host.strip_prefix('[').and_then(|inner| inner.strip_suffix(']')).unwrap_or(host);

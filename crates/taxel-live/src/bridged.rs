@@ -15,20 +15,21 @@ pub struct Bridged {
     pub parcels: u64,
     /// Datagrams that were sent over the bridge and not delivered.
     pub missing: u64,
-    /// Datagrams that the other computer dropped, its queues being full.
+    /// Datagrams that the other computer dropped because its queues were full.
     pub dropped: u64,
     /// Messages that the other computer's kernel dropped.
     pub dropped_by_kernel: u64,
-    /// Parcels that were delivered again, and ignored.
+    /// Parcels that were delivered repeatedly, and ignored.
     pub repeated: u64,
-    /// Parcels that could not be read.
+    /// Parcels that could not be parsed.
     pub refused: u64,
-    /// How often the bridge was restarted during the subscription.
+    /// Number of restarts of the bridge during the subscription.
     pub restarts: u64,
-    /// How often nothing was received for a second or more.
+    /// Number of times that nothing was received for a second or more.
     pub silences: u64,
     /// Whether something was received within the last second.
-    pub heard: bool,
+    #[serde(rename = "heard")]
+    pub received: bool,
     /// Whether the bridge reported its end.
     pub ended: bool,
     /// The other computer's clock against this one's.

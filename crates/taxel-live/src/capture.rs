@@ -1,5 +1,5 @@
-//! Receives and counts UDP datagrams: in the caller's thread, or in a thread of its own between the socket and a bounded queue; or from
-//! another computer ([`Feed`]), through the same queue.
+//! Receives and counts UDP datagrams: in the caller's thread, or in a separate thread between the socket and a bounded
+//! queue. Datagrams from another computer ([`Feed`]) pass through the same queue.
 //!
 //! By default the caller receives in its own thread, which saves a wake-up and a copy. A caller that may wait for a disk requests a
 //! separate thread ([`Receiver::apart`]), which receives in the meantime.
@@ -37,18 +37,19 @@ pub use queue::{Batch, Datagram};
 pub use sender::{SendCounts, Sender};
 use socket::Socket;
 
-/// How often the thread checks whether it is to stop.
+/// Interval at which the thread checks whether it must stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// Largest amount received at a time, bytes.
 const AT_ONCE: usize = 4 * socket::LARGEST;
 
-/// Where datagrams come from.
+/// The source of datagrams.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
     /// A board sends to this address.
     Udp(SocketAddr),
-    /// Another computer receives them, and a bridge sends them to this one: its address, and the board's name there.
+    /// Another computer receives the board's datagrams, and a bridge sends them to this one: its address, and the
+    /// board's name there.
     Bridge(String),
 }
 
@@ -71,7 +72,8 @@ pub struct Receiver {
 
 #[derive(Debug)]
 enum From {
-    /// The socket, unless the thread has it, locked by a caller while it waits for datagrams; and the thread.
+    /// The socket, locked by a caller while it waits for datagrams, or `None` after it was moved into the thread; and
+    /// the thread.
     Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
     Feed(Feed),
 }
@@ -81,7 +83,7 @@ impl Receiver {
     ///
     /// # Errors
     ///
-    /// `Socket` where the address cannot be bound (taken, not ours), `Core(Problem)` where the queue is smaller than
+    /// `Socket` if the address cannot be bound (taken, not ours), `Core(Problem)` if the queue is smaller than
     /// the largest datagram.
     pub fn bind(address: SocketAddr, options: ReceiverOptions) -> Result<Self> {
         if options.queue_bytes < socket::LARGEST {
@@ -102,12 +104,13 @@ impl Receiver {
         Ok(Self { queue, place: Origin::Udp(address), from })
     }
 
-    /// Receives in a thread of its own from now on; a feed always has one. Where no readout waits for events, the thread pauses for
-    /// `gather` after each message: this saves wake-ups, and the kernel queues and stamps what arrives in the meantime.
+    /// Receives in a separate thread from now on; a feed always has one. If no readout waits for events, the thread
+    /// pauses for `gather` after each message, which saves wake-ups; the kernel queues and stamps what arrives in the
+    /// meantime.
     ///
     /// # Errors
     ///
-    /// `Socket` where the system has no thread left.
+    /// `Socket` if the system cannot create a thread.
     pub fn apart(&self, gather: Duration) -> Result<()> {
         let From::Socket(socket, thread) = &self.from else { return Ok(()) };
         let Some(socket) = lock(socket).take() else { return Ok(()) };
@@ -116,7 +119,7 @@ impl Receiver {
             .name("taxel-receive".to_owned())
             .spawn(move || receive(socket, &queue, gather))
             .map_err(|error| {
-                // The socket was moved into the thread that did not begin: nothing can be received any more.
+                // The socket was moved into the thread that could not start, so nothing can be received any more.
                 self.queue.close(None);
                 Error::socket(&self.place)(error)
             })?;
@@ -132,13 +135,13 @@ impl Receiver {
         (Self { queue, place: Origin::Bridge(name.to_owned()), from: From::Feed(feed.clone()) }, feed)
     }
 
-    /// Where datagrams come from, with the actual port where 0 was requested.
+    /// The source of datagrams, with the actual port if 0 was requested.
     #[must_use]
     pub fn place(&self) -> &Origin {
         &self.place
     }
 
-    /// The address of a socket; unspecified, with port 0, where there is none.
+    /// The address of the socket; unspecified, with port 0, if there is no socket.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         match self.place {
@@ -147,7 +150,7 @@ impl Receiver {
         }
     }
 
-    /// Counts of the bridge, where datagrams come over one.
+    /// Counts of the bridge, if datagrams are received over one.
     #[must_use]
     pub fn bridged(&self) -> Option<Bridged> {
         match &self.from {
@@ -156,7 +159,7 @@ impl Receiver {
         }
     }
 
-    /// While the queue is empty: everything that arrived before this time was read, ns of this computer's clock.
+    /// If the queue is empty: the time before which every arrived datagram was read, ns of this computer's clock.
     #[must_use]
     pub fn silent_until(&self) -> Option<i64> {
         match &self.from {
@@ -170,30 +173,31 @@ impl Receiver {
     ///
     /// # Errors
     ///
-    /// `Socket` where receiving ended because the socket failed.
-    pub fn take(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
-        let taken = match &self.from {
+    /// `Socket` if receiving ended because the socket failed.
+    pub fn receive(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
+        let received = match &self.from {
             From::Socket(socket, _) => {
                 let mut socket = lock(socket);
                 match &mut *socket {
                     Some(own) => {
-                        let taken = self.receive(own, batch, timeout);
+                        let came = self.receive_here(own, batch, timeout);
                         if self.queue.is_done() {
-                            // Another receiver can bind the address while the counts are still read.
+                            // Closing the socket lets another receiver bind the address while the counts are still
+                            // read.
                             *socket = None;
                         }
-                        taken
+                        came
                     }
-                    None => self.queue.take(batch, timeout),
+                    None => self.queue.pop(batch, timeout),
                 }
             }
-            From::Feed(_) => self.queue.take(batch, timeout),
+            From::Feed(_) => self.queue.pop(batch, timeout),
         };
-        taken.map_err(Error::socket(&self.place))
+        received.map_err(Error::socket(&self.place))
     }
 
     /// Receives in the caller's thread.
-    fn receive(&self, socket: &mut Socket, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
+    fn receive_here(&self, socket: &mut Socket, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
         batch.begin(AT_ONCE);
         if self.queue.is_done() {
             return Ok(false);
@@ -221,7 +225,7 @@ impl Receiver {
         self.queue.is_done()
     }
 
-    /// Requests the end: what has arrived by now is received, then nothing more.
+    /// Requests the end: what has arrived so far is received, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
         if let From::Feed(_) = self.from {
@@ -241,7 +245,7 @@ impl Drop for Receiver {
     }
 }
 
-/// The thread: receives from the socket into the queue, until it is to stop or the socket fails.
+/// The receiving thread: receives from the socket into the queue, until it must stop or the socket fails.
 fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
     let mut scratch = Batch::new();
     let ended = loop {
@@ -255,7 +259,7 @@ fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
                 if ended {
                     break Ok(());
                 }
-                // After a full batch more messages are waiting already.
+                // After a full batch more messages are already waiting.
                 if messages > 0 && !full && stopped_ns.is_none() && !gather.is_zero() {
                     std::thread::sleep(gather);
                 }
@@ -263,12 +267,12 @@ fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
             Err(error) => break Err(error),
         }
     };
-    // The address is free before the queue is closed.
+    // Closed first, so that the address is free when callers see the end of the queue.
     drop(socket);
     queue.close(ended.err());
 }
 
-/// Receives until nothing waits or the batch is full; waits for the first message no longer than `wait`.
+/// Receives until no message is waiting or the batch is full; waits at most `wait` for the first message.
 fn fill(socket: &mut Socket, batch: &mut Batch, wait: Option<Duration>) -> io::Result<u64> {
     let mut messages = 0;
     while batch.room() >= socket::LARGEST {

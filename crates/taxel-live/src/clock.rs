@@ -1,13 +1,15 @@
-//! A board's clock as the host sees it: offset and drift, from arrival times alone.
+//! Estimates a board's clock relative to the host's, offset and drift, from arrival times alone.
 //!
-//! Each datagram arrives with the delay of its transmission. So the points *arrival time minus board time* lie above a line, the
-//! offset between the clocks plus the shortest delay (which cannot be separated from it); fast datagrams lie near that line.
+//! Each datagram arrives with the delay of its transmission. So the points *arrival time minus board time* are above a
+//! line: the offset between the clocks plus the shortest delay, which cannot be separated from it. The fastest
+//! datagrams are close to that line.
 //!
-//! The fastest datagrams are outliers: one in a thousand is stamped 10 to 20 us earlier than all others, because a core was
-//! already awake or a timer had just fired, and a line below all points would depend on two of those. So one point in a hundred
-//! may lie below the line. It is the line of quantile regression for that quantile: of all such lines the nearest to the points
-//! above it; the points below it are balanced about the mean time. With fewer than a hundred points none lies below, and the
-//! line is the edge of the lower convex hull above the mean time.
+//! The very fastest datagrams are outliers: one in a thousand is stamped 10 to 20 us earlier than all others, because a
+//! core was already awake or a timer had just fired, and a line below all points would depend on two of those.
+//! Therefore one point in a hundred may be below the line. It is the line of quantile regression for that quantile: of
+//! all such lines the one closest to the points above it, with the points below it balanced about the mean time. With
+//! fewer than a hundred points none may be below, and the line is the edge of the lower convex hull above the mean
+//! time.
 
 mod offset;
 mod points;
@@ -21,34 +23,35 @@ pub use offset::Offset;
 use points::Points;
 use stretch::{Point, Stretch};
 
-/// Points are stored in stretches of this length, us of the board's clock ...
+/// Duration of a stretch, the unit in which points are stored, us of the board's clock.
 const STRETCH_US: i64 = 250_000;
-/// ... of which the line uses this many: 64 s, within which the rate of a quartz is constant.
+/// Number of stretches from which the line is fitted: 64 s, within which the rate of a quartz is constant.
 const STRETCHES: usize = 256;
-/// Of stretches older than this many, only the points near the line are stored.
+/// Number of recent stretches of which all stored points are kept; of older ones only the points near the line are.
 const NEW: usize = 8;
 
-/// The line of a new clock is fitted after each stretch, later after this many, because it hardly changes any more.
+/// Number of stretches after which the line is fitted again; a new clock's line, which still changes, is fitted after
+/// each.
 const FITTED_EACH: usize = 4;
 
-/// Points of one second that lie this far from the line belong to another clock: the board was reset, or the host's clock was
-/// set; ns. After a pause the limit is larger, by the uncertainty of the drift.
+/// Distance from the line, ns, beyond which points belong to another clock: the board was reset, or the host's clock
+/// was set. After a pause the limit is larger, by the uncertainty of the drift.
 const ANOTHER_CLOCK: f64 = 100e6;
-/// Number of consecutive stretches that must lie there.
+/// Number of consecutive stretches that must be beyond that distance.
 const ANOTHER: usize = 4;
 
-/// Largest drift of a quartz, ppm: the limit of the slope over a short time, in which a late arrival looks like a drift.
+/// Largest drift of a quartz, ppm; limits the slope over a short time, in which late arrivals resemble a drift.
 const QUARTZ: f64 = 200.0;
 /// Largest drift of any clock, ppm: a ceramic resonator has 5000.
 const ANY: f64 = 20_000.0;
-/// Duration from which on a slope beyond [`QUARTZ`] is accepted, us.
+/// Duration beyond which a slope larger than [`QUARTZ`] is accepted, us.
 const LONG_US: i64 = 10_000_000;
 
 /// The largest datagram of a board of version 1, bytes: 280 events. A shorter one ends a frame.
 const FULL: usize = 280 * WORD_BYTES;
 
-/// The earliest time at which the board could send a datagram, us, to be compared with its arrival. `last` is the time of its last
-/// event, `bytes` its length.
+/// The earliest time at which the board could send a datagram, us, for comparison with its arrival. `last` is the time
+/// of its last event, `bytes` its length.
 #[must_use]
 pub fn leaves(info: &DatagramInfo, last: Option<i64>, bytes: usize, frame_us: i64) -> Option<i64> {
     match info.version {
@@ -58,14 +61,14 @@ pub fn leaves(info: &DatagramInfo, last: Option<i64>, bytes: usize, frame_us: i6
     }
 }
 
-/// Estimates the [`Offset`] as datagrams come.
+/// Estimates the [`Offset`] from datagrams as they arrive.
 #[derive(Debug, Clone, Default)]
 pub struct BoardClock {
     /// Completed stretches, the oldest first.
     stretches: VecDeque<Stretch>,
     /// The current stretch.
     running: Stretch,
-    /// Number of consecutive stretches that lie far from the line.
+    /// Number of consecutive stretches that are far from the line.
     far: usize,
     /// Number of stretches since the line was fitted.
     unfitted: usize,
@@ -73,7 +76,7 @@ pub struct BoardClock {
 }
 
 impl BoardClock {
-    /// Lines through many datagrams, one for each 32 s, each with the board's time from which on it holds, us.
+    /// Lines fitted to many datagrams, one for each 32 s, each with the board's time from which on it is valid, us.
     #[must_use]
     pub fn offsets_of(board_us: &[i64], arrived_ns: &[i64]) -> Vec<(i64, Offset)> {
         let (mut clock, mut lines) = (Self::default(), vec![]);
@@ -94,15 +97,15 @@ impl BoardClock {
         lines
     }
 
-    /// Adds a datagram that the board could send at `board_us` at the earliest and that arrived at `arrived_ns`; returns whether a
-    /// stretch ended.
+    /// Adds a datagram that the board could send at `board_us` at the earliest and that arrived at `arrived_ns`;
+    /// returns whether a stretch ended.
     pub fn note(&mut self, board_us: i64, arrived_ns: i64) -> bool {
         let point = (board_us, arrived_ns - board_us * 1000);
         let mut ended = false;
         if self.running.points > 0 {
             let (now, then) = (board_us.div_euclid(STRETCH_US), self.running.last.div_euclid(STRETCH_US));
             if now < then {
-                // A late datagram of a stretch that has ended.
+                // Ignores a late datagram of a stretch that has ended.
                 return false;
             }
             if now > then {
@@ -116,7 +119,7 @@ impl BoardClock {
             // Before the first line the offset is that of the fastest datagram.
             Some(offset) if self.stretches.is_empty() => {
                 let early = (arrived_ns - offset.host_ns(board_us)).min(0);
-                // A point this early means that the host's clock was set, which several stretches must confirm.
+                // A point this early can only mean that the host's clock was set, which several stretches must confirm.
                 #[allow(clippy::cast_precision_loss)]
                 if early as f64 > -ANOTHER_CLOCK {
                     offset.host_ns += early;
@@ -127,7 +130,7 @@ impl BoardClock {
         ended
     }
 
-    /// The estimate, once a datagram arrived.
+    /// The estimate, after the first datagram.
     #[must_use]
     pub fn offset(&self) -> Option<Offset> {
         self.offset
@@ -155,7 +158,7 @@ impl BoardClock {
             self.stretches.drain(..self.stretches.len() - ANOTHER);
             self.far = 0;
         } else if self.far > 0 {
-            // The stretch may only be delayed: the line stays until more of them confirm another clock.
+            // The stretch may only be delayed: the line is kept until more stretches confirm another clock.
             return;
         }
         while self.stretches.len() > STRETCHES {
@@ -193,7 +196,7 @@ impl BoardClock {
         let points = Points { all, early: self.stretches.iter().map(Stretch::early).sum() };
         let slope = points.slope(self.offset.map_or(0.0, |offset| offset.drift_ppm * 1e-3), most);
         let height = points.under(slope).0 + slope * (origin - middle) as f64;
-        // The slope is in ns a us: a thousandth.
+        // The slope is in ns per us, that is, in thousandths.
         let host_ns = origin * 1000 + zero.1 + height as i64;
         self.offset = Some(Offset { board_us: origin, host_ns, drift_ppm: slope * 1e3 });
     }
@@ -207,8 +210,8 @@ mod tests {
     use super::stretch::{PART_US, QUICK};
     use super::*;
 
-    /// Arrivals each `every_us`, of a host clock that starts at `start_ns` and drifts, delayed at random: by 5 us, more of some,
-    /// and by 5 ms of `spikes` of them.
+    /// A simulated link: a datagram each `every_us` to a host clock that starts at `start_ns` and drifts, with random
+    /// delays of 5 us, more for some, and 5 ms for a fraction `spikes` of them.
     struct Link {
         start_ns: i64,
         drift_ppm: f64,
@@ -230,7 +233,7 @@ mod tests {
         fn send(&mut self, clock: &mut BoardClock, from_us: i64, to_us: i64) {
             let mut board_us = from_us;
             while board_us < to_us {
-                // Jitter of a machine that has other work: exponential, 60 us in the mean, and the link itself.
+                // Jitter of a busy machine, exponential with a mean of 60 us, plus the delay of the link itself.
                 let mut late_ns = 5_000.0 - 60_000.0 * self.random.random_range(1e-9..1.0_f64).ln();
                 if self.random.random_bool(self.spikes) {
                     late_ns += 5e6;
@@ -240,7 +243,7 @@ mod tests {
             }
         }
 
-        /// How far the line is from the truth at a time, the shortest link taken off, us.
+        /// How far the line is from the truth at a time, less the shortest link, us.
         fn off(&self, clock: &BoardClock, board_us: i64) -> f64 {
             let offset = clock.offset().expect("something came");
             (offset.host_ns(board_us) - self.truth(board_us) - 5_000) as f64 * 1e-3
@@ -277,8 +280,8 @@ mod tests {
         }
     }
 
-    /// How far two sources come out apart that send 2000 datagrams a second, after 1 s and after 10 s, us; `late_us` is by how
-    /// much a datagram comes late at a time, by chance.
+    /// Difference between the estimates for two sources that send 2000 datagrams a second, after 1 s and after 10 s,
+    /// us; `late_us` is the random delay of a datagram at a time.
     fn apart(seed: u64, late_us: impl Fn(i64, &mut StdRng) -> f64) -> [f64; 2] {
         let mut random = StdRng::seed_from_u64(seed);
         let mut off = [[0.0; 2]; 2];
@@ -300,14 +303,15 @@ mod tests {
         [0, 1].map(|k| (off[0][k] - off[1][k]).abs())
     }
 
-    /// In the mean `mean` us, without memory.
+    /// An exponentially distributed delay with this mean, us.
     fn tail(random: &mut StdRng, mean: f64) -> f64 {
         -mean * random.random_range(1e-9..1.0_f64).ln()
     }
 
     #[test]
     fn what_comes_sooner_than_is_usual_does_not_move_the_line() {
-        // As a sleeping sender's arrivals were recorded: 15 us and more, but one in a thousand sooner, down to 0.
+        // Recorded arrivals of a sleeping sender had this distribution: 15 us and more, but one in a thousand earlier,
+        // down to 0.
         for seed in 0..30 {
             let [after_1_s, after_10_s] = apart(seed, |_, random| {
                 let early = if random.random_bool(0.001) { random.random_range(0.0..1.0) } else { 1.0 };
@@ -320,7 +324,8 @@ mod tests {
 
     #[test]
     fn stretches_in_which_everything_was_late_do_not_move_the_line() {
-        // A sender that does not run for a third of the time, 50 ms at once; what it sends then is late by milliseconds.
+        // A sender that is suspended for a third of the time, 50 ms at once; its datagrams are then late by
+        // milliseconds.
         for seed in 0..30 {
             let [after_1_s, after_10_s] = apart(seed, |board_us, random| {
                 let waits = board_us / 50_000 % 3 == 1;
@@ -406,7 +411,7 @@ mod tests {
 
     #[test]
     fn lines_follow_a_quartz_that_warms_up() {
-        // 2 ppm within ten minutes: one line would be 150 us off.
+        // The drift changes by 2 ppm within ten minutes: a single line would be wrong by 150 us.
         let (mut board, mut arrived) = (vec![], vec![]);
         let mut random = StdRng::seed_from_u64(1);
         let truth = |t: f64| 1e18 + t * 1e3 + t * t * 1e-3 * (2.0 / 600e6) / 2.0;
@@ -421,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_stays_bounded() {
+    fn memory_stays_bounded() {
         let mut clock = BoardClock::default();
         for k in 0..2_000_000_i64 {
             clock.note(k * 50, k * 50_000 - k * k / 1000);

@@ -1,15 +1,17 @@
-//! The emulated board as a process of its own: frames scanned, datagrams sent, commands carried out, in real time.
+//! Runs the emulated board in real time: scans frames, sends datagrams and executes commands.
 
 mod control;
 mod feed;
 mod line;
+mod pace;
 mod replay;
+mod run;
 mod scenes;
 mod sync;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde::Serialize;
 use taxel_core::board::{Board, BoardCounts, Crossed, Faults, Flawed, Flaws, Network, NetworkCounts};
@@ -19,38 +21,28 @@ use taxel_core::{Array, Stop};
 
 use crate::Result;
 use crate::capture::{SendCounts, Sender};
-use crate::latency::{Latencies, Quantiles};
-use crate::recording::now_ns;
+use crate::latency::Quantiles;
 use control::Control;
 pub use feed::Feed;
 use line::Line;
+use pace::wake_sharply;
 pub use replay::Replay;
+use run::Run;
 pub use scenes::Scenes;
 use sync::Sync;
 
-/// How often [`Emulator::run`] reads commands, checks whether to stop, and reports.
-const LOOK_EVERY: Duration = Duration::from_millis(1);
-const REPORT_EVERY: Duration = Duration::from_millis(100);
-
-/// Longest busy wait before a frame is due, and the step by which it is adapted.
-const MOST_AWAKE: Duration = Duration::from_micros(30);
-const STEP: Duration = Duration::from_nanos(100);
-
-/// How often two clocks are read; the pair read within the shortest time counts.
-const READINGS: usize = 16;
-
-/// The touch that an emulated board scans: a scene, a recording played again, noise.
+/// The input that an emulated board scans: a scene, a replayed recording, noise.
 pub trait Touch: Send {
-    /// Writes the next frame's trip times (ticks of 1/300 us, one a taxel, by taxel index); false where there is none
-    /// any more, or the caller stops it while it waits, and the board stops.
+    /// Writes the next frame's trip times (ticks of 1/300 us, one per taxel, by taxel index). Returns false if there
+    /// are no more frames, or if the caller stops it while it waits; the board then stops.
     ///
     /// # Errors
     ///
-    /// Where the touch cannot be played; then the board stops too.
+    /// If the input cannot be played; the board then stops too.
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool>;
 
-    /// Whether the next frame can be written now, or there is none any more; waits for it some milliseconds at most, so
-    /// that a board without a frame yet carries out its commands.
+    /// Whether the next frame can be written now, or there is none. Waits for it for some milliseconds at most, so that
+    /// a board without a frame still executes its commands.
     ///
     /// # Errors
     ///
@@ -59,7 +51,7 @@ pub trait Touch: Send {
         Ok(true)
     }
 
-    /// Whether the frame that was written last is the last one, where that is known.
+    /// Whether the last written frame is the final one, if that is known.
     ///
     /// # Errors
     ///
@@ -76,44 +68,44 @@ impl<F: FnMut(&mut [u16]) -> bool + Send> Touch for F {
     }
 }
 
-/// How an [`Emulator`] works.
+/// The options of an [`Emulator`].
 #[derive(Debug, Clone)]
 pub struct EmulatorOptions {
-    /// Where the datagrams go.
+    /// Destination of the datagrams.
     pub to: SocketAddr,
-    /// Send trains of datagrams in one call where the kernel can cut them (`UDP_SEGMENT`).
+    /// Send several datagrams in one call if the kernel can split them (`UDP_SEGMENT`).
     pub segment: bool,
-    /// Frames take as long as on the board; else they are scanned as fast as possible.
+    /// Whether frames take as long as on the board; otherwise they are scanned as fast as possible.
     pub real_time: bool,
-    /// Where the board takes its commands: TCP in place of the UART, bytes in, status lines out (`None`: nowhere). Port 0
-    /// finds a free one.
+    /// Address of the command port: TCP in place of the UART, commands in, status lines out (`None`: no port). Port 0
+    /// selects a free one.
     pub control: Option<SocketAddr>,
-    /// The serial line: where its name is put (a link to a pseudo-terminal), and its baud rate.
+    /// The serial line: the path of its name (a link to a pseudo-terminal), and its baud rate.
     pub line: Option<(PathBuf, u32)>,
-    /// Where the sync line is written, and whether a file there may be replaced.
+    /// The file to which the sync line is written, and whether an existing file may be replaced.
     pub sync: Option<(PathBuf, bool)>,
-    /// Commands of the schedule: before which frame, and which; ascending.
+    /// Scheduled commands, each with the frame before which it is executed; ascending.
     pub commands: Vec<(u64, Command)>,
     /// Whether the first frame is scanned without sending ([`Board::arm`]).
     pub arms: bool,
-    /// Whether the board marks a stop at the end, where a recording runs.
+    /// Whether the board sends a stop marker at the end if a recording is running.
     pub marks_stop: bool,
-    /// What the network does to datagrams.
+    /// Faults of the simulated network.
     pub faults: Option<Faults>,
-    /// The circuit that the taxels share, where it is not ideal; flaws come after it.
+    /// The circuit that the taxels share, if it is not ideal; flaws are applied after it.
     pub circuit: Option<Chain>,
-    /// What is wrong with the taxels.
+    /// Flaws of the taxels.
     pub flaws: Option<Flaws>,
     /// Interval between resets of the board, s of its time.
     pub reset_every_s: Option<f64>,
-    /// How much faster the board's clock runs than the host's, parts per million.
+    /// Drift of the board's clock relative to the host's, parts per million.
     pub drift_ppm: f64,
-    /// The UDP port that the board sends from; 0: any that is free.
+    /// Local UDP port of the board; 0 selects a free one.
     pub source_port: u16,
 }
 
 impl EmulatorOptions {
-    /// In real time to `to`, without commands.
+    /// The default options: real time, to this destination, without commands.
     #[must_use]
     pub fn to(to: SocketAddr) -> Self {
         Self {
@@ -136,26 +128,26 @@ impl EmulatorOptions {
     }
 }
 
-/// What an [`Emulator`] has done.
+/// A report of an [`Emulator`].
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Report {
-    /// What the board counted.
+    /// Counts of the board.
     pub board: BoardCounts,
-    /// What was sent.
+    /// Counts of what was sent.
     pub sent: SendCounts,
-    /// What the network did to it, where it was asked to.
+    /// Counts of the simulated network, if there is one.
     pub network: Option<NetworkCounts>,
     /// Number of resets of the board.
     pub resets: u64,
-    /// How long after its end each frame was sent; nothing where frames go as fast as they can.
+    /// Delay of each frame's datagrams after the frame's end; empty if frames are not paced.
     pub late: Quantiles,
-    /// Frames that were sent more than a frame late.
+    /// Number of frames that were sent more than one frame late.
     pub late_frames: u64,
-    /// The host's clock at the board's time 0, ns since 1970: in real time all that the board does is due by it.
+    /// The host's clock at the board's time 0, ns since 1970; in real time, every frame is due relative to it.
     pub began_ns: i64,
-    /// Time by the board's clock, s.
+    /// Duration by the board's clock, s.
     pub board_seconds: f64,
-    /// Time by the host's clock, s.
+    /// Duration by the host's clock, s.
     pub seconds: f64,
 }
 
@@ -178,7 +170,7 @@ impl Emulator {
     ///
     /// # Errors
     ///
-    /// `Socket` where the control port is taken, `File` where line or sync line cannot be had; `Core(Problem)` where the
+    /// `Socket` where the control port is taken, `File` where line or sync line cannot be opened; `Core(Problem)` where the
     /// schedule does not ascend, or a fault, flaw, drift or reset makes no sense.
     pub fn open(board: Board, array: &Array, options: EmulatorOptions) -> Result<Self> {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
@@ -207,14 +199,13 @@ impl Emulator {
         self.control.address()
     }
 
-    /// Plays `touch` to its end, or until `stop`, which is no error; `watch` gets a report ten times a second.
+    /// Plays `touch` to its end, or until `stop`, which is not an error; `watch` receives a report ten times a second.
     ///
     /// The datagrams of a frame are sent at its end. A late frame does not delay later ones.
     ///
     /// # Errors
     ///
-    /// `Socket` where the system refuses to send.
-    #[allow(clippy::cast_possible_truncation)]
+    /// `Socket` if the system refuses to send.
     pub fn run<T: Touch + ?Sized>(
         &mut self,
         touch: &mut T,
@@ -222,22 +213,7 @@ impl Emulator {
         stop: Stop<'_>,
     ) -> Result<Report> {
         let mut ticks = vec![0; self.array.len()];
-        let mut leaving = Leaving::default();
-        let mut late = Latencies::default();
-        let mut schedule = std::mem::take(&mut self.options.commands).into_iter().peekable();
-        if self.options.real_time {
-            wake_sharply();
-        }
-        let (begun, begun_ns) = now_by_both();
-        let mut pace = Pace::default();
-        let started_us = self.board.time_us();
-        let began_ns = begun_ns - (started_us * 1e3) as i64;
-        let mut report = Report { began_ns, ..Report::default() };
-        let host_s_per_us = 1e-6 / (1.0 + 1e-6 * self.options.drift_ppm);
-        let mut due = begun;
-        // The board's time since its start, us: a reset sets the board's own clock back to 0.
-        let mut before_reset_us = -started_us;
-        let (mut polled, mut reported) = (begun, begun);
+        let mut run = self.begin();
         let mut last = false;
         while !last {
             while !stop.asked() && !touch.is_there()? {
@@ -250,191 +226,125 @@ impl Emulator {
             if self.options.marks_stop && (last || touch.is_last(stop)?) {
                 self.board.record(false);
             }
-            let since_us = before_reset_us + self.board.time_us();
-            if let Some(every) = self.options.reset_every_s
-                && since_us >= (report.resets + 1) as f64 * every * 1e6
-            {
-                before_reset_us = since_us;
-                report.resets += 1;
-                self.board.reset()?;
-                self.control.greet(&self.board);
-            }
+            let since_us = run.since_us(&self.board);
+            self.reset_where_due(&mut run, since_us)?;
             let frame = self.board.counts().frames;
-            while let Some((_, command)) = schedule.next_if(|(at, _)| *at <= frame) {
+            while let Some(command) = run.next_command(frame) {
                 self.board.command(&command.to_bytes());
             }
-            if let Some(sync) = &mut self.sync {
-                sync.follow(since_us, self.board.registers().record);
+            self.write_sync(since_us);
+            // A request to stop is not an error here; the loop checks for it.
+            if !last && !self.read_taxels(&mut ticks, since_us, stop)? {
+                continue;
             }
-            if let Some(crossed) = &mut self.crossed
-                && !last
-            {
-                match crossed.read(self.board.registers(), &mut ticks, stop) {
-                    // A request to stop is no error here; the loop checks for it.
-                    Err(taxel_core::Error::Interrupted) => continue,
-                    read => read?,
-                }
-            }
-            if let Some(flawed) = &mut self.flawed
-                && !last
-            {
-                flawed.read(since_us, &mut ticks);
-            }
-            let (sender, network) = (&mut self.sender, &mut self.network);
             if frame == 0 && self.options.arms {
                 self.board.arm(&ticks)?;
                 continue;
             }
-            leaving.clear();
-            self.board.frame(&ticks, |datagram| {
-                match network {
-                    None => leaving.push(datagram),
-                    Some(network) => network.pass(datagram, &mut |out| leaving.push(out)),
-                }
-                true
-            })?;
-            // The board knows how long its frame was: a command may have changed that.
-            let before = due;
-            due = begun + Duration::from_secs_f64((before_reset_us + self.board.time_us()) * host_s_per_us);
-            let now = if self.options.real_time { pace.wait_until(due) } else { Instant::now() };
-            leaving.iter().try_for_each(|datagram| sender.push(datagram))?;
-            self.sender.flush()?;
-            if self.options.real_time {
-                let behind = now.saturating_duration_since(due);
-                late.note(i64::try_from(behind.as_nanos()).unwrap_or(i64::MAX));
-                report.late_frames += u64::from(behind > due - before);
-            }
-            if now.duration_since(polled) >= LOOK_EVERY {
-                polled = now;
+            let now = self.send_frame(&mut run, &ticks)?;
+            if run.is_poll_due(now) {
                 self.control.serve(&mut self.board);
             }
-            if now.duration_since(reported) >= REPORT_EVERY {
-                reported = now;
-                self.complete(&mut report, &late, begun, started_us + before_reset_us + self.board.time_us());
-                watch(&report, touch);
+            if run.is_report_due(now) {
+                watch(&self.report(&run), touch);
             }
         }
-        if let Some(network) = &mut self.network {
-            let mut sent = Ok(());
-            let sender = &mut self.sender;
-            network.flush(&mut |out| {
-                if sent.is_ok() && !out.is_empty() {
-                    sent = sender.push(out);
-                }
-            });
-            sent?;
-            self.sender.flush()?;
-        }
-        if let Some(sync) = &mut self.sync {
-            sync.follow(before_reset_us + self.board.time_us(), self.board.registers().record);
-        }
-        self.complete(&mut report, &late, begun, started_us + before_reset_us + self.board.time_us());
+        self.send_delayed()?;
+        self.write_sync(run.since_us(&self.board));
+        let report = self.report(&run);
         watch(&report, touch);
         Ok(report)
     }
 
-    fn complete(&self, report: &mut Report, late: &Latencies, begun: Instant, board_us: f64) {
-        report.board = *self.board.counts();
-        report.sent = self.sender.counts();
-        report.network = self.network.as_ref().map(|network| *network.counts());
-        report.late = late.quantiles();
-        report.board_seconds = board_us * 1e-6;
-        report.seconds = begun.elapsed().as_secs_f64();
-    }
-}
-
-/// Datagrams that are sent when the frame ends, not earlier: a train is sent as soon as a datagram of another length follows.
-#[derive(Default)]
-struct Leaving {
-    bytes: Vec<u8>,
-    ends: Vec<usize>,
-}
-
-impl Leaving {
-    fn push(&mut self, datagram: &[u8]) {
-        if !datagram.is_empty() {
-            self.bytes.extend_from_slice(datagram);
-            self.ends.push(self.bytes.len());
+    /// The state of a run that begins now.
+    fn begin(&mut self) -> Run {
+        if self.options.real_time {
+            wake_sharply();
         }
+        Run::new(&self.board, std::mem::take(&mut self.options.commands), self.options.drift_ppm)
     }
 
-    fn clear(&mut self) {
-        self.bytes.clear();
-        self.ends.clear();
-    }
-
-    fn iter(&self) -> impl Iterator<Item = &[u8]> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.bytes[start..end])
-    }
-}
-
-/// Now by the clock that paces frames, and by the one that arrivals are stamped with, ns since 1970. Where the thread was held
-/// up between the two, they are read again.
-fn now_by_both() -> (Instant, i64) {
-    let read = |_| {
-        let (before, now_ns) = (Instant::now(), now_ns());
-        (before.elapsed(), before, now_ns)
-    };
-    let (took, before, now_ns) =
-        (1..READINGS).map(read).fold(read(0), |best, next| if next.0 < best.0 { next } else { best });
-    (before + took / 2, now_ns)
-}
-
-/// Waits until frames are due. A sleeping thread wakes some 10 us late, later on an idle core than on a busy one. So the sleep ends
-/// earlier by that much, and the rest is a busy wait.
-#[derive(Debug, Default)]
-struct Pace {
-    sooner: Duration,
-}
-
-impl Pace {
-    /// Waits until `due`, if it is not past; returns the time then.
-    fn wait_until(&mut self, due: Instant) -> Instant {
-        let mut now = Instant::now();
-        let Some(left) = due.checked_duration_since(now) else { return now };
-        if let Some(sleep) = left.checked_sub(self.sooner)
-            && !sleep.is_zero()
+    /// Resets the board where its time since its start, us, has reached the next reset.
+    fn reset_where_due(&mut self, run: &mut Run, since_us: f64) -> Result<()> {
+        if let Some(every) = self.options.reset_every_s
+            && since_us >= (run.resets + 1) as f64 * every * 1e6
         {
-            std::thread::sleep(sleep);
-            let woken = Instant::now();
-            // Nine in ten wake in time; a later one had a busy core, which a longer busy wait does not help.
-            self.sooner = if woken.saturating_duration_since(now + sleep) > self.sooner {
-                (self.sooner + 9 * STEP).min(MOST_AWAKE)
-            } else {
-                self.sooner.saturating_sub(STEP)
-            };
-            now = woken;
+            run.before_reset_us = since_us;
+            run.resets += 1;
+            self.board.reset()?;
+            self.control.greet(&self.board);
         }
-        while now < due {
-            std::hint::spin_loop();
-            now = Instant::now();
-        }
-        now
+        Ok(())
     }
-}
 
-/// Asks the kernel not to gather this thread's wake-ups: it may let them come 50 us late, a quarter of a frame.
-fn wake_sharply() {
-    // SAFETY: PR_SET_TIMERSLACK takes one number and touches no memory of ours; where it fails, sleeps are coarser.
-    unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64) };
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_frame_is_never_sent_before_it_is_due_nor_waited_for_awake_for_long() {
-        let mut pace = Pace::default();
-        let mut due = Instant::now();
-        for _ in 0..300 {
-            due += Duration::from_micros(400);
-            assert!(pace.wait_until(due) >= due);
-            assert!(pace.sooner <= MOST_AWAKE);
+    fn write_sync(&mut self, since_us: f64) {
+        if let Some(sync) = &mut self.sync {
+            sync.follow(since_us, self.board.registers().record);
         }
-        // A frame that is already due is not waited for.
-        let now = pace.wait_until(due);
-        assert!(now >= due);
+    }
+
+    /// From what the taxels feel to what the board reads of them, through the circuit and the flaws; false where it was stopped.
+    fn read_taxels(&mut self, ticks: &mut [u16], since_us: f64, stop: Stop<'_>) -> Result<bool> {
+        if let Some(crossed) = &mut self.crossed {
+            match crossed.read(self.board.registers(), ticks, stop) {
+                Err(taxel_core::Error::Interrupted) => return Ok(false),
+                read => read?,
+            }
+        }
+        if let Some(flawed) = &mut self.flawed {
+            flawed.read(since_us, ticks);
+        }
+        Ok(true)
+    }
+
+    /// Scans a frame, and sends its datagrams at its end; returns the time then.
+    fn send_frame(&mut self, run: &mut Run, ticks: &[u16]) -> Result<Instant> {
+        let (network, leaving) = (&mut self.network, &mut run.leaving);
+        leaving.clear();
+        self.board.frame(ticks, |datagram| {
+            match network {
+                None => leaving.push(datagram),
+                Some(network) => network.pass(datagram, &mut |out| leaving.push(out)),
+            }
+            true
+        })?;
+        // The length of the frame that was scanned: a command may have changed it.
+        let frame = run.next_due(&self.board);
+        let now = if self.options.real_time { run.pace.wait_until(run.due) } else { Instant::now() };
+        run.leaving.iter().try_for_each(|datagram| self.sender.push(datagram))?;
+        self.sender.flush()?;
+        if self.options.real_time {
+            run.note_late(now, frame);
+        }
+        Ok(now)
+    }
+
+    /// Sends the datagrams that the network has delayed.
+    fn send_delayed(&mut self) -> Result<()> {
+        let Some(network) = &mut self.network else { return Ok(()) };
+        let mut sent = Ok(());
+        let sender = &mut self.sender;
+        network.flush(&mut |out| {
+            if sent.is_ok() && !out.is_empty() {
+                sent = sender.push(out);
+            }
+        });
+        sent?;
+        self.sender.flush()
+    }
+
+    /// What was done up to now.
+    fn report(&self, run: &Run) -> Report {
+        Report {
+            board: *self.board.counts(),
+            sent: self.sender.counts(),
+            network: self.network.as_ref().map(|network| *network.counts()),
+            resets: run.resets,
+            late: run.late.quantiles(),
+            late_frames: run.late_frames,
+            began_ns: run.began_ns,
+            board_seconds: run.board_us(&self.board) * 1e-6,
+            seconds: run.begun.elapsed().as_secs_f64(),
+        }
     }
 }

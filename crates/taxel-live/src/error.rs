@@ -1,39 +1,39 @@
-//! What can go wrong out there.
+//! The errors of this crate.
 
 use std::path::{Path, PathBuf};
 
-/// An error of the core, or one of files and sockets with the place where it came from.
+/// An error of the core, or an error of files and sockets with its place.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// What the core found.
+    /// An error of `taxel-core`.
     #[error(transparent)]
     Core(#[from] taxel_core::Error),
     /// A file that could not be read or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// Which.
+        /// The file.
         path: PathBuf,
         /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A detection that could not be handed on.
+    /// A detection that could not be delivered.
     #[error("detections: {0}")]
     Sink(std::io::Error),
     /// A socket that could not be opened or used.
     #[error("{place}: {source}")]
     Socket {
-        /// Which address.
+        /// The address.
         place: String,
         /// The error of the operating system.
         source: std::io::Error,
     },
 }
 
-/// The result of everything in this crate that can fail.
+/// The result of each function in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// Names the file in an error of the operating system.
+    /// Adds the file's path to an error of the operating system.
     pub fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
         move |source| Self::File { path: path.to_owned(), source }
     }
@@ -43,7 +43,7 @@ impl Error {
         taxel_core::Error::Format(format!("{}: {text}", path.display())).into()
     }
 
-    /// Names the address in an error of the operating system.
+    /// Adds the address to an error of the operating system.
     pub fn socket(place: impl ToString) -> impl FnOnce(std::io::Error) -> Self {
         let place = place.to_string();
         move |source| Self::Socket { place, source }

@@ -1,68 +1,69 @@
-//! Another computer's clock as this one sees it: offset and drift, from round trips.
+//! Estimates another computer's clock relative to this one's, offset and drift, from round trips.
 //!
-//! A question leaves here at t1, reaches the other at t2, its answer leaves there at t3 and is back at t4. Neither way takes
-//! less than no time, so the other clock is ahead by at most t2 - t1 and at least t3 - t4: an interval as wide as the round
-//! trip. Of each second the narrowest is stored (the filter of NTP, RFC 5905, section 10); the drift is the median slope
-//! between their middles, and the offset is the middle of what all of the last seconds allow with that drift. It is wrong by
-//! half the difference between the shortest ways there and back, which no exchange can show, and by no more than
-//! [`HostOffset::within_ns`] beside the drift's own error.
+//! A request is sent here at t1 and reaches the other computer at t2; its reply is sent there at t3 and arrives here at
+//! t4. Neither direction takes negative time, so the other clock is ahead by at most t2 - t1 and at least t3 - t4: an
+//! interval as wide as the round trip. For each second the exchange with the narrowest interval is stored (the filter
+//! of NTP, RFC 5905, section 10). The drift is the median slope between the intervals' midpoints, and the offset is the
+//! midpoint of the intersection of the newest intervals, corrected for that drift. Its error is half the difference
+//! between the shortest delays in the two directions, which no exchange can reveal; apart from the drift's error it is
+//! at most [`HostOffset::within_ns`].
 
 use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-/// Of each stretch of this length the narrowest exchange is stored, ns ...
+/// Duration of a stretch, for which the exchange with the narrowest interval is stored, ns.
 const STRETCH_NS: i64 = 1_000_000_000;
-/// ... for so many stretches, from which the drift comes ...
+/// Number of stored stretches, from which the drift is estimated.
 const STRETCHES: usize = 64;
-/// ... and the offset from the newest of them ...
+/// Number of the newest stretches, from which the offset is estimated.
 const NEWEST: usize = 16;
-/// ... once there are so many; before, the newest alone counts.
+/// Number of stretches from which on both are estimated; before, the newest stretch alone defines the offset.
 const BELIEVED: usize = 4;
-/// A quartz is accurate to 100 ppm, two of them to 200: a larger slope is no drift.
+/// Largest plausible drift: a quartz is accurate to 100 ppm, so two differ by up to 200.
 const MOST_DRIFT: f64 = 200e-6;
-/// An exchange that contradicts the estimate by more than this ...
+/// An exchange contradicts the estimate if its interval is farther away than this, ns.
 const ASTRAY_NS: i64 = 5_000_000;
-/// ... this many times in a row means that a clock was set.
+/// Number of consecutive contradicting exchanges after which a clock must have been set.
 const ASTRAY: u32 = 4;
-/// A longer round trip is ignored, ns.
+/// Longest accepted round trip, ns.
 const LONGEST_NS: i64 = 2_000_000_000;
 
-/// What another computer's clock shows when this one's shows a time: a line.
+/// The relation of another computer's clock to this one's: a line.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct HostOffset {
-    /// A time of this computer, ns since 1970 ...
+    /// This computer's time of a point on the line, ns since 1970.
     pub here_ns: i64,
-    /// ... and by how much the other's clock was ahead then, ns.
+    /// Time by which the other clock was ahead at that point, ns.
     pub ahead_ns: i64,
-    /// How much faster the other's clock runs, parts per million.
+    /// Drift of the other clock relative to this one, parts per million.
     pub drift_ppm: f64,
-    /// Half the width of the interval that the shortest round trips allow, ns.
+    /// Half the width of the interval in which the offset must be, by the shortest round trips, ns.
     pub within_ns: i64,
 }
 
 impl HostOffset {
-    /// This computer's time at a time of the other's, both ns since 1970.
+    /// Converts a time of the other computer to this one's, both ns since 1970.
     #[must_use]
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
     pub fn here_ns(&self, there_ns: i64) -> i64 {
         let since = there_ns.saturating_sub(self.ahead_ns).saturating_sub(self.here_ns);
-        // Less the drift over the stretch, so that nothing is lost to the precision of a float.
+        // Corrects the time difference by the drift only, so that a float's precision does not limit the result.
         let drift = self.drift_ppm * 1e-6;
         self.here_ns.saturating_add(since).saturating_sub((since as f64 * (drift / (1.0 + drift))) as i64)
     }
 }
 
-/// The four times of a round trip, ns since 1970, each by the clock of its computer.
+/// The four times of a round trip, ns since 1970, each by the clock of the computer where it was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RoundTrip {
-    /// The question left here.
+    /// t1: the request was sent here.
     pub asked: i64,
-    /// It reached the other.
+    /// t2: the request arrived at the other computer.
     pub came: i64,
-    /// The answer left there.
+    /// t3: the reply was sent there.
     pub answered: i64,
-    /// It was back here.
+    /// t4: the reply arrived here.
     pub back: i64,
 }
 
@@ -87,22 +88,22 @@ impl Allowed {
 /// Estimates a [`HostOffset`] from round trips.
 #[derive(Debug, Clone, Default)]
 pub struct HostClock {
-    /// The narrowest of each finished stretch.
-    kept: VecDeque<Allowed>,
-    /// The narrowest of the stretch that runs.
+    /// The narrowest exchange of each completed stretch.
+    finished: VecDeque<Allowed>,
+    /// The narrowest exchange of the current stretch.
     narrowest: Option<Allowed>,
     astray: u32,
     offset: Option<HostOffset>,
 }
 
 impl HostClock {
-    /// Adds a round trip; one with contradictory times, or that took too long, is ignored.
+    /// Adds a round trip; one with contradictory times, or one that took too long, is ignored.
     pub fn note(&mut self, trip: RoundTrip) {
         let (Some(most), Some(least)) = (trip.came.checked_sub(trip.asked), trip.answered.checked_sub(trip.back))
         else {
             return;
         };
-        let Some(here) = trip.back.checked_sub(trip.asked).map(|took| trip.asked + took / 2) else { return };
+        let Some(here) = trip.back.checked_sub(trip.asked).map(|passed| trip.asked + passed / 2) else { return };
         let allowed = Allowed { here, least, most };
         if !(0..=LONGEST_NS).contains(&most.saturating_sub(least)) {
             return;
@@ -122,17 +123,17 @@ impl HostClock {
                 }
             }
             before => {
-                if self.kept.len() == STRETCHES {
-                    self.kept.pop_front();
+                if self.finished.len() == STRETCHES {
+                    self.finished.pop_front();
                 }
-                self.kept.extend(before);
+                self.finished.extend(before);
                 self.narrowest = Some(allowed);
             }
         }
         self.fit();
     }
 
-    /// The estimate, once there was an exchange.
+    /// The estimate, after the first exchange.
     #[must_use]
     pub fn offset(&self) -> Option<HostOffset> {
         self.offset
@@ -150,13 +151,13 @@ impl HostClock {
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
     fn fit(&mut self) {
         let Some(last) = self.narrowest else { return };
-        let kept: Vec<Allowed> = self.kept.iter().copied().chain([last]).collect();
+        let narrow: Vec<Allowed> = self.finished.iter().copied().chain([last]).collect();
         let (mut drift, mut counts) = (0.0, 1);
-        if kept.len() >= BELIEVED {
-            let mut slopes: Vec<f64> = kept
+        if narrow.len() >= BELIEVED {
+            let mut slopes: Vec<f64> = narrow
                 .iter()
                 .enumerate()
-                .flat_map(|(k, a)| kept.iter().skip(k + 1).map(move |b| (a, b)))
+                .flat_map(|(k, a)| narrow.iter().skip(k + 1).map(move |b| (a, b)))
                 .filter(|(a, b)| b.here > a.here)
                 .map(|(a, b)| (b.middle() - a.middle()) as f64 / (b.here - a.here) as f64)
                 .collect();
@@ -166,7 +167,7 @@ impl HostClock {
                 counts = NEWEST;
             }
         }
-        let newest = kept.iter().rev().take(counts);
+        let newest = narrow.iter().rev().take(counts);
         let moved = |bound: i64, at: i64| bound - ((at - last.here) as f64 * drift) as i64;
         let least = newest.clone().map(|a| moved(a.least, a.here)).max().unwrap_or(last.least);
         let most = newest.map(|a| moved(a.most, a.here)).min().unwrap_or(last.most);
@@ -185,7 +186,7 @@ mod tests {
 
     const HERE: i64 = 1_700_000_000_000_000_000;
 
-    /// A source of numbers between 0 and 1.
+    /// A random number generator, uniform between 0 and 1.
     struct Chance(u64);
 
     impl Chance {
@@ -205,7 +206,7 @@ mod tests {
             here + self.ahead_ns + ((here - HERE) as f64 * self.drift) as i64
         }
 
-        /// Four times a second for `seconds`; each way takes 100 us and, now and then, up to 20 ms more.
+        /// Exchanges four times a second for `seconds`; each direction takes 100 us and sometimes up to 20 ms more.
         fn exchanged(&self, clock: &mut HostClock, from: i64, seconds: i64, chance: &mut Chance) -> i64 {
             for k in 0..seconds * 4 {
                 let mut way = || 100_000 + (chance.next().powi(8) * 20e6) as i64;
@@ -235,7 +236,7 @@ mod tests {
     fn the_first_round_trip_is_believed_within_its_half() {
         let mut clock = HostClock::default();
         assert_eq!(clock.offset(), None);
-        // 2 ms there, 1 ms back, the other is 10 s ahead.
+        // 2 ms there, 1 ms back, with the other clock 10 s ahead.
         let came = HERE + 10_002_000_000;
         clock.note(RoundTrip { asked: HERE, came, answered: came, back: HERE + 3_000_000 });
         let offset = clock.offset().expect("one came");

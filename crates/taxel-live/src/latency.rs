@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-/// Buckets in each doubling of the value: quantiles are right to 1 in 32.
+/// Number of buckets per doubling of the value: quantiles are accurate to 1 in 32.
 const FINE: u32 = 32;
 const BUCKETS: usize = (FINE * (64 - FINE.ilog2() + 1)) as usize;
 
-/// A histogram of durations, with buckets 3 % wide; memory does not grow.
+/// A histogram of durations with buckets 3 % wide and fixed memory.
 #[derive(Debug, Clone)]
 pub struct Latencies {
     buckets: Box<[u64; BUCKETS]>,
@@ -14,16 +14,16 @@ pub struct Latencies {
     max_ns: u64,
 }
 
-/// Quantiles of [`Latencies`], us; none where nothing was measured.
+/// Quantiles of [`Latencies`], us; none if nothing was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Quantiles {
-    /// How many were measured.
+    /// Number of measured durations.
     pub count: u64,
     /// Median.
     pub p50_us: Option<f64>,
-    /// 99 of 100 were no longer.
+    /// The 99th percentile.
     pub p99_us: Option<f64>,
-    /// The longest.
+    /// The maximum.
     pub max_us: Option<f64>,
 }
 
@@ -34,7 +34,7 @@ impl Default for Latencies {
 }
 
 impl Latencies {
-    /// Notes a duration, ns; one below 0, as two clocks that disagree may give, counts as 0.
+    /// Adds a duration, ns; a negative one, which two clocks that disagree can cause, counts as 0.
     pub fn note(&mut self, ns: i64) {
         let ns = u64::try_from(ns).unwrap_or(0);
         self.buckets[bucket(ns)] += 1;
@@ -42,7 +42,7 @@ impl Latencies {
         self.max_ns = self.max_ns.max(ns);
     }
 
-    /// The duration that a share `q` of all did not exceed, ns.
+    /// The quantile `q` of the durations, ns.
     #[must_use]
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn quantile(&self, q: f64) -> u64 {
@@ -71,7 +71,7 @@ impl Latencies {
     }
 }
 
-/// Values below [`FINE`] have a bucket each; above, each doubling has [`FINE`] of equal width.
+/// The bucket of a value: values below [`FINE`] have one each; above, each doubling has [`FINE`] of equal width.
 fn bucket(ns: u64) -> usize {
     let doublings = ns.max(1).ilog2().saturating_sub(FINE.ilog2());
     let within = ns >> doublings;

@@ -1,4 +1,4 @@
-//! Where the world comes in: sockets, files and threads around `taxel-core`.
+//! Input and output around `taxel-core`: sockets, files and threads.
 
 pub mod address;
 pub mod bridged;

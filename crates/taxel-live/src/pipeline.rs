@@ -1,10 +1,11 @@
-//! Datagrams to detections, as they arrive.
+//! Converts datagrams to detections, as they arrive.
 //!
-//! The stages are *receive*, *decode*, *record* and *read out* (`stages`). One thread runs them all, and gives them to another
-//! one before it calls a sink (`threads`). While something is recorded, which a disk may hold up, receiving ([`crate::capture`]),
-//! decoding with recording, and reading out have a thread each; reading out also has one where it is slower than what arrives. The
-//! queues between them are bounded, and what finds no room is counted where it was lost. Viewers get copies ([`Live::counters`],
-//! [`Live::picture`]) and cannot slow the pipeline.
+//! The stages are *receive*, *decode*, *record* and *read out* (`stages`). One thread runs them all, and passes them to
+//! another thread before it calls a sink (`threads`). While a recording runs, which a disk may delay, there are
+//! separate threads for receiving ([`crate::capture`]), for decoding with recording, and for reading out; reading out
+//! also has its own thread if it is slower than the events arrive. The queues between the threads are bounded, and what
+//! does not fit is counted where it was lost. Viewers receive copies ([`Live::counters`], [`Live::picture`]) and cannot
+//! slow the pipeline.
 
 mod ahead;
 mod copies;
@@ -16,13 +17,13 @@ mod options;
 mod output;
 mod picture_buffer;
 mod read_out;
-mod reader;
 mod readout_queue;
 mod receive;
 mod record;
 mod recorder;
 mod recordings;
 mod rest;
+mod running_readout;
 mod sending;
 mod shared;
 mod sink;
@@ -52,14 +53,14 @@ pub use counters::{Counters, SourceCounts, Summary};
 pub use handle::Handle;
 pub use options::{LiveOptions, Record};
 use output::DetectionOutput;
-pub use reader::Listener;
-use reader::Reader;
 use readout_queue::ReadoutQueue;
 use recorder::{Part, Recorder};
 use recordings::Recordings;
+pub use running_readout::ReadoutSetup;
+use running_readout::RunningReadout;
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{Published, Shared};
+use shared::{Published, RecordingSlot, Shared};
 pub use sink::{Lines, OutputDetection, Sink};
 pub use source::{Place, Source, SourceKind};
 use sources::Others;
@@ -67,13 +68,13 @@ use stages::Stages;
 use threads::Threads;
 pub use viewer_queue::{Change, Piece, ViewerEvents};
 
-/// How long a wait lasts before the caller is asked whether to stop.
+/// Interval at which a waiting call checks whether it must stop.
 const CHECK_EVERY: Duration = Duration::from_millis(50);
 
-/// How many detections wait for [`Live::next`]; more are lost to it, and counted, but not lost to the sinks.
+/// Capacity of the queue of [`Live::next`], detections; more are lost for it, and counted, but still reach the sinks.
 const OUTPUT_WAITING: usize = 1 << 14;
 
-/// Datagrams to detections, from [`Live::start`] until [`Live::stop`].
+/// A running pipeline from datagrams to detections, from [`Live::start`] until [`Live::stop`].
 pub struct Live {
     shared: Arc<Shared>,
     detections: channel::Receiver<OutputDetection>,
@@ -83,24 +84,24 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens the socket (and the file), and begins.
+    /// Opens the socket (and the file), and starts.
     ///
     /// # Errors
     ///
-    /// `Socket` where the port is taken, `File` where the file exists or cannot be created, or a destination cannot be
-    /// opened, `Core(Problem)` for options that make no sense.
+    /// `Socket` if the port is in use, `File` if the file exists or cannot be created, or a destination cannot be
+    /// opened, `Core(Problem)` if an option is not valid.
     pub fn start(
         address: SocketAddr,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         let capture = options.capture;
-        // The socket is opened before the file: where the port is taken no empty file is left behind.
-        Self::start_from(|| Receiver::bind(address, capture), options, listener, sinks)
+        // The socket is opened before the file, so that a port that is in use leaves no empty file.
+        Self::start_from(|| Receiver::bind(address, capture), options, readout, sinks)
     }
 
-    /// As [`Live::start`], from what another computer receives ([`Receiver::fed`]).
+    /// As [`Live::start`], for datagrams that another computer receives ([`Receiver::fed`]).
     ///
     /// # Errors
     ///
@@ -108,16 +109,16 @@ impl Live {
     pub fn start_fed(
         receiver: Receiver,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        Self::start_from(|| Ok(receiver), options, listener, sinks)
+        Self::start_from(|| Ok(receiver), options, readout, sinks)
     }
 
     fn start_from(
         receiver: impl FnOnce() -> Result<Receiver>,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
@@ -130,14 +131,14 @@ impl Live {
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
         }
-        Self::begin(Box::new(receiver), options, listener, sinks, None)
+        Self::begin(Box::new(receiver), options, readout, sinks, None)
     }
 
-    /// Begins; `host` is whose recording this one's is a part of.
+    /// Starts the pipeline; `host` is the pipeline whose recording contains this one's as a part.
     fn begin(
         receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
-        listener: Listener,
+        readout: ReadoutSetup,
         sinks: Vec<Box<dyn Sink>>,
         host: Option<Part>,
     ) -> Result<Self> {
@@ -151,15 +152,15 @@ impl Live {
         }
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
-        if let (Listener::None, Some(to)) = (&listener, options.send.first()) {
+        if let (ReadoutSetup::None, Some(to)) = (&readout, options.send.first()) {
             return Err(taxel_core::problem!("send to {to} without a readout: nothing would be detected").into());
         }
-        match &listener {
-            Listener::Taring(stretch_us, _) if *stretch_us <= 0 => {
+        match &readout {
+            ReadoutSetup::Taring(stretch_us, _) if *stretch_us <= 0 => {
                 return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
             }
-            Listener::Taring(_, readout) => readout.check()?,
-            Listener::None | Listener::Reading(_) => {}
+            ReadoutSetup::Taring(_, readout) => readout.check()?,
+            ReadoutSetup::None | ReadoutSetup::Reading(_) => {}
         }
         let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
         let receiver = receiver()?;
@@ -173,12 +174,9 @@ impl Live {
             receiver,
             readout_queue: ReadoutQueue::new(&options.array, options.readout_events),
             published: Mutex::new(published),
-            recorder: Mutex::new(recorder),
-            broken: Mutex::default(),
+            recording: RecordingSlot { recorder: Mutex::new(recorder), ..RecordingSlot::default() },
             requests: Mutex::default(),
             requested: AtomicBool::new(false),
-            picture_times: Mutex::default(),
-            records: AtomicBool::new(false),
             subscribers: Mutex::default(),
             sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
@@ -188,14 +186,14 @@ impl Live {
             ended: AtomicBool::new(false),
         });
         let (queue, detections) = channel::bounded(OUTPUT_WAITING);
-        let reads_out = !matches!(listener, Listener::None);
+        let reads_out = !matches!(readout, ReadoutSetup::None);
         let board = |address, own: LiveOptions, part| {
             let capture = own.capture;
-            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Listener::None, vec![], Some(part))
+            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, ReadoutSetup::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
-            // Nothing arrived: a new file is not left behind.
-            let recorder = lock(&shared.recorder).take();
+            // Nothing arrived: a new file is removed.
+            let recorder = lock(&shared.recording.recorder).take();
             drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
         })?;
         let boards = others.boards.iter().map(|(name, board)| (name.clone(), Arc::clone(&board.shared)));
@@ -203,11 +201,11 @@ impl Live {
         let others = Mutex::new(others);
         let mut live =
             Self { shared: Arc::clone(&shared), detections, threads: vec![], others, recordings: Arc::new(recordings) };
-        // A device that detections drive must not wait for a callback.
+        // The destinations come first: a device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
         let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
-        let reader = reads_out.then(|| Reader::new(listener, &options));
-        let stages = Stages::new(&shared, reader);
+        let readout = reads_out.then(|| RunningReadout::new(readout, &options));
+        let stages = Stages::new(&shared, readout);
         let names: &[&str] = if reads_out { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
         let threads = Arc::new(Threads::new(stages, output, names.len()));
         for name in names {
@@ -223,26 +221,26 @@ impl Live {
         Ok(())
     }
 
-    /// The address that it receives on, with the port that was found where 0 was asked for; unspecified, with port 0, where a
-    /// bridge feeds it.
+    /// The address on which the pipeline receives, with the actual port if 0 was requested; unspecified, with port 0,
+    /// if a bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
     }
 
-    /// Where datagrams come from.
+    /// The source of datagrams.
     #[must_use]
     pub fn place(&self) -> &Origin {
         self.shared.receiver.place()
     }
 
-    /// What others may do with it while it runs.
+    /// A handle with the operations that other threads may use while the pipeline runs.
     #[must_use]
     pub fn handle(&self) -> Handle {
         Handle { shared: Arc::clone(&self.shared), recordings: Arc::clone(&self.recordings) }
     }
 
-    /// The next detection; `None` after `timeout` without one, or at once when all is over.
+    /// The next detection; `None` after `timeout` without one, or at once if the pipeline has ended.
     ///
     /// # Errors
     ///
@@ -253,7 +251,7 @@ impl Live {
             Err(channel::RecvTimeoutError::Timeout) => self.check().map(|()| None),
             Err(channel::RecvTimeoutError::Disconnected) => {
                 self.check()?;
-                // Without a readout there are no detections: wait as asked, but not after the end.
+                // Without a readout there are no detections: waits for the timeout, but not beyond the end.
                 if !self.is_over() {
                     std::thread::sleep(timeout);
                 }
@@ -262,7 +260,7 @@ impl Live {
         }
     }
 
-    /// As [`Live::next`], but returns `None` as soon as `stop` asks for it.
+    /// As [`Live::next`], but returns `None` as soon as `stop` requests it.
     ///
     /// # Errors
     ///
@@ -271,7 +269,7 @@ impl Live {
         let until = Instant::now().checked_add(timeout);
         loop {
             let left = until.map_or(CHECK_EVERY, |t| t.saturating_duration_since(Instant::now()));
-            // Before `next`: an error that ended the pipeline is then known, and `next` returns it.
+            // Read before `next`: if an error has ended the pipeline, `next` then returns it.
             let over = self.is_over();
             let output = self.next(left.min(CHECK_EVERY))?;
             if output.is_some() || over || left.is_zero() || stop.asked() {
@@ -290,7 +288,7 @@ impl Live {
         self.shared.ended.load(Ordering::Acquire)
     }
 
-    /// What arrived, what became of it and what was lost, up to now.
+    /// Counts of what arrived, how it was processed and what was lost, so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
         let others = lock(&self.others);
@@ -299,18 +297,18 @@ impl Live {
         Counters { sources: boards.chain(numbers).collect(), ..self.shared.counters() }
     }
 
-    /// The address that another board of the recording sends to; `None` where there is none of that name.
+    /// The address on which another board of the recording is received; `None` if there is no board of that name.
     #[must_use]
     pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
         lock(&self.others).boards.iter().find(|(known, _)| known == name).map(|(_, board)| board.address())
     }
 
-    /// Records numbers of a source whose values a program gives, one for each of its columns, which arrived at `arrived_ns` (ns since
-    /// 1970).
+    /// Records one line of a source whose values a program passes, with a number for each of its columns; it arrived at
+    /// `arrived_ns` (ns since 1970).
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where there is no such source, or it has other columns; `File` where the disk is full.
+    /// `Core(Problem)` if there is no such source, or it has other columns; `File` if the disk is full.
     pub fn sample(&self, name: &str, arrived_ns: i64, values: &[f64]) -> Result<()> {
         let numbers = lock(&self.others).numbers.iter().find(|(known, _)| known == name).map(|(_, n)| Arc::clone(n));
         match numbers {
@@ -319,7 +317,7 @@ impl Live {
         }
     }
 
-    /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 of a taxel without any event so far.
+    /// The taxels' values, ticks, by taxel index, updated ten times a second; 0 for a taxel without any event so far.
     #[must_use]
     pub fn picture(&self) -> Vec<u16> {
         self.shared.published().picture.clone()
@@ -331,7 +329,7 @@ impl Live {
         self.shared.published().tare.clone()
     }
 
-    /// The starts and stops that arrived since the last call.
+    /// The start and stop markers since the last call.
     #[must_use]
     pub fn take_markers(&self) -> Vec<Marker> {
         std::mem::take(&mut self.shared.published().markers)
@@ -341,7 +339,7 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where nothing is recorded that can hold notes, `File` where the disk is full.
+    /// `Core(Problem)` if nothing is recorded that can hold notes, `File` if the disk is full.
     pub fn note(&self, text: &str) -> Result<()> {
         self.shared.note(text, true)
     }
@@ -351,7 +349,7 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where there is no such version.
+    /// `Core(Problem)` if there is no such version.
     pub fn expect_version(&self, version: u8) -> Result<()> {
         if !(1..=2).contains(&version) {
             return Err(taxel_core::problem!("wire version {version}: must be 1 or 2").into());
@@ -360,13 +358,13 @@ impl Live {
         Ok(())
     }
 
-    /// Records what arrives from now on, of all sources, beginning with the registers and the values that the taxels hold. A recording
-    /// that runs ends with what arrived before, and is returned: each datagram, and each line, belongs to one of them.
+    /// Starts a recording of all sources, which begins with the registers and the taxels' values. A recording that runs
+    /// ends with what arrived before, and is returned: each datagram, and each line, belongs to one of them.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where recordings were not to begin later ([`LiveOptions::record_later`]), `File` where the file exists or
-    /// cannot be created: then the one that runs goes on. What ended that one early, or `File` where its end cannot be written.
+    /// `Core(Problem)` if recordings were not to begin later ([`LiveOptions::record_later`]), `File` if the file exists or
+    /// cannot be created: then the one that runs goes on. What ended that one early, or `File` if its end cannot be written.
     pub fn record(&self, record: &Record) -> Result<Option<Summary>> {
         if !self.shared.options.record_later {
             return Err(taxel_core::problem!("a recording while listening: begin without one, for later ones").into());
@@ -374,12 +372,12 @@ impl Live {
         self.handle().record(record)
     }
 
-    /// Lets the recording that runs restart, where no source has given anything; returns whether it does.
+    /// Restarts the recording that runs, where no source has given anything; returns whether it did.
     #[must_use]
     pub fn record_again(&self) -> bool {
-        // Before the recorder is locked: counting and recording must not wait for each other.
+        // Read before the recorder is locked: counting and recording must not wait for each other.
         let now = self.shared.counters();
-        lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.again(&now))
+        lock(&self.shared.recording.recorder).as_mut().is_some_and(|recorder| recorder.restart_if_empty(&now))
     }
 
     /// As [`Handle::end_recording`].
@@ -397,22 +395,22 @@ impl Live {
         self.handle().records()
     }
 
-    /// Asks all threads to end once they have processed what arrived; [`Live::stop`] waits for them.
+    /// Requests the end: all threads end once they have processed what arrived; [`Live::stop`] waits for them.
     pub fn end(&self) {
         self.shared.receiver.stop();
     }
 
-    /// Ends: processes what arrived, closes the file, and returns what was lost.
+    /// Ends the pipeline: processes what arrived, closes the file, and returns what was lost.
     ///
     /// # Errors
     ///
-    /// The error that ended the pipeline early, or `File` where the end of the recording cannot be written.
+    /// The error that ended the pipeline early, or `File` if the end of the recording cannot be written.
     pub fn stop(mut self) -> Result<Summary> {
         let others = lock(&self.others).stop(|board| Ok(board.stop()?.counters));
         let joined = self.join();
         let (sources, ended) = others.map_or_else(|error| (BTreeMap::new(), Err(error)), |counts| (counts, Ok(())));
         let counters = Counters { sources, ..self.shared.counters() };
-        let recorder = lock(&self.shared.recorder).take();
+        let recorder = lock(&self.shared.recording.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
         let lost = recorder::losses(&counters, None);
         let verdict = recordings::verdict(self.place(), &counters, counters.nothing_came(), &lost);

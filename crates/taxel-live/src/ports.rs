@@ -1,4 +1,4 @@
-//! Serial ports that the system knows.
+//! Lists the serial ports of the system.
 
 use serde::Serialize;
 use serialport::SerialPortType;
@@ -8,25 +8,26 @@ use crate::{Error, Result};
 /// A serial port.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Port {
-    /// Where it is, as "/dev/ttyUSB0".
+    /// Path of the device, as "/dev/ttyUSB0".
     pub place: String,
     /// "usb", "pci", "bluetooth" or "other".
     pub kind: &'static str,
-    /// The product, maker and serial number of a USB device, as far as it reports them.
+    /// The product name of a USB device, if it reports it.
     pub product: Option<String>,
-    /// As above.
+    /// The manufacturer of a USB device, if it reports it.
     pub maker: Option<String>,
-    /// As above.
+    /// The serial number of a USB device, if it reports it.
     pub serial: Option<String>,
     /// Vendor and product numbers of a USB device.
     pub usb: Option<(u16, u16)>,
 }
 
-/// All serial ports, USB devices first, each kind by name. Pseudo-terminals are not among them: the system does not list them.
+/// All serial ports, USB devices first, each kind by name. Pseudo-terminals are not included: the system does not list
+/// them.
 ///
 /// # Errors
 ///
-/// `File` where the system cannot be asked.
+/// `File` if the system cannot list its ports.
 pub fn ports() -> Result<Vec<Port>> {
     let found = serialport::available_ports()
         .map_err(|error| Error::file(std::path::Path::new("/sys/class/tty"))(error.into()))?;

@@ -1,20 +1,21 @@
 //! Recording files, which stay readable after a crash: MCAP, and the raw `.lsa` of the manual.
 //!
-//! A recording holds the datagrams as they arrived, not decoded events, with the host's arrival time and an arrival number. Beside them stand the board's registers, markers, notes, detections, counts of what was lost, and a
-//! low-rate picture in a standard schema, so that any MCAP viewer shows something.
+//! A recording contains the datagrams as they arrived, not decoded events, with the host's arrival time and an arrival
+//! number. It also contains the board's registers, markers, notes, detections, counts of what was lost, and a low-rate
+//! picture in a standard schema, so that any MCAP viewer shows something.
 //!
-//! A file is readable at any moment: a chunk reaches it whole, at the latest [`FLUSH_EVERY`] after its first datagram,
+//! A file is readable at any time: chunks are written whole, at the latest [`FLUSH_EVERY`] after their first datagram,
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
 mod base64;
+mod event_pictures;
+mod grey_picture;
 mod limits;
 mod lsa;
 mod mcap_reader;
 mod mcap_writer;
 mod metadata;
 mod output;
-mod picture;
-mod pictures;
 mod stream;
 mod topic;
 
@@ -27,59 +28,64 @@ use taxel_core::{Array, problem};
 
 use crate::bridged::Bridged;
 
+pub use event_pictures::EventPictures;
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
-pub use pictures::Pictures;
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 
-/// How long a datagram waits at most until its chunk is closed and handed to the operating system.
+/// Longest time that a datagram waits until its chunk is closed and passed to the operating system.
 ///
-/// Half of it is waited on average; the rest of the 100 ms that a kill may cost is left to compression and a busy machine.
+/// The average wait is half of it; the rest of the 100 ms that a kill may cost is reserved for compression and a busy
+/// machine.
 pub const FLUSH_EVERY: Duration = Duration::from_millis(20);
 
-/// A chunk that has waited so long means that the writing thread gets no processor: the next caller writes it.
+/// From one low-rate picture to the next: in recordings where something comes, as the pipeline publishes them, and to other computers.
+pub const PICTURE_EVERY: Duration = Duration::from_millis(100);
+
+/// Age of the oldest queued message at which the writing thread counts as starved of the processor: the next caller
+/// writes the queue.
 pub const LATE: Duration = Duration::from_millis(40);
 
 /// The verdict on version 1 when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
 
-/// What a recording states about itself, from its first bytes on.
+/// The properties of a recording, stored at its beginning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// The sensor.
     pub array: Array,
-    /// What the board's registers held at the beginning, where that is known.
+    /// The board's registers at the beginning, if they are known.
     #[serde(default)]
     pub registers: Option<Registers>,
-    /// The array that those registers drive, where the recording is a part of it.
+    /// The array that those registers drive, if the recording contains a part of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub driven: Option<Array>,
-    /// What was left behind on the way to this file, a line each.
+    /// What conversions to this file left out, one line each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<String>,
-    /// The numbers of events that a state gave, in a file made of events whose datagrams do not say so.
+    /// The numbers of events that a state gave, in a file made of events whose datagrams do not state it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<u64>,
     /// Whether intensity words are differences (the board's option) instead of values.
     #[serde(default)]
     pub difference: bool,
-    /// What is added to decoded times, us: whole turns of the board's 6.5536 s counter before the first stamp, where a
-    /// file was converted; 0 for what arrived from a board.
+    /// Added to decoded times, us: in a converted file whole turns of the board's 6.5536 s counter before the first
+    /// stamp; 0 for a recording from a board.
     #[serde(default)]
     pub origin_us: i64,
-    /// Where the datagrams arrived from: "udp 0.0.0.0:5208", a file's name ...
+    /// The origin of the datagrams: "udp 0.0.0.0:5208", a file's name, and so on.
     #[serde(default)]
     pub source: String,
     /// The host's clock when the recording began, ns since 1970.
     #[serde(default)]
     pub started_ns: i64,
-    /// The name of this source among the others of its file.
+    /// Name of this source among the sources of its file.
     #[serde(default = "board", skip_serializing_if = "is_board")]
     pub name: String,
-    /// Of a stream of numbers what its lines hold; a board has none.
+    /// For a stream of numbers, the content of its lines; none for a board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<Stream>,
     /// The other sources of the file, each with its own clock.
@@ -87,7 +93,7 @@ pub struct Header {
     pub sources: Vec<Header>,
 }
 
-/// The name of a source that was given none.
+/// The default name of a source.
 fn board() -> String {
     "board".to_owned()
 }
@@ -96,10 +102,10 @@ fn is_board(name: &str) -> bool {
     name == "board"
 }
 
-/// How a file is written.
+/// The options of a writer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WriterOptions {
-    /// Of the chunks.
+    /// Compression of the chunks.
     pub compression: Compression,
     /// Whether an existing file may be replaced.
     pub overwrite: bool,
@@ -108,12 +114,12 @@ pub struct WriterOptions {
 /// Compression of the chunks of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Compression {
-    /// Fastest.
+    /// No compression, the fastest.
     #[default]
     None,
-    /// A tenth smaller on the worst case, a quarter of a core there.
+    /// A tenth smaller in the worst case, in which it uses a quarter of a core.
     Lz4,
-    /// Smallest.
+    /// The smallest files.
     Zstd,
 }
 
@@ -130,24 +136,24 @@ impl std::str::FromStr for Compression {
     }
 }
 
-/// What happened to datagrams and bytes, by cause; the sums close.
+/// Counts of datagrams and bytes, by what happened to them; the sums of the causes equal the totals.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Counts {
-    /// Datagrams that the socket handed over.
+    /// Datagrams received from the socket.
     pub received: u64,
-    /// Datagrams that this recording holds.
+    /// Datagrams in this recording.
     pub recorded: u64,
-    /// What the kernel dropped, its receive buffer being full: datagrams, or with `UDP_GRO` trains of them.
+    /// What the kernel dropped because its receive buffer was full: datagrams, or with `UDP_GRO` trains of them.
     pub dropped_by_kernel: u64,
-    /// Datagrams that taxel dropped, its own queue being full.
+    /// Datagrams that taxel dropped because its own queue was full.
     pub dropped_by_queue: u64,
-    /// What the decoder could not use of the bytes that arrived, by cause; see [`damage`].
+    /// What the decoder could not use of the bytes received, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
-    /// What was lost between the computer that received and this one, where there are two.
+    /// What was lost between the computer that received the datagrams and this one, if they are different.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bridged: Option<Box<Bridged>>,
-    /// Of a board that speaks version 2: datagrams that it sent and that never came intact.
+    /// For version 2: datagrams that the board sent and that never arrived intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
     /// The verdict of the recording that this one was converted from.
@@ -156,7 +162,7 @@ pub struct Counts {
 }
 
 impl Header {
-    /// Checks what a file states about itself.
+    /// Checks the properties that a file states.
     pub(crate) fn check(&self) -> taxel_core::Result<()> {
         self.array.check()?;
         let (rows, columns) = (self.array.rows, self.array.columns);
@@ -194,7 +200,7 @@ impl Header {
         check_name(&self.name)
     }
 
-    /// The header of a board.
+    /// The header of a recording of a board.
     #[must_use]
     pub fn of_board(array: Array, registers: Option<Registers>, source: String, started_ns: i64) -> Self {
         Self {
@@ -213,11 +219,11 @@ impl Header {
         }
     }
 
-    /// The header of a stream of numbers: a row of as many taxels as it has columns of values.
+    /// The header of a stream of numbers: an array of one row, with one taxel per column of values.
     ///
     /// # Errors
     ///
-    /// `Problem` for a name or columns that make no sense.
+    /// `Problem` if the name or a column is not valid.
     pub fn of_stream(name: &str, stream: Stream, source: String, started_ns: i64) -> taxel_core::Result<Self> {
         stream.check(name)?;
         let columns = u16::try_from(stream.values().count()).unwrap_or(u16::MAX);
@@ -229,7 +235,7 @@ impl Header {
     }
 }
 
-/// A source's name is a part of the names of its channels.
+/// Checks a source's name, which becomes part of the names of its channels.
 fn check_name(name: &str) -> taxel_core::Result<()> {
     let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.is_empty() || name.len() > 64 || !name.chars().all(fits) {
@@ -239,7 +245,7 @@ fn check_name(name: &str) -> taxel_core::Result<()> {
 }
 
 impl Counts {
-    /// One line: nothing lost after arrival, or what was lost where.
+    /// The verdict in one line: nothing lost after arrival, or what was lost where.
     #[must_use]
     pub fn verdict(&self) -> String {
         let missing = self.received.saturating_sub(self.dropped_by_queue + self.recorded);
@@ -286,7 +292,7 @@ impl Counts {
     }
 }
 
-/// What a decoder could not use, by cause, as recordings state it.
+/// What a decoder could not use, by cause, as recordings store it.
 #[must_use]
 pub fn damage(counts: &wire::Counts) -> BTreeMap<String, u64> {
     [
@@ -301,7 +307,7 @@ pub fn damage(counts: &wire::Counts) -> BTreeMap<String, u64> {
     .into()
 }
 
-/// The same of a board that speaks version 2, where it does; and how many of its datagrams are missing.
+/// The same for version 2, if the board sends it; and the number of its missing datagrams.
 #[must_use]
 pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String, u64>, u64)> {
     let causes = [
@@ -318,46 +324,46 @@ pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String
     (counts.datagrams > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))
 }
 
-/// Something written down while recording.
+/// A note written during a recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Note {
-    /// When, by the host's clock, ns since 1970.
+    /// Time by the host's clock, ns since 1970.
     pub at_ns: i64,
-    /// When, by the board's clock, us; where it was known.
+    /// Time by the board's clock, us, if it was known.
     pub t_us: Option<i64>,
-    /// What.
+    /// Text of the note.
     pub text: String,
 }
 
-/// What became of the board while recording.
+/// A reset of the board, or a change of its version, during a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BoardChange {
-    /// When it was noticed, by the host's clock, ns since 1970.
+    /// Time by the host's clock at which the change was noticed, ns since 1970.
     #[serde(skip)]
     pub at_ns: i64,
-    /// The board's time, us, which goes on over it; where it was known.
+    /// The board's time, us, which continues over the change; none if it was not known.
     pub t_us: Option<i64>,
-    /// What.
+    /// Kind of the change.
     #[serde(flatten)]
     pub change: Change,
 }
 
-/// What a [`BoardChange`] was.
+/// Kind of a [`BoardChange`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "change", rename_all = "lowercase")]
 pub enum Change {
-    /// The board was reset: its taxels hold no value until their next event.
+    /// The board was reset: its taxels' values are unknown until their next event.
     Reset,
-    /// It speaks another version of the wire.
+    /// The board changed its version of the wire.
     Wire {
-        /// From here on.
+        /// The version from here on.
         version: u8,
-        /// Whether the host told it to; else its datagrams showed it.
+        /// Whether the host commanded it; else its datagrams showed it.
         asked: bool,
     },
 }
 
-/// The host's clock, ns since 1970.
+/// The current time of the host's clock, ns since 1970.
 #[must_use]
 pub fn now_ns() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();

@@ -8,7 +8,7 @@ use taxel_core::{Array, Stop};
 use taxel_live::bridged::Bridged;
 use taxel_live::capture::{Feed, Receiver, ReceiverOptions, Sender};
 use taxel_live::host_clock::RoundTrip;
-use taxel_live::pipeline::{Copied, Listener, Live, LiveOptions, Record, Summary};
+use taxel_live::pipeline::{Copied, Live, LiveOptions, ReadoutSetup, Record, Summary};
 use taxel_live::recording::{Compression, Reader, Topic, now_ns};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -88,10 +88,10 @@ fn bridged(
 ) -> (Scratch, Summary, Scratch, Summary) {
     let (near, far) = (Scratch::new(&format!("{name}-near.mcap")), Scratch::new(&format!("{name}-far.mcap")));
     let since = now_ns() - 60_000_000_000;
-    let source = Live::start(ANY, near.options(), Listener::None, vec![]).expect("a port");
+    let source = Live::start(ANY, near.options(), ReadoutSetup::None, vec![]).expect("a port");
     let mut copies = source.handle().copy().expect("it runs");
     let (receiver, feed) = Receiver::fed("zenoh:there/left", ReceiverOptions::default());
-    let live = Live::start_fed(receiver, far.options(), Listener::None, vec![]).expect("nothing to refuse");
+    let live = Live::start_fed(receiver, far.options(), ReadoutSetup::None, vec![]).expect("nothing to refuse");
     feed.begin_session();
     compare(&feed, since);
     let to = source.address();
@@ -111,7 +111,7 @@ fn bridged(
                 let base = i64::from_le_bytes(parcel[24..32].try_into().unwrap());
                 parcel[24..32].copy_from_slice(&there(base, since).to_le_bytes());
                 for parcel in carry(k, parcel) {
-                    assert!(feed.take(&parcel), "one session");
+                    assert!(feed.push(&parcel), "one session");
                 }
                 k += 1;
             }
@@ -126,8 +126,8 @@ fn bridged(
         }
     }
     sends.join().expect("sent");
-    let heard = live.counters().capture.datagrams;
-    wait_until(|| live.counters().decoded == heard);
+    let received = live.counters().capture.datagrams;
+    wait_until(|| live.counters().decoded == received);
     (near, ended.expect("ended"), far, live.stop().expect("a sound way"))
 }
 
@@ -137,13 +137,13 @@ fn came(summary: &Summary) -> Bridged {
 
 #[test]
 fn what_came_there_comes_here_and_as_of_this_clock() {
-    let (near, sent, far, heard) = bridged(3000, "whole", |_, parcel| vec![parcel]);
+    let (near, sent, far, received) = bridged(3000, "whole", |_, parcel| vec![parcel]);
     assert_eq!(sent.counters.bridged, None);
-    assert_eq!(heard.counters.decoded, 3000);
-    assert_eq!(heard.counters.wire, sent.counters.wire);
-    let bridged = came(&heard);
+    assert_eq!(received.counters.decoded, 3000);
+    assert_eq!(received.counters.wire, sent.counters.wire);
+    let bridged = came(&received);
     assert_eq!((bridged.missing, bridged.dropped, bridged.refused, bridged.ended), (0, 0, 0, true));
-    assert!(heard.verdict.starts_with("nothing lost"), "{}", heard.verdict);
+    assert!(received.verdict.starts_with("nothing lost"), "{}", received.verdict);
     let (there, here) = (near.recorded(), far.recorded());
     assert_eq!(there.len(), 3000);
     for (a, b) in there.iter().zip(&here) {
@@ -155,7 +155,7 @@ fn what_came_there_comes_here_and_as_of_this_clock() {
 #[test]
 fn what_is_lost_repeated_or_spoilt_on_the_way_is_counted() {
     let mut spoilt = 0;
-    let (_near, _, far, heard) = bridged(3000, "lossy", |k, mut parcel| match k % 7 {
+    let (_near, _, far, received) = bridged(3000, "lossy", |k, mut parcel| match k % 7 {
         2 => vec![],
         3 => vec![parcel.clone(), parcel],
         5 => {
@@ -165,25 +165,25 @@ fn what_is_lost_repeated_or_spoilt_on_the_way_is_counted() {
         }
         _ => vec![parcel],
     });
-    let bridged = came(&heard);
+    let bridged = came(&received);
     let came = far.recorded().len() as u64;
     assert!(bridged.missing > 0 && spoilt > 0);
     assert_eq!(bridged.refused, spoilt);
     assert!(bridged.repeated > 0);
-    assert_eq!(came, heard.counters.decoded);
+    assert_eq!(came, received.counters.decoded);
     // The first parcels and the last arrived (numbers 0 and 1 do), or what is beyond them is not known to be missing.
     if bridged.ended {
         assert_eq!(came + bridged.missing, 3000);
     }
-    assert!(heard.verdict.contains("lost between the computers"), "{}", heard.verdict);
+    assert!(received.verdict.contains("lost between the computers"), "{}", received.verdict);
 }
 
 #[test]
 fn a_bridge_that_is_begun_anew_is_met_anew_and_goes_on() {
     let (receiver, feed) = Receiver::fed("zenoh:there", ReceiverOptions::default());
-    let live = Live::start_fed(receiver, LiveOptions::new(Array::thesis()), Listener::None, vec![]).expect("begun");
+    let live = Live::start_fed(receiver, LiveOptions::new(Array::thesis()), ReadoutSetup::None, vec![]).expect("begun");
     for session in 0..3 {
-        let source = Live::start(ANY, LiveOptions::new(Array::thesis()), Listener::None, vec![]).expect("a port");
+        let source = Live::start(ANY, LiveOptions::new(Array::thesis()), ReadoutSetup::None, vec![]).expect("a port");
         let mut copies = source.handle().copy().expect("it runs");
         let mut sender = Sender::open(source.address(), false).expect("a socket");
         sender.push(&datagrams(1)[0]).expect("sent");
@@ -191,7 +191,7 @@ fn a_bridge_that_is_begun_anew_is_met_anew_and_goes_on() {
         let mut met = 0;
         while live.counters().capture.datagrams == before {
             if let Some(Copied::Parcel(parcel)) = copies.next(Duration::from_millis(50)) {
-                while !feed.take(&parcel) {
+                while !feed.push(&parcel) {
                     met += 1;
                     feed.begin_session();
                     let now = now_ns();

@@ -33,21 +33,21 @@ fn send(to: SocketAddr, datagrams: u64, segment: bool) -> SendCounts {
     sender.counts()
 }
 
-/// Stops, takes the rest; gives what was taken (number in the payload, our number) and the counts.
+/// Stops, reads the rest; returns what was received (number in the payload, our number) and the counts.
 fn drain(receiver: &Receiver) -> (Vec<(u64, u64)>, Counts) {
     receiver.stop();
     let mut batch = Batch::new();
-    let mut taken = vec![];
+    let mut received = vec![];
     while !receiver.is_done() {
-        receiver.take(&mut batch, Duration::from_millis(100)).expect("a sound socket");
+        receiver.receive(&mut batch, Duration::from_millis(100)).expect("a sound socket");
         for (d, bytes) in batch.iter() {
             let k = u64::from_le_bytes(bytes[..8].try_into().expect("8 bytes"));
             assert_eq!(bytes, datagram(k), "payload {k} came as it was sent");
             assert!(d.arrived_ns > 0);
-            taken.push((k, d.number));
+            received.push((k, d.number));
         }
     }
-    (taken, receiver.counts())
+    (received, receiver.counts())
 }
 
 #[test]
@@ -55,8 +55,8 @@ fn every_datagram_comes_once_in_order_with_and_without_trains() {
     for (segment, gro) in [(false, false), (false, true), (true, false), (true, true)] {
         let receiver = bind(ReceiverOptions { gro, ..ReceiverOptions::default() });
         let sent = send(receiver.address(), 3000, segment);
-        let (taken, counts) = drain(&receiver);
-        assert_eq!(taken, (0..3000).map(|k| (k, k)).collect::<Vec<_>>());
+        let (received, counts) = drain(&receiver);
+        assert_eq!(received, (0..3000).map(|k| (k, k)).collect::<Vec<_>>());
         assert_eq!((counts.datagrams, counts.bytes), (sent.datagrams, sent.bytes));
         assert_eq!((counts.dropped_by_kernel, counts.dropped_by_queue, counts.waiting), (0, 0, 0));
         if segment && gro && counts.gro && sent.segmenting {
@@ -73,8 +73,8 @@ fn who_takes_receives_by_himself_until_a_thread_does() {
     for (segment, gro, apart) in [(false, false, 60), (false, true, 0), (true, true, 25), (true, false, 99)] {
         let receiver = Receiver::bind(ANY, ReceiverOptions { gro, ..ReceiverOptions::default() }).expect("a port");
         let mut sender = Sender::open(receiver.address(), segment).expect("a socket");
-        let (mut batch, mut taken) = (Batch::new(), vec![]);
-        assert!(!receiver.take(&mut batch, Duration::from_millis(1)).expect("a sound socket"), "nothing came");
+        let (mut batch, mut received) = (Batch::new(), vec![]);
+        assert!(!receiver.receive(&mut batch, Duration::from_millis(1)).expect("a sound socket"), "nothing came");
         for round in 0..60 {
             if round == apart {
                 receiver.apart(Duration::from_millis(apart % 2)).expect("a thread");
@@ -83,24 +83,25 @@ fn who_takes_receives_by_himself_until_a_thread_does() {
                 sender.push(&datagram(k)).expect("sent");
             }
             sender.flush().expect("sent");
-            // The last of them are taken after the stop.
+            // The last of them are received after the stop.
             let begun = Instant::now();
-            while round < 59 && taken.len() < 10 * (round as usize + 1) && begun.elapsed() < Duration::from_secs(10) {
-                receiver.take(&mut batch, Duration::from_millis(100)).expect("a sound socket");
-                taken.extend(batch.iter().map(|(d, bytes)| (bytes.to_vec(), d.number)));
+            while round < 59 && received.len() < 10 * (round as usize + 1) && begun.elapsed() < Duration::from_secs(10)
+            {
+                receiver.receive(&mut batch, Duration::from_millis(100)).expect("a sound socket");
+                received.extend(batch.iter().map(|(d, bytes)| (bytes.to_vec(), d.number)));
             }
         }
         let (rest, counts) = drain(&receiver);
         assert_eq!(rest, (590..600).map(|k| (k, k)).collect::<Vec<_>>());
-        assert_eq!(taken, (0..590).map(|k| (datagram(k), k)).collect::<Vec<_>>());
+        assert_eq!(received, (0..590).map(|k| (datagram(k), k)).collect::<Vec<_>>());
         assert_eq!((counts.datagrams, counts.bytes), (600, sender.counts().bytes));
         assert_eq!((counts.dropped_by_kernel, counts.dropped_by_queue, counts.waiting), (0, 0, 0));
-        assert!(!receiver.take(&mut batch, Duration::from_secs(9)).expect("ended"), "after the end at once");
+        assert!(!receiver.receive(&mut batch, Duration::from_secs(9)).expect("ended"), "after the end at once");
     }
 }
 
 #[test]
-fn an_address_is_free_again_when_all_was_taken_though_the_receiver_lives() {
+fn an_address_is_free_again_when_all_was_read_though_the_receiver_lives() {
     for apart in [false, true] {
         let receiver = bind(ReceiverOptions::default());
         if apart {
@@ -130,10 +131,10 @@ fn what_came_after_the_stop_is_left() {
                 }
             });
             let (mut batch, begun) = (Batch::new(), Instant::now());
-            receiver.take(&mut batch, Duration::from_secs(10)).expect("a sound socket");
+            receiver.receive(&mut batch, Duration::from_secs(10)).expect("a sound socket");
             receiver.stop();
             while !receiver.is_done() && begun.elapsed() < Duration::from_secs(60) {
-                receiver.take(&mut batch, Duration::from_millis(100)).expect("a sound socket");
+                receiver.receive(&mut batch, Duration::from_millis(100)).expect("a sound socket");
             }
             ended.store(true, Ordering::Relaxed);
         });
@@ -146,18 +147,18 @@ fn what_the_kernel_drops_closes_the_sum_at_the_socket() {
     for (segment, gro) in [(false, false), (true, false), (true, true)] {
         // The kernel rounds 1 up to its least buffer: a datagram or two.
         let options = ReceiverOptions { kernel_buffer_bytes: 1, gro, ..ReceiverOptions::default() };
-        let (sent, counts, taken) = (0..20)
+        let (sent, counts, received) = (0..20)
             .find_map(|_| {
                 let receiver = bind(options);
                 let sent = send(receiver.address(), 20_000, segment);
-                let (taken, counts) = drain(&receiver);
-                (counts.dropped_by_kernel > 0).then_some((sent, counts, taken.len() as u64))
+                let (received, counts) = drain(&receiver);
+                (counts.dropped_by_kernel > 0).then_some((sent, counts, received.len() as u64))
             })
             .expect("a buffer of two datagrams overflows");
         // Where trains arrive whole the kernel counts trains; else datagrams.
         let came = if segment && counts.gro && sent.segmenting { sent.messages } else { sent.datagrams };
         assert_eq!(came, counts.messages + counts.dropped_by_kernel);
-        assert_eq!(counts.datagrams, taken);
+        assert_eq!(counts.datagrams, received);
         assert!(counts.datagrams < sent.datagrams);
     }
 }
@@ -173,12 +174,15 @@ fn what_our_queue_drops_closes_the_sum_behind_it_and_leaves_a_gap_in_the_numbers
     }
     assert_eq!(receiver.counts().waiting + receiver.counts().dropped_by_queue, 2000);
     send(receiver.address(), 1, false);
-    let (taken, counts) = drain(&receiver);
+    let (received, counts) = drain(&receiver);
     assert_eq!(counts.dropped_by_kernel, 0);
     assert_eq!(counts.datagrams, sent.datagrams + 1);
-    assert_eq!(counts.datagrams, taken.len() as u64 + counts.dropped_by_queue);
+    assert_eq!(counts.datagrams, received.len() as u64 + counts.dropped_by_queue);
     assert!(counts.dropped_by_queue > 1900, "64 KiB hold about fifty of two thousand");
-    assert!(taken[..taken.len() - 1].iter().all(|&(k, number)| k == number), "a number counts what was dropped too");
+    assert!(
+        received[..received.len() - 1].iter().all(|&(k, number)| k == number),
+        "a number counts what was dropped too"
+    );
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! From the emulated board's frames to recorded datagrams and detections: nothing is lost uncounted, and the recording
-//! gives what was heard live.
+//! gives what was received live.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
@@ -15,7 +15,7 @@ use taxel_core::wire::{Command, Decoder, Registers};
 use taxel_core::{Array, Events, Stop};
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{self, Emulator, Report, Touch};
-use taxel_live::pipeline::{Listener, Live, LiveOptions, OutputDetection, Record, Sink, Summary};
+use taxel_live::pipeline::{Live, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Summary};
 use taxel_live::recording::{Compression, Reader, Topic};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -55,7 +55,7 @@ fn presses(frames: u64, pressed: u64) -> impl Touch {
     }
 }
 
-/// What the board says to these frames, straight from its state machine.
+/// What the board sends of these frames, straight from its state machine.
 fn sent(frames: u64, pressed: u64) -> Events {
     let array = Array::thesis();
     let mut board = Board::new(Registers::default(), &array).expect("a valid preset");
@@ -84,7 +84,7 @@ fn emulate(to: SocketAddr, real_time: bool, mut touch: impl Touch) -> Report {
     emulator.run(&mut touch, |_, _| {}, Stop::never()).expect("sent")
 }
 
-/// Hears every event and speaks after some forty within `tau` ms, which is how slowly its kernel rises.
+/// Reads every event and fires after some forty within `tau` ms, which is how slowly its kernel rises.
 fn readout(tau: f64) -> Readout {
     let neuron = Neuron { tau, refractory: 15.0, theta_0: 0.4, ..Neuron::default() };
     let one = TrainedNeuron { delay_ms: 0.0, weights: vec![0.03; 2 * 4096], neuron };
@@ -103,8 +103,8 @@ fn of(encoder: &str, one: TrainedNeuron) -> Readout {
     }
 }
 
-fn reading(readout: &Readout) -> Listener {
-    Listener::Reading(Box::new(readout.stream(&Array::thesis(), 192.0, None).expect("a sound readout")))
+fn reading(readout: &Readout) -> ReadoutSetup {
+    ReadoutSetup::Reading(Box::new(readout.stream(&Array::thesis(), 192.0, None).expect("a sound readout")))
 }
 
 fn options(record: Option<&Scratch>) -> LiveOptions {
@@ -145,14 +145,14 @@ fn recorded(path: &Scratch) -> (Events, Vec<Detection>) {
         })
         .expect("sound chunks");
     decoder.finish_into(&mut events);
-    let said = reader.remarks(Stop::never()).expect("sound chunks").0.detections;
-    (events, said.into_iter().map(|(_, d)| d).collect())
+    let detections = reader.remarks(Stop::never()).expect("sound chunks").0.detections;
+    (events, detections.into_iter().map(|(_, d)| d).collect())
 }
 
 #[test]
 fn a_recording_holds_the_events_that_the_board_sent() {
     let path = Scratch::new("events.mcap");
-    let live = Live::start(ANY, options(Some(&path)), Listener::None, vec![]).expect("a port and a file");
+    let live = Live::start(ANY, options(Some(&path)), ReadoutSetup::None, vec![]).expect("a port and a file");
     let report = emulate(live.address(), false, presses(3000, 3000));
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
@@ -166,7 +166,7 @@ fn a_recording_holds_the_events_that_the_board_sent() {
 #[test]
 fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
     let path = Scratch::new("bytes.lsa");
-    let live = Live::start(ANY, options(Some(&path)), Listener::None, vec![]).expect("a port and a file");
+    let live = Live::start(ANY, options(Some(&path)), ReadoutSetup::None, vec![]).expect("a port and a file");
     let report = emulate(live.address(), false, presses(1000, 1000));
     wait_for(&live, |live| live.counters().wire.bytes == report.sent.bytes);
     assert!(!path.0.with_extension("lss").exists(), "not complete yet");
@@ -179,10 +179,10 @@ fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
 }
 
 #[test]
-fn what_is_said_live_is_what_the_recording_says() {
-    let path = Scratch::new("said.mcap");
-    let heard = Arc::new(Mutex::new(Vec::<OutputDetection>::new()));
-    let sink = Arc::clone(&heard);
+fn detections_live_are_those_of_the_recording() {
+    let path = Scratch::new("detections.mcap");
+    let delivered = Arc::new(Mutex::new(Vec::<OutputDetection>::new()));
+    let sink = Arc::clone(&delivered);
     let sinks: Vec<Box<dyn Sink>> = vec![Box::new(move |output: &OutputDetection| {
         sink.lock().expect("not poisoned").push(output.clone());
         Ok(())
@@ -190,25 +190,25 @@ fn what_is_said_live_is_what_the_recording_says() {
     let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), sinks).expect("a port and a file");
     let report = emulate(live.address(), true, presses(4000, 4000));
     let mut queued = vec![];
-    while let Some(said) = live.next(Duration::from_millis(500)).expect("no error") {
-        queued.push(said);
+    while let Some(output) = live.next(Duration::from_millis(500)).expect("no error") {
+        queued.push(output);
     }
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     assert_eq!(summary.counters.late, 0);
     assert_eq!(summary.counters.events, summary.counters.read_out);
-    let heard = heard.lock().expect("not poisoned");
-    assert_eq!(*heard, queued, "sink and queue hear the same");
-    let live_said: Vec<Detection> = heard.iter().map(|s| s.detection.clone()).collect();
-    let (events, said) = recorded(&path);
-    assert_eq!(said, live_said, "the recording has the detections that were output");
+    let delivered = delivered.lock().expect("not poisoned");
+    assert_eq!(*delivered, queued, "sink and queue get the same");
+    let output: Vec<Detection> = delivered.iter().map(|s| s.detection.clone()).collect();
+    let (events, detections) = recorded(&path);
+    assert_eq!(detections, output, "the recording has the detections that were output");
     let mut again = readout(2.0).run_events(events.view(), 192.0, None, &[], Stop::never()).expect("a sound readout");
-    // Nothing moved the time on after the last event, and what it would have led to was not said.
+    // Nothing moved the time on after the last event, and what it would have led to was not output.
     again.retain(|d| Some(&d.t) < events.t.last());
-    assert_eq!(again, live_said);
-    assert!(again.len() > 5, "the presses are heard: {}", again.len());
-    // By the host's clock less the offset no detection can be said before it was known, but for the clocks' estimate.
-    assert!(heard.iter().all(|s| s.output_us >= s.detection.known - 192), "{heard:?}");
+    assert_eq!(again, output);
+    assert!(again.len() > 5, "the presses are detected: {}", again.len());
+    // By the host's clock less the offset no detection can be output before it was known, but for the clocks' estimate.
+    assert!(delivered.iter().all(|s| s.output_us >= s.detection.known - 192), "{delivered:?}");
 }
 
 /// The board's times of a recording's pictures, us.
@@ -237,8 +237,8 @@ fn a_recording_has_pictures_around_detections_beside_ten_a_second() {
     while live.next(Duration::from_millis(200)).expect("no error").is_some() {}
     live.stop().expect("no error");
     let tenths = begun.elapsed().as_millis() / 100;
-    let (times, said) = (pictured(&path), recorded(&path).1);
-    assert!(said.len() > 20, "{}", said.len());
+    let (times, detections) = (pictured(&path), recorded(&path).1);
+    assert!(detections.len() > 20, "{}", detections.len());
     assert!(times.len() as u128 > 2 * tenths, "{} pictures in {tenths} tenths of a second", times.len());
     assert!(times.len() as u128 <= 10 * tenths + 12, "{} pictures in {tenths} tenths of a second", times.len());
 }
@@ -254,14 +254,14 @@ fn in_silence_time_moves_on_by_the_hosts_clock() {
         ticks[..40].fill(20 * frames);
         frames <= 2
     });
-    let said = live.next(Duration::from_secs(30)).expect("no error").expect("it is output though no event follows");
-    assert!(said.detection.t > 1000, "the kernel takes its time: {said:?}");
+    let output = live.next(Duration::from_secs(30)).expect("no error").expect("it is output though no event follows");
+    assert!(output.detection.t > 1000, "the kernel takes its time: {output:?}");
     live.stop().expect("no error");
 }
 
 #[test]
 fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
-    let live = Live::start(ANY, options(None), Listener::None, vec![]).expect("a port");
+    let live = Live::start(ANY, options(None), ReadoutSetup::None, vec![]).expect("a port");
     let mut datagrams: Vec<Vec<u8>> = vec![];
     let mut board = Board::new(Registers::default(), &Array::thesis()).expect("a valid preset");
     let mut touch = presses(800, 800);
@@ -325,13 +325,13 @@ fn a_slow_readout_loses_events_where_they_are_counted_and_the_recording_loses_no
 }
 
 #[test]
-fn who_is_slow_to_listen_holds_up_neither_what_comes_nor_what_is_read_out() {
+fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
     let (free, held) = std::sync::mpsc::channel::<()>();
-    let heard = Arc::new(Mutex::new(Vec::<Detection>::new()));
-    let sink = Arc::clone(&heard);
+    let delivered = Arc::new(Mutex::new(Vec::<Detection>::new()));
+    let sink = Arc::clone(&delivered);
     let slow: Box<dyn Sink> = Box::new(move |output: &OutputDetection| {
         sink.lock().expect("not poisoned").push(output.detection.clone());
-        // Until it is let go; then at once.
+        // Waits until the test drops the other end; then returns at once.
         let _ = held.recv();
         Ok(())
     });
@@ -339,22 +339,22 @@ fn who_is_slow_to_listen_holds_up_neither_what_comes_nor_what_is_read_out() {
     let report = emulate(live.address(), true, presses(1500, 1500));
     let expected = sent(1500, 1500);
     wait_for(&live, |live| live.counters().read_out == expected.len() as u64);
-    assert_eq!((heard.lock().expect("not poisoned").len(), live.counters().detections), (1, 0));
+    assert_eq!((delivered.lock().expect("not poisoned").len(), live.counters().detections), (1, 0));
     drop(free);
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     let mut again = readout(2.0).run_events(expected.view(), 192.0, None, &[], Stop::never()).expect("a sound readout");
     again.retain(|d| Some(&d.t) < expected.t.last());
-    assert!(again.len() > 3, "the presses are heard: {}", again.len());
-    assert_eq!(*heard.lock().expect("not poisoned"), again, "each once, in their order");
+    assert!(again.len() > 3, "the presses are detected: {}", again.len());
+    assert_eq!(*delivered.lock().expect("not poisoned"), again, "each once, in their order");
     assert_eq!(summary.counters.detections, again.len() as u64);
 }
 
 #[test]
-fn a_file_that_exists_is_kept_and_its_port_is_let_go() {
-    let path = Scratch::new("kept.mcap");
+fn a_file_that_exists_stays_and_its_port_is_free() {
+    let path = Scratch::new("earlier.mcap");
     std::fs::write(&path.0, "mine").expect("written");
-    let error = Live::start(ANY, options(Some(&path)), Listener::None, vec![]).err().expect("refused");
+    let error = Live::start(ANY, options(Some(&path)), ReadoutSetup::None, vec![]).err().expect("refused");
     assert!(matches!(&error, taxel_live::Error::File { .. }), "{error}");
     assert_eq!(std::fs::read(&path.0).expect("still there"), b"mine");
 }
@@ -362,15 +362,15 @@ fn a_file_that_exists_is_kept_and_its_port_is_let_go() {
 #[test]
 fn a_port_that_is_taken_leaves_no_file_behind() {
     let path = Scratch::new("unborn.mcap");
-    let holder = Live::start(ANY, options(None), Listener::None, vec![]).expect("a port");
-    let error = Live::start(holder.address(), options(Some(&path)), Listener::None, vec![]).err().expect("refused");
+    let holder = Live::start(ANY, options(None), ReadoutSetup::None, vec![]).expect("a port");
+    let error = Live::start(holder.address(), options(Some(&path)), ReadoutSetup::None, vec![]).err().expect("refused");
     assert!(matches!(&error, taxel_live::Error::Socket { .. }), "{error}");
     assert!(!path.0.exists());
 }
 
 #[test]
 fn a_stop_ends_also_while_datagrams_pour_in() {
-    let live = Live::start(ANY, options(None), Listener::None, vec![]).expect("a port");
+    let live = Live::start(ANY, options(None), ReadoutSetup::None, vec![]).expect("a port");
     let to = live.address();
     let done = Arc::new(std::sync::atomic::AtomicBool::new(false));
     let theirs = Arc::clone(&done);
@@ -389,14 +389,14 @@ fn a_stop_ends_also_while_datagrams_pour_in() {
 }
 
 #[test]
-fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_what_follows() {
+fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_what_follows() {
     let mut weights = vec![0.0; 10];
     weights[0] = 3.0;
     let neuron = Neuron { tau: 0.5, refractory: 15.0, ..Neuron::default() };
     let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, weights });
     let path = Scratch::new("tare.mcap");
-    let listener = Listener::Taring(1_000_000, Box::new(readout.clone()));
-    let live = Live::start(ANY, options(Some(&path)), listener, vec![]).expect("a port");
+    let setup = ReadoutSetup::Taring(1_000_000, Box::new(readout.clone()));
+    let live = Live::start(ANY, options(Some(&path)), setup, vec![]).expect("a port");
     wait_for(&live, |live| live.counters().taring);
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
@@ -409,27 +409,27 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_w
         quiet.frame(ticks, never).expect("a frame") || pressed.frame(ticks, never).expect("a frame")
     };
     let report = emulator.run(&mut touch, |_, _| {}, Stop::never()).expect("sent");
-    let mut said = vec![];
+    let mut detections = vec![];
     while let Some(next) = live.next(Duration::from_millis(500)).expect("no error") {
-        said.push(next.detection);
+        detections.push(next.detection);
     }
     let start = 260 * 192 / 100 * 100;
     assert_eq!(live.take_markers().iter().map(|m| (m.t, m.start)).collect::<Vec<_>>(), [(start, true)]);
-    let tare = live.tare().expect("taken");
+    let tare = live.tare().expect("measured");
     assert!(!live.counters().taring);
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
     assert_eq!((tare.start_us, tare.stop_us), (0, start));
     assert!(tare.rest.iter().all(|&rest| rest == Some(20.0)));
-    assert_eq!(said.len(), 5, "a press each 208 frames of 1000");
+    assert_eq!(detections.len(), 5, "a press each 208 frames of 1000");
     let again =
         readout.run_events(recorded(&path).0.view(), 192.0, Some(&tare), &[], Stop::never()).expect("a sound readout");
-    assert_eq!(again, said);
+    assert_eq!(again, detections);
 }
 
 #[test]
 fn the_board_takes_commands_and_answers() {
-    let live = Live::start(ANY, options(None), Listener::None, vec![]).expect("a port");
+    let live = Live::start(ANY, options(None), ReadoutSetup::None, vec![]).expect("a port");
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
     let control = Some(ANY);

@@ -1,4 +1,4 @@
-//! A board that speaks version 2, heard live: what was lost is known, and its promises say when a moment is over.
+//! A board that speaks version 2, received live: what was lost is known, and its promises say when a moment is over.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use taxel_core::encode::Encoder;
 use taxel_core::neuron::{Neuron, Time};
 use taxel_core::wire::{Pairing, Registers, v2};
 use taxel_core::{Array, Events, Stop};
-use taxel_live::pipeline::{Listener, Live, LiveOptions, Record};
+use taxel_live::pipeline::{Live, LiveOptions, ReadoutSetup, Record};
 use taxel_live::recording::{Compression, Reader};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -42,7 +42,7 @@ fn datagrams(array: &Array, registers: Registers, frames: u16) -> Vec<Vec<u8>> {
         Board::new(registers, array).expect("sound registers").version_2(version_2).expect("the same array");
     let mut sent = vec![];
     for k in 0..frames {
-        // Above the floor of every preset, so that each taxel is told once.
+        // Above the floor of every preset, so that each taxel is sent once.
         let mut ticks = vec![40; array.len()];
         let columns = usize::from(array.columns);
         for y in 4..20 {
@@ -91,7 +91,8 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
     let mut sent = datagrams(&array, registers, 300);
     for lossy in [false, true] {
         let path = Scratch::new(if lossy { "lossy.mcap" } else { "whole.mcap" });
-        let live = Live::start(ANY, options(&array, registers, Some(&path)), Listener::None, vec![]).expect("a port");
+        let live =
+            Live::start(ANY, options(&array, registers, Some(&path)), ReadoutSetup::None, vec![]).expect("a port");
         let mut lost = 0;
         if lossy {
             let whole = std::mem::take(&mut sent);
@@ -114,12 +115,12 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
         let counters = &summary.counters;
         assert_eq!((counters.wire_version, counters.wire.bytes), (2, 0));
         assert_eq!(counters.wire_v2.missing, lost);
-        let says = if lossy {
+        let verdict = if lossy {
             format!("LOST: {lost} datagrams lost or damaged on the way")
         } else {
             "nothing lost".to_owned()
         };
-        assert!(summary.verdict.starts_with(&says), "{}", summary.verdict);
+        assert!(summary.verdict.starts_with(&verdict), "{}", summary.verdict);
         let reader = Reader::open(&path.0).expect("a recording");
         let read = reader.decode(Pairing::Direct, Stop::never()).expect("sound chunks");
         let expected = decoded(&array, &sent);
@@ -144,8 +145,8 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), one)].into(),
     };
-    let listener = Listener::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
-    let live = Live::start(ANY, options(&array, registers, None), listener, vec![]).expect("a port");
+    let readout = ReadoutSetup::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
+    let live = Live::start(ANY, options(&array, registers, None), readout, vec![]).expect("a port");
     let mut board = Board::new(registers, &array).expect("sound registers");
     let socket = UdpSocket::bind(ANY).expect("a socket");
     // Two frames with events, then nothing but heartbeats; the potential crosses some ms later.
@@ -155,8 +156,8 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         board.frame(&ticks, |datagram| socket.send_to(datagram, live.address()).is_ok()).expect("a frame");
         std::thread::sleep(Duration::from_micros(100));
     }
-    let said = live.next(Duration::from_secs(30)).expect("a sound way").expect("it is said though no event follows");
-    assert!(said.detection.t > 1000, "the kernel takes its time: {said:?}");
+    let output = live.next(Duration::from_secs(30)).expect("no error").expect("it is output though no event follows");
+    assert!(output.detection.t > 1000, "the kernel takes its time: {output:?}");
     assert_eq!(live.counters().wrong, 0);
     live.stop().expect("a sound way");
 }

@@ -40,8 +40,8 @@ fn record(path: &Path, datagrams: u64, compression: Compression) {
     }
     writer.note(1_000_000_000_500, Some(192), "left heel").unwrap();
     writer.marker(1_000_000_000_600, Marker { t: 384, start: true }).unwrap();
-    let said = Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5, repaired: true };
-    writer.detection(1_000_000_000_700, &said).unwrap();
+    let detection = Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5, repaired: true };
+    writer.detection(1_000_000_000_700, &detection).unwrap();
     writer.registers(1_000_000_000_800, &header().registers.unwrap()).unwrap();
     writer.picture(1_000_000_000_900, 192, 64, &vec![75; 4096]).unwrap();
     let counts = Counts { received: datagrams, ..Counts::default() };
@@ -96,8 +96,8 @@ fn an_existing_file_is_replaced_only_when_asked() {
     let folder = Folder::new("exists");
     let path = folder.0.join("a.mcap");
     std::fs::write(&path, b"precious").unwrap();
-    let said = Writer::create(&path, &header(), WriterOptions::default()).err().unwrap().to_string();
-    assert!(said.contains("a.mcap") && said.to_lowercase().contains("exists"), "{said}");
+    let error = Writer::create(&path, &header(), WriterOptions::default()).err().unwrap().to_string();
+    assert!(error.contains("a.mcap") && error.to_lowercase().contains("exists"), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), b"precious");
     let options = WriterOptions { overwrite: true, ..WriterOptions::default() };
     Writer::create(&path, &header(), options).unwrap().finish(Counts::default()).unwrap();
@@ -158,7 +158,7 @@ fn a_damaged_chunk_is_skipped_and_counted() {
 }
 
 #[test]
-fn a_byte_damaged_anywhere_loses_nothing_unsaid() {
+fn a_byte_damaged_anywhere_loses_nothing_uncounted() {
     let folder = Folder::new("anywhere");
     let path = folder.0.join("whole.mcap");
     record(&path, 3000, Compression::None);
@@ -176,7 +176,7 @@ fn a_byte_damaged_anywhere_loses_nothing_unsaid() {
         };
         let (left, bad) = datagrams(&reader);
         let counted = reader.rebuilt().gaps + reader.rebuilt().large_chunks + bad;
-        assert!(left.len() == all.len() || counted > 0, "byte {place}: {} of {} unsaid", left.len(), all.len());
+        assert!(left.len() == all.len() || counted > 0, "byte {place}: {} of {} uncounted", left.len(), all.len());
         let mut rest = all.iter();
         assert!(left.iter().all(|d| rest.any(|other| other == d)), "byte {place}: not what was written");
     }
@@ -196,7 +196,7 @@ fn a_damaged_length_loses_no_more_than_its_chunk() {
         std::fs::write(&path, &bytes).unwrap();
         let reader = Reader::open(&path).unwrap();
         let (left, bad) = datagrams(&reader);
-        // A length that says too much counts as a chunk that is too large to be unpacked.
+        // A length that is too large counts as a chunk that is too large to be unpacked.
         let counted = reader.rebuilt().gaps + reader.rebuilt().large_chunks + bad;
         assert_eq!(counted, 1, "byte {place} ^ {flip}: {:?}", reader.rebuilt());
         assert!(left.len() >= 2000, "byte {place}: {} datagrams are left", left.len());
@@ -205,7 +205,7 @@ fn a_damaged_length_loses_no_more_than_its_chunk() {
 }
 
 #[test]
-fn a_writer_that_is_dropped_keeps_everything_and_says_that_it_was_not_finished() {
+fn a_writer_that_is_dropped_writes_everything_and_states_that_it_was_not_finished() {
     let folder = Folder::new("drop");
     let path = folder.0.join("a.mcap");
     let writer = Writer::create(&path, &header(), WriterOptions::default()).unwrap();
@@ -221,15 +221,15 @@ fn a_writer_that_is_dropped_keeps_everything_and_says_that_it_was_not_finished()
 #[test]
 fn a_full_disk_is_one_error() {
     let options = WriterOptions { overwrite: true, ..WriterOptions::default() };
-    let said = Writer::create(Path::new("/dev/full"), &header(), options).err().map(|e| e.to_string());
-    assert_eq!(said.as_deref(), Some("/dev/full: No space left on device (os error 28)"));
+    let error = Writer::create(Path::new("/dev/full"), &header(), options).err().map(|e| e.to_string());
+    assert_eq!(error.as_deref(), Some("/dev/full: No space left on device (os error 28)"));
 }
 
 #[test]
 fn wrong_files_are_refused_in_one_line() {
     let folder = Folder::new("wrong");
     let path = folder.0.join("a.mcap");
-    for (bytes, said) in [
+    for (bytes, reason) in [
         (&b"\x1f\x8b\x08\x00\x00\x00\x00\x00"[..], "byte 0: starts with 1F 8B 08 00, not with the MCAP magic"),
         (&b""[..], "byte 0: the file ends inside the MCAP magic"),
         (&b"\x89MCAP0\r"[..], "byte 7: the file ends inside the MCAP magic"),
@@ -237,20 +237,20 @@ fn wrong_files_are_refused_in_one_line() {
     ] {
         std::fs::write(&path, bytes).unwrap();
         let error = Reader::open(&path).unwrap_err().to_string();
-        assert!(error.contains(said) && error.contains("a.mcap") && !error.contains('\n'), "{error}");
+        assert!(error.contains(reason) && error.contains("a.mcap") && !error.contains('\n'), "{error}");
     }
 }
 
 #[test]
-fn the_verdict_says_what_was_lost_where() {
+fn the_verdict_states_what_was_lost_where() {
     let sound = Counts { received: 10, recorded: 10, ..Counts::default() };
     assert_eq!(sound.verdict(), NOTHING_LOST);
     let lossy = Counts { received: 10, recorded: 6, dropped_by_kernel: 2, dropped_by_queue: 3, ..Counts::default() };
-    let said = lossy.verdict();
+    let verdict = lossy.verdict();
     for part in
         ["LOST: 2 messages dropped by the kernel", "3 datagrams dropped by taxel's queue", "1 datagrams received"]
     {
-        assert!(said.contains(part), "{said}");
+        assert!(verdict.contains(part), "{verdict}");
     }
     let damaged = Counts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
     assert_eq!(damaged.verdict(), format!("{NOTHING_LOST}; in the bytes that came: 7 skipped"));

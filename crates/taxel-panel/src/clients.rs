@@ -68,7 +68,7 @@ impl Clients {
         self.send(Broadcast::Text(message.to_string().into()));
     }
 
-    /// Tells all sessions that a new picture can be shown.
+    /// Announces to all sessions that a new picture can be shown.
     pub(super) fn new_picture(&self) {
         self.pictures.send_modify(|n| *n += 1);
     }

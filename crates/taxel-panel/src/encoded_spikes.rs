@@ -76,7 +76,7 @@ impl EncodedSpikes {
         }
     }
 
-    /// Tells the encoder that no change before `t` (us) will follow.
+    /// Informs the encoder that no change before `t` (us) will follow.
     pub(super) fn advance(&mut self, t: i64) {
         if self.failed.is_none() {
             let from = self.pending.len();

@@ -15,6 +15,41 @@ pub(super) struct Label {
     pub(super) row: LabelRow,
 }
 
+/// A change of the labels of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum LabelChange {
+    Mark(LabelRow),
+    Rename { id: u64, label: String },
+    Move { id: u64, t_us: i64 },
+    Delete { id: u64 },
+}
+
+impl LabelChange {
+    /// Applies it to the labels; a new one gets the number `next_id`.
+    fn apply(self, labels: &mut Vec<Label>, next_id: u64) -> Result<(), String> {
+        match self {
+            Self::Mark(row) => labels.push(Label { id: next_id, row }),
+            Self::Rename { id, label } => {
+                let place = place_of(labels, id)?;
+                labels[place].row.label = label;
+            }
+            Self::Move { id, t_us } => {
+                let place = place_of(labels, id)?;
+                labels[place].row.t_us = t_us;
+            }
+            Self::Delete { id } => drop(labels.remove(place_of(labels, id)?)),
+        }
+        Ok(())
+    }
+}
+
+fn place_of(labels: &[Label], id: u64) -> Result<usize, String> {
+    labels
+        .iter()
+        .position(|label| label.id == id)
+        .ok_or_else(|| format!("label_id: there is no label {id}; it was deleted, perhaps by somebody else"))
+}
+
 /// The labels of the recordings that clients have opened, by the recordings' names.
 #[derive(Debug, Default)]
 pub(super) struct LabelTables(Mutex<Tables>);
@@ -70,17 +105,13 @@ impl LabelTables {
     ///
     /// # Errors
     ///
-    /// That of `change`, which is given the labels and the number of the next one; then nothing is changed.
-    pub(super) fn change<E>(
-        &self,
-        recording: &str,
-        change: impl FnOnce(&mut Vec<Label>, u64) -> Result<(), E>,
-    ) -> Result<(Vec<Label>, Vec<LabelRow>), E> {
+    /// Where there is no label of that number; then nothing is changed.
+    pub(super) fn change(&self, recording: &str, change: LabelChange) -> Result<(Vec<Label>, Vec<LabelRow>), String> {
         let mut tables = lock(&self.0);
         let before = tables.labels.get(recording).cloned().unwrap_or_default();
         let mut labels = before.clone();
         let id = tables.next_id();
-        change(&mut labels, id)?;
+        change.apply(&mut labels, id)?;
         labels.sort_by_key(|label| label.row.t_us);
         let rows = labels.iter().map(|label| label.row.clone()).collect();
         tables.labels.insert(recording.to_owned(), labels);

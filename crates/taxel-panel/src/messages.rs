@@ -68,7 +68,7 @@ pub(super) fn counters(
             "panel": live.missing(),
         },
         "queue": now.capture.waiting,
-        "latency": { "decode": now.decode_latency, "said": now.said_latency },
+        "latency": { "decode": now.decode_latency, "said": now.output_latency },
         "wire_version": now.wire_version,
         "marked_start": now.marked_start,
         "taring": now.taring,

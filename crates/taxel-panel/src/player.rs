@@ -74,19 +74,19 @@ impl Player {
         let needs_changes = options.watched.is_some() || options.encoder.is_some();
         let dense = index.events_before(t).saturating_sub(index.events_before(t - span)) > HISTORY_CHANGES;
         let before = if stored && (!needs_changes || dense) { 0 } else { span };
-        let (frame, reader) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
+        let (keyframe, reader) = index.open(t.saturating_sub(before.max(FORGET * COLUMN_US) + LATE_US))?;
         let columns = index.array().columns;
         let unit_us = options.column_us.min(COLUMN_US);
         let bytes = TimeColumns::bytes_for(index.array().rows.into(), span / unit_us);
-        let state = ArrayState::new(columns, index.noise_floor(), &frame, unit_us, bytes);
-        let first_own = frame.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
+        let state = ArrayState::new(columns, index.noise_floor(), &keyframe, unit_us, bytes);
+        let first_own = keyframe.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
         let history = options.watched.map(|taxel| {
-            let held = frame.held.get(taxel as usize).copied().unwrap_or(UNKNOWN);
-            TaxelHistory::new(taxel, held, frame.latest, options.column_us)
+            let held = keyframe.held.get(taxel as usize).copied().unwrap_or(UNKNOWN);
+            TaxelHistory::new(taxel, held, keyframe.latest, options.column_us)
         });
         let encoder = options.encoder.as_ref();
         let spikes =
-            encoder.map(|e| EncodedSpikes::new(e, index.array(), options.column_us, &frame.held, frame.latest));
+            encoder.map(|e| EncodedSpikes::new(e, index.array(), options.column_us, &keyframe.held, keyframe.latest));
         let spikes = spikes.transpose()?;
         let mut player =
             Self { index, reader, state, first_own, pending: vec![], applied: 0, t, history, spikes, options };

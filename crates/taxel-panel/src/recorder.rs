@@ -14,8 +14,7 @@ pub(super) struct RecordingPlan {
     pub(super) name: String,
     /// Number of the next recording, appended to the name.
     pub(super) index: Option<u32>,
-    /// Ending of the file, "mcap" or "lsa".
-    pub(super) ending: &'static str,
+    pub(super) format: RecordingFormat,
     pub(super) countdown: Duration,
     pub(super) length: Option<Duration>,
     /// Whether the next recording begins by itself.
@@ -23,10 +22,28 @@ pub(super) struct RecordingPlan {
     pub(super) label: Option<String>,
 }
 
+/// The kind of file that is recorded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum RecordingFormat {
+    Mcap,
+    /// Raw bytes alone.
+    Lsa,
+}
+
+impl RecordingFormat {
+    /// Ending of the file's name.
+    fn ending(self) -> &'static str {
+        match self {
+            Self::Mcap => "mcap",
+            Self::Lsa => "lsa",
+        }
+    }
+}
+
 impl RecordingPlan {
     /// Name of the next file.
     pub(super) fn file(&self) -> String {
-        let plain = format!("{}.{}", self.name, self.ending);
+        let plain = format!("{}.{}", self.name, self.format.ending());
         match self.index {
             Some(index) => numbered(plain.as_ref(), index).to_string_lossy().into_owned(),
             None => plain,

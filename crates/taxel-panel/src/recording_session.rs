@@ -10,12 +10,12 @@ use taxel_live::recording::Compression;
 
 use super::hub::Hub;
 use super::messages::warning;
-use super::recorder::{Phase, RecorderState, RecordingPlan};
+use super::recorder::{Phase, RecorderState, RecordingFormat, RecordingPlan};
 
 /// How often progress is sent to the clients.
 const PROGRESS_EVERY: Duration = Duration::from_secs(1);
 
-/// Waits so long for the board's stop marker after telling it to stop.
+/// Waits so long for the board's stop marker after the register was written.
 const STOP_MARKER_WITHIN: Duration = Duration::from_millis(100);
 
 /// Value of REG7 while a recording runs (Table 5.5).
@@ -129,7 +129,8 @@ async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> 
     let since = Instant::now();
     set(hub, |state| state.phase = Phase::Recording(since));
     write_record_register(hub, true).await;
-    let noted = plan.label.as_ref().filter(|_| plan.ending == "mcap").map(|label| live.handle.entitle(label));
+    let noted =
+        plan.label.as_ref().filter(|_| plan.format == RecordingFormat::Mcap).map(|label| live.handle.entitle(label));
     if let Some(Err(error)) = noted {
         hub.clients.send_json(&warning(format!("label: {error}")));
     }

@@ -11,9 +11,9 @@ use taxel_live::ports::ports;
 use super::clients::Broadcast;
 use super::handler::{Cut, LabelRow, UnhealthyTaxels};
 use super::hub::Hub;
-use super::labels::{Label, file_of};
+use super::labels::{LabelChange, file_of};
 use super::live_source::LiveSource;
-use super::recorder::RecordingPlan;
+use super::recorder::{RecordingFormat, RecordingPlan};
 use super::request::{Answer, Refusal, Request};
 use super::{recording_session, registers};
 
@@ -38,7 +38,19 @@ pub(super) async fn carry_out(
         "record" => record(&hub, &request)?,
         "stop" => hub.recorder.end()?,
         "note" => board(&hub)?.handle.note(request.text("text", 200)?)?,
-        "mark" | "rename" | "move" | "delete" => label(&hub, what, shown, &request).await?,
+        "mark" => {
+            let row = LabelRow { label: label_text(&request)?, t_us: request.time("t_us")? };
+            change_label(&hub, shown, LabelChange::Mark(row)).await?;
+        }
+        "rename" => {
+            let change = LabelChange::Rename { id: label_id(&request)?, label: label_text(&request)? };
+            change_label(&hub, shown, change).await?;
+        }
+        "move" => {
+            let change = LabelChange::Move { id: label_id(&request)?, t_us: request.time("t_us")? };
+            change_label(&hub, shown, change).await?;
+        }
+        "delete" => change_label(&hub, shown, LabelChange::Delete { id: label_id(&request)? }).await?,
         "health" => return health(&hub, shown).await.map(Some),
         "cut" => return cut(&hub, shown, &request).await.map(Some),
         "recordings" => return Ok(Some(hub.recordings_message())),
@@ -132,9 +144,9 @@ fn record(hub: &Arc<Hub>, request: &Request<'_>) -> Answer {
     let index = if request.has("index") { Some(request.whole("index", 0, 999_999)?) } else { None };
     let length = if request.has("length_s") { Some(request.number("length_s", 0.01, 86_400.0)?) } else { None };
     let countdown = if request.has("countdown_s") { request.number("countdown_s", 0.0, 60.0)? } else { 0.0 };
-    let ending = match request.get("format").and_then(Value::as_str) {
-        None | Some("mcap") => "mcap",
-        Some("lsa") => "lsa",
+    let format = match request.get("format").and_then(Value::as_str) {
+        None | Some("mcap") => RecordingFormat::Mcap,
+        Some("lsa") => RecordingFormat::Lsa,
         Some(_) => return Err(Refusal::of("format", "must be mcap or lsa")),
     };
     let advance = request.optional_flag("advance")?;
@@ -147,7 +159,7 @@ fn record(hub: &Arc<Hub>, request: &Request<'_>) -> Answer {
     let plan = RecordingPlan {
         name: name.to_owned(),
         index: index.and_then(|index| u32::try_from(index).ok()),
-        ending,
+        format,
         countdown: Duration::from_secs_f64(countdown),
         length: length.map(Duration::from_secs_f64),
         advance,
@@ -172,30 +184,21 @@ pub(super) async fn read_labels(hub: &Hub, recording: &str) -> Answer {
     Ok(())
 }
 
+fn label_id(request: &Request<'_>) -> Answer<u64> {
+    Ok(request.whole("label_id", 1, i64::MAX)?.unsigned_abs())
+}
+
+fn label_text(request: &Request<'_>) -> Answer<String> {
+    Ok(request.text("label", 200)?.to_owned())
+}
+
 /// Changes a label of the recording that is shown or being recorded, and writes the table.
-async fn label(hub: &Hub, what: &str, shown: Option<&str>, request: &Request<'_>) -> Answer {
+async fn change_label(hub: &Hub, shown: Option<&str>, change: LabelChange) -> Answer {
     let recorded = hub.recorder.file();
     let name = shown.or(recorded.as_deref()).ok_or("a label belongs to a recording: open one, or record")?;
-    let wanted = if what == "mark" { 0 } else { request.whole("label_id", 1, i64::MAX)?.unsigned_abs() };
-    let text = if matches!(what, "mark" | "rename") { request.text("label", 200)?.to_owned() } else { String::new() };
-    let t_us = if matches!(what, "mark" | "move") { request.time("t_us")? } else { 0 };
     let table = hub.folder.file(&file_of(name))?;
     let turn = hub.file_turn().await;
-    let (before, rows) = hub.labels.change(name, |labels, next_id| {
-        if what == "mark" {
-            labels.push(Label { id: next_id, row: LabelRow { label: text, t_us } });
-            return Ok(());
-        }
-        let place = labels.iter().position(|label| label.id == wanted).ok_or_else(|| {
-            Refusal::from(format!("label_id: there is no label {wanted}; it was deleted, perhaps by somebody else"))
-        })?;
-        match what {
-            "rename" => labels[place].row.label = text,
-            "move" => labels[place].row.t_us = t_us,
-            _ => drop(labels.remove(place)),
-        }
-        Ok::<_, Refusal>(())
-    })?;
+    let (before, rows) = hub.labels.change(name, change)?;
     // The turn goes with the writing, which goes on where the client leaves.
     let (written, _turn) = hub.ask(move |handler| Ok((handler.write_labels(&table, &rows), turn))).await?;
     if let Err(reason) = written {

@@ -11,7 +11,7 @@ import { make, part, write } from "./dom.js";
 
 /** Places of a kind that the browser remembers. */
 const REMEMBERED = 8;
-const LINES_KEPT = 200;
+const MOST_LINES = 200;
 
 /** A place to choose from a list, or to type, and to connect to. */
 class PlaceForm {
@@ -151,7 +151,7 @@ export class Connection {
   log(text) {
     const lines = part("board-lines", HTMLElement);
     lines.append(make("li", {}, text));
-    while (lines.children.length > LINES_KEPT) lines.firstElementChild?.remove();
+    while (lines.children.length > MOST_LINES) lines.firstElementChild?.remove();
     lines.scrollTop = lines.scrollHeight;
     part("no-lines", HTMLElement).hidden = true;
   }

@@ -7,7 +7,7 @@ import { seconds, short, whole } from "./words.js";
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
 /** Detections of the live source that are stored, and the number of those that are listed and marked. */
-const KEPT = 300;
+const MOST_STORED = 300;
 const LISTED = 100;
 const MARKED = 200;
 
@@ -30,7 +30,7 @@ export class Detections {
   /** @param {Detection} detection */
   add(detection) {
     this.live.unshift(detection);
-    this.live.length = Math.min(this.live.length, KEPT);
+    this.live.length = Math.min(this.live.length, MOST_STORED);
   }
 
   /** @param {Detection[]} detections newest first @param {string} none the text where there are none */
@@ -51,7 +51,7 @@ export class Detections {
 
   /** Writes the list, if it has changed. */
   list() {
-    if (this.listed === this.shown.length && this.listed < KEPT) return;
+    if (this.listed === this.shown.length && this.listed < MOST_STORED) return;
     this.listed = this.shown.length;
     const rows = this.shown.slice(0, LISTED).map(({ label, t_us, latency_us }) => {
       const late = latency_us === null ? "" : short(latency_us);

@@ -4,7 +4,7 @@ import { make, part, write } from "./dom.js";
 import { counted, seconds } from "./words.js";
 
 /** @typedef {import("./protocol.js").Label} Label */
-/** @typedef {import("./protocol.js").Labels} LabelsTold */
+/** @typedef {import("./protocol.js").Labels} LabelsMessage */
 /** @typedef {import("./server.js").Server} Server */
 /** @typedef {import("./settings.js").Settings} Settings */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
@@ -32,7 +32,7 @@ export class Labels {
     this.timeline = timeline;
     this.failed = failed;
     this.shown = shown;
-    /** @type {Map<string, LabelsTold>} by recording */
+    /** @type {Map<string, LabelsMessage>} by recording */
     this.files = new Map();
     /** The recording whose labels are shown. @type {string | null} */
     this.file = null;
@@ -61,7 +61,7 @@ export class Labels {
     return (this.file && this.files.get(this.file)?.labels) || [];
   }
 
-  /** @param {LabelsTold} message */
+  /** @param {LabelsMessage} message */
   take(message) {
     this.files.set(message.name, { ...message, labels: [...message.labels].sort((a, b) => a.t_us - b.t_us) });
     if (message.name === this.file) this.show();

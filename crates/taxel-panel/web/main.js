@@ -29,7 +29,7 @@ import { Zoom } from "./zoom.js";
 /** @typedef {import("./protocol.js").Hello} Hello */
 /** @typedef {import("./protocol.js").Counters} Counters */
 /** @typedef {import("./protocol.js").Opened} Opened */
-/** @typedef {import("./protocol.js").ArrayTold} ArrayTold */
+/** @typedef {import("./protocol.js").ArrayInfo} ArrayInfo */
 
 /** How often text is written, and lanes are drawn, ms. */
 const TEXT_MS = 125;
@@ -103,7 +103,7 @@ function watch(taxel) {
   lanesDue = true;
 }
 
-/** @param {ArrayTold} array */
+/** @param {ArrayInfo} array */
 function resize(array) {
   if (!timeline || timeline.rows !== array.rows || maps.columns !== array.columns) {
     timeline = new Timeline(array.rows, hello?.column_us ?? 4000);
@@ -233,13 +233,8 @@ function showRegisters() {
   const values = opened ? opened.registers : (registers?.values ?? null);
   maps.floor = Number(values?.noise_floor ?? 0);
   if (opened) {
-    if (!hello?.live) board.show(opened.registers ?? {}, frameOf(opened.registers), null, true);
+    if (!hello?.live) board.show(opened.registers ?? {}, opened.frame_us, null, true);
   } else if (registers && hello?.live) board.take(registers);
-}
-
-/** @param {Record<string, number | boolean> | null} values @returns {number | null} us of a frame: lines x line period */
-function frameOf(values) {
-  return values && values.lines && values.line_period ? (Number(values.lines) * Number(values.line_period)) / 100 : null;
 }
 
 /** @param {Opened} message */

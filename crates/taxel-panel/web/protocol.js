@@ -6,8 +6,8 @@ export const VERSION = 1;
 export const UNKNOWN_VALUE = 65535;
 
 /**
- * @typedef {{ rows: number, columns: number, pitch_mm: number, name: string, exists: string | null }} ArrayTold
- * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayTold | null, udp: string | null, control: string | null,
+ * @typedef {{ rows: number, columns: number, pitch_mm: number, name: string, exists: string | null }} ArrayInfo
+ * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayInfo | null, udp: string | null, control: string | null,
  *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, columns_us: [number, number], time_columns: number,
  *   delta_intensity: boolean | null }} Hello
  * @typedef {{ type: "registers", known: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
@@ -23,10 +23,11 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "recorder", state: "idle" | "countdown" | "recording" | "finishing", name: string | null, index: number | null,
  *   file: string | null, label: string | null, advance: boolean, left_s: number | null, seconds: number | null, length_s: number | null,
  *   last: { file: string, verdict: string } | null, error: string | null }} Recorder
- * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileTold
- * @typedef {{ type: "recordings", folder: string, files: FileTold[] }} Recordings
- * @typedef {{ type: "opened", name: string, array: ArrayTold, start_us: number | null, stop_us: number | null, events: number, bytes: number,
- *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null, markers: { t_us: number, start: boolean }[],
+ * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileInfo
+ * @typedef {{ type: "recordings", folder: string, files: FileInfo[] }} Recordings
+ * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null, events: number, bytes: number,
+ *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null,
+ *   frame_us: number | null, markers: { t_us: number, start: boolean }[],
  *   notes: { t_us: number | null, text: string }[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
  * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[] }} Overview
  * @typedef {{ type: "transport", source: string | null, state: "following" | "playing" | "paused", speed: number, t_us: number | null }} Transport

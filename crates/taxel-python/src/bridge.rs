@@ -43,7 +43,7 @@ impl Feed {
 
     /// Takes a parcel; False where it begins a session and `begin_session` has to come first.
     fn take(&self, py: Python<'_>, parcel: Vec<u8>) -> bool {
-        py.detach(|| self.feed.take(&parcel))
+        py.detach(|| self.feed.push(&parcel))
     }
 
     /// A session begins.
@@ -62,8 +62,8 @@ impl Feed {
     }
 
     /// Ends the pipeline because of an error.
-    fn fail(&self, said: &str) {
-        self.feed.fail(said);
+    fn fail(&self, reason: &str) {
+        self.feed.fail(reason);
     }
 
     /// Whether the pipeline has ended.

@@ -44,8 +44,8 @@ pub(crate) fn live(error: LiveError) -> PyErr {
 fn os_error(source: std::io::Error, place: String) -> PyErr {
     match source.raw_os_error() {
         Some(code) => {
-            let said = source.to_string();
-            let text = said.split(" (os error").next().unwrap_or(&said).to_owned();
+            let message = source.to_string();
+            let text = message.split(" (os error").next().unwrap_or(&message).to_owned();
             PyOSError::new_err((code, text, place))
         }
         None if source.kind() == std::io::ErrorKind::AlreadyExists => {

@@ -16,7 +16,7 @@ use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
 use taxel_live::pipeline::{
-    Handle, Lines, Listener, Live as Pipeline, LiveOptions, OutputDetection, Record, Sink, Source,
+    Handle, Lines, Live as Pipeline, LiveOptions, OutputDetection, ReadoutSetup, Record, Sink, Source,
 };
 
 use crate::bridge::{Copies, Feed};
@@ -187,11 +187,11 @@ impl Live {
         }
         let readout = readout.map(Readout::from_json).transpose().map_err(core)?;
         let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
-        let listener = Listener::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
+        let readout = ReadoutSetup::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
         let pipeline = enter(py, |_| match fed {
-            Some(receiver) => Pipeline::start_fed(receiver, options, listener, sinks),
-            None => Pipeline::start(of_host(host, port)?, options, listener, sinks),
+            Some(receiver) => Pipeline::start_fed(receiver, options, readout, sinks),
+            None => Pipeline::start(of_host(host, port)?, options, readout, sinks),
         })?;
         Ok(Self {
             pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline),
@@ -306,7 +306,7 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.records())).unwrap_or(false)
     }
 
-    /// Announces that the host told the board to speak this version of the wire.
+    /// Announces that the host has set the board to this version of the wire.
     fn expect_version(&self, py: Python<'_>, version: u8) -> PyResult<()> {
         self.with(py, |pipeline| pipeline.expect_version(version))
     }

@@ -7,7 +7,7 @@ use taxel_core::{Error, reading};
 
 use crate::errors::core;
 
-/// Reads `what` from its JSON, or says which of its parameters makes no sense.
+/// Reads `what` from its JSON, or reports which of its parameters makes no sense.
 pub(crate) fn parsed<T: DeserializeOwned>(what: &str, json: &str) -> PyResult<T> {
     // Groups of parameters are ours; whoever wrote the parameter knows its name alone.
     reading::from_text(json).map_err(|unfit| core(Error::Problem(unfit.by_name().of(what))))

@@ -3,14 +3,14 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::Error;
-use taxel_live::recording::Pictures;
+use taxel_live::recording::EventPictures;
 
 use crate::convert::{EventsIn, array, slice, to_events};
 use crate::enter::{Shared, enter};
 
 /// The pictures that a recording of events gets, one by one.
 #[pyclass(frozen, module = "taxel._core")]
-struct RecordingPictures(Shared<Pictures>);
+struct RecordingPictures(Shared<EventPictures>);
 
 /// Time, us, and ticks by taxel index.
 type PictureOut<'py> = (i64, Bound<'py, PyArray1<u16>>);
@@ -22,7 +22,7 @@ impl RecordingPictures {
     fn new(py: Python<'_>, events: EventsIn<'_>, around: PyReadonlyArray1<'_, i64>) -> PyResult<Self> {
         let (events, around) = (to_events(events)?, slice("around", &around)?);
         let events = events.view()?;
-        Ok(Self(Shared::new(enter(py, |_| Pictures::new(events, around))?)))
+        Ok(Self(Shared::new(enter(py, |_| EventPictures::new(events, around))?)))
     }
 
     fn __iter__(slf: Py<Self>) -> Py<Self> {
@@ -30,7 +30,7 @@ impl RecordingPictures {
     }
 
     fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<PictureOut<'py>>> {
-        let picture = |pictures: &mut Pictures| pictures.next_picture().map(|(t, held)| (t, held.to_vec()));
+        let picture = |pictures: &mut EventPictures| pictures.next_picture().map(|(t, held)| (t, held.to_vec()));
         let found = self.0.enter(py, |pictures, _| Ok::<_, Error>(picture(pictures)))?;
         Ok(found.map(|(t, held)| (t, array(py, held))))
     }

@@ -89,14 +89,14 @@ impl RecordingReader {
         let detections: Vec<_> =
             all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope, d.repaired)).collect();
         let markers: Vec<_> = all.markers.iter().map(|m| (m.t, m.start)).collect();
-        let said = json!({
+        let remarks = json!({
             "registers": all.registers, "markers": markers, "notes": all.notes, "detections": detections,
             "board": all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>(),
             "counts": all.counts, "datagrams": all.datagrams, "datagram_bytes": all.datagram_bytes,
             "arrivals": all.arrivals, "pictures": all.pictures, "bad_chunks": bad_chunks,
             "samples": all.samples, "held": all.held, "zeroings": all.zeroings,
         });
-        Ok(said.to_string())
+        Ok(remarks.to_string())
     }
 
     /// Decodes all datagrams.
@@ -199,8 +199,8 @@ impl RecordingWriter {
         slope: f64,
         repaired: bool,
     ) -> PyResult<()> {
-        let said = Detection { label, t: t_us, known: known_us, slope, repaired };
-        self.with(py, |writer| writer.detection(at_ns, &said))
+        let detection = Detection { label, t: t_us, known: known_us, slope, repaired };
+        self.with(py, |writer| writer.detection(at_ns, &detection))
     }
 
     /// Writes a reset of the board or a change of its version of the wire, given as JSON.

@@ -32,7 +32,7 @@ struct WireDecoder(Shared<Either>);
 
 #[pymethods]
 impl WireDecoder {
-    /// `pairing` and `differences` are of version 1 alone: datagrams of version 2 say both themselves.
+    /// `pairing` and `differences` are of version 1 alone: datagrams of version 2 state both themselves.
     #[new]
     fn new(version: u8, array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
         let (array, pairing): (_, Pairing) = (to_array(array)?, parsed("pairing", &format!("{pairing:?}"))?);
@@ -56,9 +56,9 @@ impl WireDecoder {
         let room = to_room(&mut columns)?;
         let columns = self.0.enter(py, |decoder, stop| match decoder {
             Either::One(decoder) => decoder.fill(data, arrived, room, last, stop),
-            Either::Two(decoder, heard) => {
-                let (columns, what) = decoder.fill(data, arrived, room)?;
-                *heard = Some(what);
+            Either::Two(decoder, outcome) => {
+                let (columns, of_this) = decoder.fill(data, arrived, room)?;
+                *outcome = Some(of_this);
                 Ok(columns)
             }
         })?;
@@ -114,7 +114,7 @@ impl WireDecoder {
     fn last(&self, py: Python<'_>) -> Option<(Option<i64>, bool)> {
         self.0.with(py, |decoder| match decoder {
             Either::One(_) => None,
-            Either::Two(_, heard) => heard.map(|heard| match heard {
+            Either::Two(_, last) => last.map(|outcome| match outcome {
                 Outcome::Intact { until, .. } => (until, true),
                 Outcome::Repeated | Outcome::Refused(_) => (None, false),
             }),

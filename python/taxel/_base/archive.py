@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.limits import DESCRIPTION, UNPACKED, unpacked
+from taxel._base.messages import first_line
 from taxel._core import FormatError
 
 __all__ = ["read_arrays", "stored_names"]
@@ -38,7 +39,7 @@ def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
 
 
 def read_arrays(
-    path: str | os.PathLike[str], wanted: Iterable[str], *, texts: Iterable[str] = ()
+    path: str | os.PathLike[str], names: Iterable[str], *, texts: Iterable[str] = ()
 ) -> dict[str, NDArray[Any]]:
     """Read arrays of a .npz by name, those of the wanted ones that it has.
 
@@ -68,22 +69,21 @@ def read_arrays(
     """
     with open(path, "rb") as file:
         try:
-            return _arrays(Path(path), file, tuple(wanted), frozenset(texts))
+            return _arrays(Path(path), file, tuple(names), frozenset(texts))
         except (FormatError, MemoryError):
             raise
         # NumPy and zipfile raise many kinds of errors on damage: zlib.error, NotImplementedError, TokenError,
         # struct.error, OSError where an archive says that it goes on before its beginning ...
         except Exception as error:
-            said = str(error).split("\n", maxsplit=1)[0][:200] or type(error).__name__
-            raise FormatError(f"{path}: a .npz that cannot be unpacked ({said}); write it again") from None
+            raise FormatError(f"{path}: a .npz that cannot be unpacked ({first_line(error)}); write it again") from None
 
 
-def _arrays(path: Path, file: IO[bytes], wanted: tuple[str, ...], texts: frozenset[str]) -> dict[str, NDArray[Any]]:
+def _arrays(path: Path, file: IO[bytes], names: tuple[str, ...], texts: frozenset[str]) -> dict[str, NDArray[Any]]:
     """Read the arrays once all have said how large they are."""
     columns = {}
     with zipfile.ZipFile(file) as archive:
         members = {name.removesuffix(".npy"): name for name in archive.namelist()}
-        there = [name for name in wanted if name in members]
+        there = [name for name in names if name in members]
         total = 0
         for name in there:
             with archive.open(members[name]) as array:

@@ -46,7 +46,7 @@ _SHOWN = 60
 #: The most values that a parameter may hold.
 _MOST = 10_000_000
 #: The most entries of an iterator, which may have no end.
-_MOST_GIVEN = 1_000_000
+_MOST_ENTRIES = 1_000_000
 #: The most values to which an array that NumPy repeats (`np.broadcast_to`) is copied.
 _MOST_REPEATED = 100_000_000
 
@@ -93,12 +93,12 @@ def several(name: str, values: object) -> list[Any]:
     _refuse_repeated(name, values)
     try:
         sized = hasattr(values, "__len__")
-        found = list(values) if sized else list(islice(values, _MOST_GIVEN + 1))  # type: ignore[call-overload]
+        entries = list(values) if sized else list(islice(values, _MOST_ENTRIES + 1))  # type: ignore[call-overload]
     except TypeError:
         raise ProblemError(f"{name} is {shown(values)}: must be a sequence") from None
-    if not sized and len(found) > _MOST_GIVEN:
-        raise ProblemError(f"{name} is {shown(values)}: must give at most {_MOST_GIVEN} entries")
-    return found
+    if not sized and len(entries) > _MOST_ENTRIES:
+        raise ProblemError(f"{name} is {shown(values)}: must give at most {_MOST_ENTRIES} entries")
+    return entries
 
 
 def callback(name: str, value: T) -> T:
@@ -184,8 +184,8 @@ def _converted(name: str, values: Any, unit: str | None) -> Any:
         return [_converted(f"{name}[{k}]", value, unit) for k, value in enumerate(values)]
     try:
         convert = values.rescale if hasattr(values, "rescale") else values.to
-        given = convert(unit or "dimensionless")
-        plain = np.asarray(given.magnitude if hasattr(given, "magnitude") else given.value, np.float64)
+        in_unit = convert(unit or "dimensionless")
+        plain = np.asarray(in_unit.magnitude if hasattr(in_unit, "magnitude") else in_unit.value, np.float64)
         # 7 ms in s and back is 7.000000000000001 ms; whole numbers stay whole, so that stamps stay stamps.
         rounded = np.rint(plain)
         return np.where(np.abs(plain - rounded) <= 1e-15 * np.abs(plain), rounded, plain)
@@ -245,8 +245,8 @@ def flag(name: str, value: object) -> bool:
 def text(name: str, value: object, among: Collection[str] = ()) -> str:
     """Return a text, one of a closed list where there is one."""
     if not isinstance(value, str) or (among and value not in among):
-        wanted = f"one of {', '.join(map(repr, among))}" if among else "a text"
-        raise ProblemError(f"{name} is {shown(value)}: must be {wanted}")
+        expected = f"one of {', '.join(map(repr, among))}" if among else "a text"
+        raise ProblemError(f"{name} is {shown(value)}: must be {expected}")
     if _lone_surrogate(value):
         raise ProblemError(f"{name} is {shown(value)}: must be a text without lone surrogates")
     return value
@@ -254,14 +254,14 @@ def text(name: str, value: object, among: Collection[str] = ()) -> str:
 
 def path(name: str, value: object) -> str:
     """Return a file's name; refuse what cannot be one (a number would be an open file to Python)."""
-    named = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    plain = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     try:
-        encoded = os.fsencode(named) if isinstance(named, str) else b""
+        encoded = os.fsencode(plain) if isinstance(plain, str) else b""
     except UnicodeEncodeError:  # half of a surrogate pair, which no file's name holds
         encoded = b""
-    if not isinstance(named, str) or not encoded or b"\0" in encoded:
+    if not isinstance(plain, str) or not encoded or b"\0" in encoded:
         raise ProblemError(f"{name} is {shown(value)}: must be a path")
-    return named
+    return plain
 
 
 def window(unit: str, start: object, stop: object) -> tuple[float, float]:
@@ -280,29 +280,31 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
     plain = bare(name, values, unit)
     _refuse_repeated(name, plain)
     try:
-        given = np.asarray(plain)
-        if given.size == 0 and given.dtype.kind not in "biuf":
-            given = given.astype(dtype)
-        if given.dtype.kind not in "biufO":
-            raise ProblemError(f"{name}: holds {given.dtype}, must hold numbers")
+        received = np.asarray(plain)
+        if received.size == 0 and received.dtype.kind not in "biuf":
+            received = received.astype(dtype)
+        if received.dtype.kind not in "biufO":
+            raise ProblemError(f"{name}: holds {received.dtype}, must hold numbers")
         with np.errstate(invalid="ignore", over="ignore"):
             # A field of records may be contiguous (of one record) and still not aligned.
-            array = np.require(given, dtype, ["C", "A"]).reshape(given.shape)
+            array = np.require(received, dtype, ["C", "A"]).reshape(received.shape)
     except (TypeError, ValueError, OverflowError) as error:
         raise ProblemError(f"{name}: {error}") from None
-    if given.dtype != array.dtype:
+    if received.dtype != array.dtype:
         if array.dtype.kind == "f":
             # A float may lose digits (float32) but not its value.
-            changed = np.isinf(array) & ~np.isinf(given.astype(np.float64))
+            changed = np.isinf(array) & ~np.isinf(received.astype(np.float64))
         else:
-            changed = np.asarray(given != array)
+            changed = np.asarray(received != array)
         if changed.any():
             place = tuple(int(k[0]) for k in np.nonzero(np.atleast_1d(changed)))
-            where = f"[{', '.join(map(str, place))}]" if given.ndim else ""
-            value = shown(np.atleast_1d(given).astype(object)[place])
-            wanted = {"b": "True or False", "f": "a number that fits"}.get(array.dtype.kind, "a whole number that fits")
+            where = f"[{', '.join(map(str, place))}]" if received.ndim else ""
+            value = shown(np.atleast_1d(received).astype(object)[place])
+            expected = {"b": "True or False", "f": "a number that fits"}.get(
+                array.dtype.kind, "a whole number that fits"
+            )
             fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
-            raise ProblemError(f"{name}{where} is {value}: must be {wanted}{fits}")
+            raise ProblemError(f"{name}{where} is {value}: must be {expected}{fits}")
     return array
 
 
@@ -355,10 +357,10 @@ def nth(what: str, chosen: SupportsIndex, length: int) -> int:
     return n % length
 
 
-def fields(records: object, wanted: tuple[str, ...]) -> tuple[str, ...]:
+def fields(records: object, required: tuple[str, ...]) -> tuple[str, ...]:
     """Return the names of a record array's fields; refuse one that lacks a field."""
     names = getattr(getattr(records, "dtype", None), "names", None) or ()
-    missing = [name for name in wanted if name not in names]
+    missing = [name for name in required if name not in names]
     if missing:
         raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
     return tuple(names)

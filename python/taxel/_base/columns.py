@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import column, numbers
 
-__all__ = ["Columns", "frozen", "kept", "kept_numbers", "own"]
+__all__ = ["Columns", "frozen", "own", "own_column", "own_numbers"]
 
 
 class Columns:
@@ -28,23 +28,23 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
     return array
 
 
-def kept(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
+def own_column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
     """Return a noun's column (see `column`): read-only, and copied once where it lies in memory of the caller's."""
     return own(column(name, values, dtype, unit), values)
 
 
-def kept_numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
-    """As `kept`, of any shape (see `numbers`)."""
+def own_numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
+    """As `own_column`, of any shape (see `numbers`)."""
     return own(numbers(name, values, dtype, unit), values)
 
 
-def own(array: NDArray[Any], given: ArrayLike) -> NDArray[Any]:
-    """Return an array that was made of what a caller gave, or a copy where he could still change it; read-only."""
-    if isinstance(given, np.ndarray):
-        his = array is given or np.may_share_memory(array, given)
+def own(array: NDArray[Any], source: ArrayLike) -> NDArray[Any]:
+    """Return an array made from `source`, read-only: a copy where it shares memory that the caller can still change."""
+    if isinstance(source, np.ndarray):
+        shared = array is source or np.may_share_memory(array, source)
     else:
-        his = not isinstance(given, list | tuple)
-    return frozen(array.copy() if his and not _unchangeable(array) else array)
+        shared = not isinstance(source, list | tuple)
+    return frozen(array.copy() if shared and not _unchangeable(array) else array)
 
 
 def _unchangeable(array: object) -> bool:

@@ -19,24 +19,24 @@ def main() -> None:
     sys.path[:] = json.loads(sys.stdin.readline())
     import h5py  # noqa: PLC0415  where it lies was read just now
 
-    say(running=True)
+    send(running=True)
     try:
         with h5py.File(path) as h5:
-            say(attributes={name: whole(value) for name, value in h5.attrs.items()}, entries=entries(h5, h5py))
+            send(attributes={name: whole(value) for name, value in h5.attrs.items()}, entries=entries(h5, h5py))
             for line in sys.stdin:
                 order = json.loads(line)
                 if order["text"]:
-                    say(done=str(h5[order["name"]].asstr()[()]))
+                    send(done=str(h5[order["name"]].asstr()[()]))
                 else:
                     read(h5[order["name"]], memory, order["at"], order["size"])
     # What h5py raises on damage is no closed list.
     except BaseException as error:
-        say(error=(str(error).splitlines() or [""])[0][:200], kind=type(error).__name__)
+        send(error=(str(error).splitlines() or [""])[0][:200], kind=type(error).__name__)
 
 
-def say(**said: Any) -> None:
+def send(**message: Any) -> None:
     """Write a line."""
-    print(json.dumps(said), flush=True)
+    print(json.dumps(message), flush=True)
 
 
 def whole(value: Any) -> int | None:
@@ -49,16 +49,16 @@ def whole(value: Any) -> int | None:
 
 def entries(h5: Any, h5py: Any) -> dict[str, Any]:
     """Return what each entry of the root is: its kind of numbers ("text", "" of a group) and its shape."""
-    found = {}
+    described = {}
     for name in h5:
         data = h5[name]
         if not isinstance(data, h5py.Dataset):
-            found[name] = ["", []]
+            described[name] = ["", []]
         elif h5py.check_string_dtype(data.dtype) is not None:
-            found[name] = ["text", list(data.shape)]
+            described[name] = ["text", list(data.shape)]
         else:
-            found[name] = [data.dtype.str if data.dtype.kind in "biuf" else str(data.dtype), list(data.shape)]
-    return found
+            described[name] = [data.dtype.str if data.dtype.kind in "biuf" else str(data.dtype), list(data.shape)]
+    return described
 
 
 def read(data: Any, memory: int, at: int, size: int) -> None:
@@ -76,9 +76,9 @@ def read(data: Any, memory: int, at: int, size: int) -> None:
                 for k in range(0, len(data), rows):
                     part = np.s_[k : k + rows]
                     data.read_direct(array, part, part)
-                    say(read=k)
+                    send(read=k)
             del array
-    say(done=None)
+    send(done=None)
 
 
 if __name__ == "__main__":

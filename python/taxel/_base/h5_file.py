@@ -93,9 +93,9 @@ class H5File:
         try:
             self._order(sys.path)
             self._answer(BEGIN_S)
-            said = self._answer(PATIENCE_S)
-            self.attributes: dict[str, int | None] = said["attributes"]
-            self.entries = {name: Entry(dtype, tuple(shape)) for name, (dtype, shape) in said["entries"].items()}
+            answer = self._answer(PATIENCE_S)
+            self.attributes: dict[str, int | None] = answer["attributes"]
+            self.entries = {name: Entry(dtype, tuple(shape)) for name, (dtype, shape) in answer["entries"].items()}
         except BaseException:
             self.close()
             raise
@@ -153,9 +153,9 @@ class H5File:
 
     def _done(self) -> Any:
         """Return the answer to an order, once it is done."""
-        while "done" not in (said := self._answer(PATIENCE_S)):
+        while "done" not in (answer := self._answer(PATIENCE_S)):
             pass
-        return said["done"]
+        return answer["done"]
 
     def _answer(self, patience_s: float) -> dict[str, Any]:
         """Return the next line that the child says."""
@@ -172,12 +172,12 @@ class H5File:
                 )
             self._rest += more
         line, _, self._rest = self._rest.partition(b"\n")
-        said: dict[str, Any] = json.loads(line)
-        if said.get("kind") == "MemoryError":
-            raise MemoryError(said["error"])
-        if "error" in said:
-            raise FormatError(f"{self.path}: not a whole HDF5 file ({said['error']})")
-        return said
+        answer: dict[str, Any] = json.loads(line)
+        if answer.get("kind") == "MemoryError":
+            raise MemoryError(answer["error"])
+        if "error" in answer:
+            raise FormatError(f"{self.path}: not a whole HDF5 file ({answer['error']})")
+        return answer
 
     def close(self) -> None:
         """End the child."""

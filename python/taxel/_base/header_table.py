@@ -55,21 +55,21 @@ class HeaderTable:
         (('label', 't_us'), [(3, {'label': 'heel', 't_us': '400'})])
         """
         reader = csv.reader(lines, strict=True)
-        found: list[tuple[int, tuple[str, ...]]] = []
+        rows: list[tuple[int, tuple[str, ...]]] = []
         line = 1
         try:
             for cells in reader:
                 if any(cell.strip() for cell in cells):
-                    found.append((line, tuple(cells)))
+                    rows.append((line, tuple(cells)))
                 line = reader.line_num + 1
         except csv.Error as error:
-            said = "a quote opens and does not close" if "end of data" in str(error) else error
-            raise FormatError(f"{place}, line {line}: {said}") from None
-        header = tuple(name.strip() for name in found[0][1]) if found else ()
+            reason = "a quote opens and does not close" if "end of data" in str(error) else error
+            raise FormatError(f"{place}, line {line}: {reason}") from None
+        header = tuple(name.strip() for name in rows[0][1]) if rows else ()
         repeated = [name for name in header if name and header.count(name) > 1]
         if repeated:
-            raise FormatError(f"{place}, line {found[0][0]}: column {shown(repeated[0])} stands there twice")
-        return cls(str(place), header, tuple(found[1:]))
+            raise FormatError(f"{place}, line {rows[0][0]}: column {shown(repeated[0])} stands there twice")
+        return cls(str(place), header, tuple(rows[1:]))
 
     @property
     def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
@@ -88,7 +88,7 @@ class HeaderTable:
             raise FormatError(f"{self.place}, line {line}: {len(cells)} cells, must have {len(self.header)}")
         return cells
 
-    def has(self, wanted: Sequence[str], others: Sequence[str] | None = None) -> None:
+    def has(self, required: Sequence[str], others: Sequence[str] | None = None) -> None:
         """Check the names of the columns.
 
         Parameters
@@ -100,19 +100,19 @@ class HeaderTable:
         ------
         FormatError : one is missing, or stands there that may not (names it)
         """
-        missing = [name for name in wanted if name not in self.header]
+        missing = [name for name in required if name not in self.header]
         if missing:
             first = self.header[0] if len(self.header) == 1 else ""
-            parted = next((said for mark, said in _PARTED.items() if mark in first), None)
+            parted = next((delimiter for mark, delimiter in _PARTED.items() if mark in first), None)
             if parted:
                 raise FormatError(f"{self.place}, line 1: its cells are parted by {parted}; must be commas")
             there = f"there are {', '.join(map(shown, self.header))}" if self.header else "it is empty"
             raise FormatError(
-                f"{self.place}, line 1: no column {missing[0]!r}; {there}; must be {','.join(wanted)} ..."
+                f"{self.place}, line 1: no column {missing[0]!r}; {there}; must be {','.join(required)} ..."
             )
-        strange = [name for name in self.header if others is not None and name not in (*wanted, *others)]
+        strange = [name for name in self.header if others is not None and name not in (*required, *others)]
         if strange:
-            known = ",".join((*wanted, *(others or ())))
+            known = ",".join((*required, *(others or ())))
             raise FormatError(f"{self.place}, line 1: column {shown(strange[0])}; must be {known} or some of them")
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:

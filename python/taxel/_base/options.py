@@ -23,8 +23,8 @@ def option(default: Any, about: str, *, least: float | None = None, most: float 
 
 def about(options: Any, name: str) -> dict[str, Any]:
     """Return the text and the range of an option, for the command line: help, min, max."""
-    found = {one.name: one.metadata for one in fields(options)}[name]
-    return {key: value for key, value in found.items() if value is not None}
+    metadata = {one.name: one.metadata for one in fields(options)}[name]
+    return {key: value for key, value in metadata.items() if value is not None}
 
 
 def with_options(options: Callable[_P, _Options]) -> Callable[[Callable[[_Options], _Result]], Callable[_P, _Result]]:
@@ -54,8 +54,8 @@ def with_fields_of(
 
         functools.update_wrapper(init, begin)
         own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-        named = inspect.signature(options).parameters.values()
-        init.__signature__ = inspect.Signature([own, *named])  # type: ignore[attr-defined]
+        parameters = inspect.signature(options).parameters.values()
+        init.__signature__ = inspect.Signature([own, *parameters])  # type: ignore[attr-defined]
         return init
 
     return decorate

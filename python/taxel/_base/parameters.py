@@ -142,7 +142,7 @@ class Parameters:
         ProblemError : a name that is not known, or a value that makes no sense; all parameters are then as before
         """
         names = self._names()
-        given: dict[str, Any] = {}
+        changes: dict[str, Any] = {}
         inner: dict[str, dict[str, Any]] = {}
         for name, value in parameters.items():
             outer, nested, rest = name.partition("__")
@@ -151,16 +151,16 @@ class Parameters:
             if nested:
                 inner.setdefault(outer, {})[rest] = value
             else:
-                given[outer] = value
+                changes[outer] = value
         for name, values in inner.items():
-            held: Any = given.get(name, getattr(self, name))
+            held: Any = changes.get(name, getattr(self, name))
             held = self._stands_for(name) if held is None else held
             if not hasattr(held, "set_params") or isinstance(held, type):
                 raise ProblemError(f"{name} is {shown(held)}: has no parameter {next(iter(values))!r}")
-            given[name] = copy.copy(held).set_params(**values)
+            changes[name] = copy.copy(held).set_params(**values)
         before = self._values()
         try:
-            for name, value in given.items():
+            for name, value in changes.items():
                 object.__setattr__(self, name, value)
             self._check()
         except BaseException:
@@ -176,8 +176,8 @@ class Parameters:
 
     def __repr__(self) -> str:
         default = {name: entry.default for name, entry in signature(type(self)).parameters.items()}
-        given = (f"{name}={value!r}" for name, value in self._values().items() if not _same(value, default[name]))
-        return f"{type(self).__name__}({', '.join(given)})"
+        settings = (f"{name}={value!r}" for name, value in self._values().items() if not _same(value, default[name]))
+        return f"{type(self).__name__}({', '.join(settings)})"
 
 
 class Value(Parameters):

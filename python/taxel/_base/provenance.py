@@ -62,7 +62,7 @@ class Sources:
             By name of a module, name in ``taxel._core``, or path of a data file; sorted.
         """
         done: set[str] = set()
-        found: dict[str, str] = {}
+        digests: dict[str, str] = {}
         open_ = list(modules)
         while open_:
             name = open_.pop()
@@ -71,13 +71,13 @@ class Sources:
             done.add(name)
             if name.startswith(f"{_CORE}."):
                 compiled = self._compiled.get(name.removeprefix(f"{_CORE}."))
-                found |= {} if compiled is None else {name: compiled}  # what is only there for types has none
+                digests |= {} if compiled is None else {name: compiled}  # what is only there for types has none
             elif (module := self._module(name)) is not None:
-                found[name] = module.digest
+                digests[name] = module.digest
                 data = module.data if self._roots[name.split(".")[0]].is_dir() else []
-                found |= {self._shown(file): _digest(file.read_bytes()) for file in data}
+                digests |= {self._shown(file): _digest(file.read_bytes()) for file in data}
                 open_ += self._used(module)
-        return dict(sorted(found.items()))
+        return dict(sorted(digests.items()))
 
     def digest(self, *modules: str) -> str:
         """Return one digest of all that `parts` finds."""
@@ -105,7 +105,7 @@ class Sources:
         return file.relative_to(root.parent).as_posix()
 
     def _used(self, module: _Module) -> Iterator[str]:
-        for source, name in module.taken:
+        for source, name in module.imported:
             if name is None or self._is_module(f"{source}.{name}"):
                 continue  # a module: what is taken from it counts
             yield from self._home(source, name)
@@ -171,12 +171,12 @@ class _Module:
         #: Where each name comes from that an import binds: module, and name in it; those for types too.
         self.bound: dict[str, tuple[str, str | None]] = {}
         #: What is taken when the module runs.
-        self.taken: list[tuple[str, str | None]] = []
+        self.imported: list[tuple[str, str | None]] = []
         for node, runs in _imports(tree):
             for alias, source, original in _names(node):
                 self.bound[alias] = (source, original)
                 if runs:
-                    self.taken.append((source, original))
+                    self.imported.append((source, original))
         self._tree = tree
         self.defined = {name for node in tree.body for name in _defines(node)}
 
@@ -184,7 +184,7 @@ class _Module:
     def chains(self) -> list[tuple[str, tuple[str, ...]]]:
         """List how each name that an import binds is used: ``learn.ConeX`` is ``("learn", ("ConeX",))``."""
         bases = {id(node.value) for node in ast.walk(self._tree) if isinstance(node, ast.Attribute)}
-        found = []
+        uses = []
         for node in ast.walk(self._tree):
             if isinstance(node, ast.Attribute | ast.Name) and id(node) not in bases:
                 chain: list[str] = []
@@ -193,24 +193,24 @@ class _Module:
                     chain.append(inner.attr)
                     inner = inner.value
                 if isinstance(inner, ast.Name) and inner.id in self.bound:
-                    found.append((inner.id, tuple(reversed(chain))))
-        return sorted(set(found))
+                    uses.append((inner.id, tuple(reversed(chain))))
+        return sorted(set(uses))
 
     @cached_property
     def computes_names(self) -> bool:
         """Whether it imports by a name that it computes."""
         calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call)]
-        named = [(getattr(call.func, "id", getattr(call.func, "attr", "")), call) for call in calls]
+        called = [(getattr(call.func, "id", getattr(call.func, "attr", "")), call) for call in calls]
         return any(
             name == "import_module" and not (call.args and isinstance(call.args[0], ast.Constant))
-            for name, call in named
+            for name, call in called
         )
 
     @cached_property
     def data(self) -> list[Path]:
         """The files beside it that are no code, where it looks for files there; none below another package."""
         looks = any(isinstance(node, ast.Name) and node.id == "__file__" for node in ast.walk(self._tree))
-        if not looks and "importlib.resources" not in {source for source, _ in self.taken}:
+        if not looks and "importlib.resources" not in {source for source, _ in self.imported}:
             return []
         folder = self.path.parent
         packages = {file.parent for file in folder.rglob("__init__.py")} - {folder}

@@ -19,6 +19,7 @@ from taxel._base.arguments import flag, instance, mapping, number, numbers, seve
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
+from taxel._base.messages import counted, first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.calibration._curves import N_PER_KPA_MM2, Curve, Law, Power, Table, Values, above_0, curve_of
@@ -29,14 +30,14 @@ __all__ = ["Calibration", "Load"]
 
 #: What a calibration may be in: force on a taxel, or pressure at it.
 UNITS = ("N", "kPa")
-#: Between which an exponent is sought: conductance of a fabric and counts of common sheets lie well within.
+#: Range in which an exponent is searched: conductance of a fabric and counts of common sheets lie well within.
 _EXPONENTS = (0.2, 5.0)
-#: Loads missed by less than this share are met, whichever exponent does it better.
+#: Exponents that miss the loads by less than this share (root mean square) count as equally good.
 _ALIKE = 1e-3
 
 
 class Load(NamedTuple):
-    """A known load, and what the sensor read while it lay there.
+    """A known load, and the sensor's readings under it.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ class Calibration:
 
     @classmethod
     def _made(cls, array: Array, curve: Curve, unit: str, of: str, how: Mapping[str, Any]) -> Calibration:
-        """Build one of its parts, checked."""
+        """Build a calibration from its parts, and check them."""
         made = cls.__new__(cls)
         made.array, made._curve = instance("array", array, Array), curve
         made.unit, made.of = checked_text("unit", unit, UNITS), checked_text("of", of)
@@ -157,7 +158,7 @@ class Calibration:
         date: str | None = None,
         note: str = "",
     ) -> Calibration:
-        """Take the law of the fabric, its amplifier and its ramp: ticks to N or kPa.
+        """Use the law of the fabric, its amplifier and its ramp: ticks to N or kPa.
 
         Parameters
         ----------
@@ -191,8 +192,8 @@ class Calibration:
         ...     Frames([[[0.0]]], [0], unit="N")).values.round(1)
         array([[[4.5]]], dtype=float32)
         """
-        given = {} if sensor is None else mapping("sensor", sensor)
-        curve = Law(ramp, checked_text("unit", unit, UNITS), **given)
+        constants = {} if sensor is None else mapping("sensor", sensor)
+        curve = Law(ramp, checked_text("unit", unit, UNITS), **constants)
         how = {"gain": gain, "rest": rest, "floor": floor, "date": date, "note": note}
         return cls._made(array, curve, unit, "ticks", how)
 
@@ -211,7 +212,7 @@ class Calibration:
         date: str | None = None,
         note: str = "",
     ) -> Calibration:
-        """Take known points, straight lines between them: of one taxel for all, or of each.
+        """Interpolate linearly between known points: of one taxel for all, or of each.
 
         Parameters
         ----------
@@ -296,10 +297,10 @@ class Calibration:
         array([10.], dtype=float32)
         """
         checked_text("unit", unit, UNITS)
-        given = [instance("loads", load, Load) for load in several("loads", loads)]
-        if not given:
+        measured = [instance("loads", load, Load) for load in several("loads", loads)]
+        if not measured:
             raise ProblemError("loads is empty: lay at least one known load on the array")
-        array, of = instance("frames", given[0].frames, Frames).array, given[0].frames.unit
+        array, of = instance("frames", measured[0].frames, Frames).array, measured[0].frames.unit
         curve: Curve = Power(1.0)
         if start is not None:
             instance("start", start, Calibration)
@@ -308,8 +309,8 @@ class Calibration:
                 raise ProblemError(f"start turns {start.of} into {start.unit}: must turn {of} into {unit}")
             curve, rest = start._curve, start.rest if rest is None else rest
         whole_fit = cls._made(array, curve, unit, of, {"rest": rest, "floor": floor, "date": date, "note": note})
-        laid = [_Laid.of(load, k, whole_fit) for k, load in enumerate(given, start=1)]
-        differ = len({load.load for load in given}) > 1
+        laid = [_Laid.of(load, k, whole_fit) for k, load in enumerate(measured, start=1)]
+        differ = len({load.load for load in measured}) > 1
         if exponent is not None:
             whole_fit._curve = curve.bent(above_0("exponent", exponent))
         elif differ and not isinstance(curve, Table):
@@ -321,7 +322,7 @@ class Calibration:
         unknown = 1 + (differ and exponent is None and not isinstance(curve, Table))
         unknown += int(np.count_nonzero(gains[_there(array)] != gain)) if each else 0
         whole_fit.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
-        whole_fit.loads = tuple((load.load, load.unit, value) for load, value in zip(given, made, strict=True))
+        whole_fit.loads = tuple((load.load, load.unit, value) for load, value in zip(measured, made, strict=True))
         return whole_fit
 
     def apply(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
@@ -369,14 +370,14 @@ class Calibration:
         values = self._curve.readings(np.maximum(frames.values, 0.0) / self.gain, held)
         return Frames(_32_bits(values), frames.t, unit=self.of, array=frames.array)
 
-    def _rest(self, given: Tare | ArrayLike | None) -> Values:
-        if isinstance(given, Tare):
-            _same(self.array, given.array, "the tare")
-            given = given.rest
-        elif given is not None and np.isnan(numbers("rest", given, np.float64)).any():
+    def _rest(self, rest: Tare | ArrayLike | None) -> Values:
+        if isinstance(rest, Tare):
+            _same(self.array, rest.array, "the tare")
+            rest = rest.rest
+        elif rest is not None and np.isnan(numbers("rest", rest, np.float64)).any():
             raise ProblemError("rest holds NaN: must be finite; give a Tare where the rest of a taxel is not known")
-        if given is not None:
-            return _by_taxel("rest", given, self.array)
+        if rest is not None:
+            return _by_taxel("rest", rest, self.array)
         if self.rest is not None:
             return self.rest
         return np.full(self.array.shape, self._curve.rest() if isinstance(self._curve, Law) else 0.0)
@@ -396,13 +397,13 @@ class Calibration:
         if isinstance(curve, Table) and curve.x.ndim == 3:
             curve = Table(curve.x[:, top:bottom, left:right], curve.y)
         gain = self.gain[top:bottom, left:right]
-        said = {name: getattr(self, name) for name in ("floor", "date", "residual", "loads", "note")}
-        return self._made(small, curve, self.unit, self.of, {**said, "gain": gain, "rest": rest})
+        unchanged = {name: getattr(self, name) for name in ("floor", "date", "residual", "loads", "note")}
+        return self._made(small, curve, self.unit, self.of, {**unchanged, "gain": gain, "rest": rest})
 
     def to_json(self) -> str:
         """Return the calibration as JSON that people can read."""
         even = bool((self.gain == self.gain[0, 0]).all())
-        said: dict[str, Any] = {
+        document: dict[str, Any] = {
             "taxel": "calibration",
             "unit": self.unit,
             "of": self.of,
@@ -410,7 +411,7 @@ class Calibration:
             "residual": self.residual,
             "loads": [{"load": load, "unit": unit, "made": made} for load, unit, made in self.loads],
             "note": self.note,
-            "curve": self._curve.said(),
+            "curve": self._curve.to_dict(),
             "floor": self.floor,
             "array": self.array._geometry(),
             "gain": float(self.gain[0, 0]) if even else self.gain.tolist(),
@@ -418,7 +419,7 @@ class Calibration:
             if self.rest is None
             else [[None if np.isnan(r) else r for r in row] for row in self.rest.tolist()],
         }
-        lines = (f" {json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in said.items())
+        lines = (f" {json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in document.items())
         return "{\n" + ",\n".join(lines) + "\n}\n"
 
     @classmethod
@@ -437,33 +438,32 @@ class Calibration:
             raise ProblemError(f"calibration is {shown(text)}: must be JSON text")
         entry = "the whole"
         try:
-            said = json.loads(text)
-            if not isinstance(said, dict) or said.get("taxel") != "calibration":
+            document = json.loads(text)
+            if not isinstance(document, dict) or document.get("taxel") != "calibration":
                 raise ProblemError('must be an object with "taxel": "calibration"')
             entry = "array"
-            array = Array._from_geometry(mapping(entry, said[entry]))
+            array = Array._from_geometry(mapping(entry, document[entry]))
             entry = "curve"
-            unit = checked_text("unit", said["unit"], UNITS)
-            curve = curve_of(mapping(entry, said[entry]), unit)
+            unit = checked_text("unit", document["unit"], UNITS)
+            curve = curve_of(mapping(entry, document[entry]), unit)
             entry = "loads"
             loads = [
-                (number("load", x["load"]), str(x["unit"]), number("made", x["made"])) for x in said.get(entry, ())
+                (number("load", x["load"]), str(x["unit"]), number("made", x["made"])) for x in document.get(entry, ())
             ]
             entry = "rest"
-            rest = said.get(entry)
+            rest = document.get(entry)
             if rest is not None:
                 rest = [[math.nan if r is None else r for r in row] for row in rest]
             entry = "values"
             names = ("gain", "floor", "date", "residual", "note")
-            how = {name: said[name] for name in names if name in said} | {"rest": rest, "loads": loads}
-            return cls._made(array, curve, unit, said["of"], how)
+            how = {name: document[name] for name in names if name in document} | {"rest": rest, "loads": loads}
+            return cls._made(array, curve, unit, document["of"], how)
         except RecursionError:
             raise FormatError("the calibration is nested too deeply; must be as Calibration.save writes it") from None
         except KeyError as error:
             raise FormatError(f"{entry}: {error.args[0]} is missing; must be as Calibration.save writes it") from None
         except (ValueError, TypeError, AttributeError, IndexError, OverflowError, ProblemError) as error:
-            line = str(error).split("\n", maxsplit=1)[0][:200]
-            raise FormatError(f"{entry}: {line}; must be as Calibration.save writes it") from None
+            raise FormatError(f"{entry}: {first_line(error)}; must be as Calibration.save writes it") from None
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the calibration to a JSON file, whole or not at all.
@@ -530,13 +530,13 @@ class Calibration:
 
     def described(self) -> str:
         """Return what it is in a line: the curve, its day, its residual."""
-        (kind, values), count = next(iter(self._curve.said().items())), len(self.loads)
+        (kind, values), count = next(iter(self._curve.to_dict().items())), len(self.loads)
         curve = {
             "power": f"power {values.get('exponent', 0):.3g}",
             "table": f"table of {len(values.get('values', ()))}",
         }
         parts = [curve.get(kind, "law of the fabric")]
-        parts += [f"fit to {count} load{'s' * (count > 1)}"] * bool(count)
+        parts += [f"fit to {counted(count, 'load')}"] * bool(count)
         parts += [] if self.residual is None else [f"residual {100 * self.residual:.1f} %"]
         return ", ".join([f"{self.of} to {self.unit}", *parts, self.date])
 
@@ -553,7 +553,7 @@ class Calibration:
 
 
 class _Laid(NamedTuple):
-    """A load as equations: which taxels, weighed how, make how much; mean readings above the floor."""
+    """The equations of a load: its taxels, their weights and the value; from mean readings above the floor."""
 
     load: float
     weight: float
@@ -596,18 +596,18 @@ class _Laid(NamedTuple):
         return cls(value, weight, readings, rest, loaded, alone)
 
     def by_taxel(self, calibration: Calibration, curve: Curve | None = None) -> Values:
-        """Return what each chosen taxel makes, in the load's own unit; 0 elsewhere."""
+        """Return the value of each chosen taxel, in the load's own unit; 0 elsewhere."""
         curve = calibration._curve if curve is None else curve
         values = self.weight * calibration.gain * curve.values(self.readings, self.rest)
         return np.where(self.chosen, values, 0.0)
 
     def made(self, calibration: Calibration, curve: Curve | None = None) -> float:
-        """Return what all chosen taxels make: their sum of a force, their mean of a pressure."""
+        """Return the value of all chosen taxels: the sum of forces, the mean of pressures."""
         every = self.by_taxel(calibration, curve)[self.chosen]
         return float(every.mean() if self.alone else every.sum())
 
     def errors(self, calibration: Calibration) -> Values:
-        """Return by which share of the load each equation is missed."""
+        """Return the error of each equation, as a share of the load."""
         if self.alone:
             return np.asarray(self.by_taxel(calibration)[self.chosen] / self.load - 1.0)
         return np.array([self.made(calibration) / self.load - 1.0])
@@ -621,7 +621,7 @@ def _least(made: Sequence[float], loads: Sequence[float]) -> tuple[float, float]
 
 
 def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]) -> float:
-    """Return the exponent whose best gain misses the loads by least."""
+    """Return the exponent whose best gain has the least squares of relative error."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415  loads slowly
 
     loads = [one.load for one in laid]
@@ -630,13 +630,13 @@ def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]
         bent = curve.bent(math.exp(log))
         return _least([one.made(calibration, bent) for one in laid], loads)[1]
 
-    # From a grid first: the squares need not have a single valley.
+    # A grid comes first, as the squares may have several minima.
     grid = np.linspace(math.log(_EXPONENTS[0]), math.log(_EXPONENTS[1]), 33)
     miss = np.array([np.inf, *map(missed, grid), np.inf])
     valleys = np.flatnonzero((miss[1:-1] <= miss[:-2]) & (miss[1:-1] < miss[2:]))
     around = [(grid[max(0, k - 1)], grid[min(len(grid) - 1, k + 1)]) for k in map(int, valleys)]
-    found = [minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 1e-9}) for bounds in around]
-    best, *others = sorted((float(one.fun), math.exp(float(one.x))) for one in found)
+    minima = [minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 1e-9}) for bounds in around]
+    best, *others = sorted((float(one.fun), math.exp(float(one.x))) for one in minima)
     alike = [exponent for squares, exponent in others if squares <= max(4.0 * best[0], _ALIKE**2)]
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
@@ -663,7 +663,7 @@ def _gains(calibration: Calibration, laid: Sequence[_Laid], each: bool) -> tuple
 
 
 def _32_bits(values: Values) -> NDArray[np.float32]:
-    """Return values as pictures hold them; what does not fit is the largest that does."""
+    """Return values as float32, as pictures hold them; larger ones become the largest float32."""
     return np.minimum(values, np.finfo(np.float32).max).astype(np.float32)
 
 
@@ -671,18 +671,18 @@ def _there(array: Array) -> NDArray[np.bool_]:
     return np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists)
 
 
-def _same(own: Array, other: Array, what: str, unit: str | None = None, wanted: str | None = None) -> None:
+def _same(own: Array, other: Array, what: str, unit: str | None = None, expected: str | None = None) -> None:
     """Refuse what is of another array, or in another unit."""
     if own != other:
         raise ProblemError(f"{what}: of {other!r}; the calibration is of another array, {own!r}")
-    if unit != wanted:
-        raise ProblemError(f"{what}: in {unit}; the calibration takes {wanted}")
+    if unit != expected:
+        raise ProblemError(f"{what}: in {unit}; the calibration takes {expected}")
 
 
-def _by_taxel(name: str, given: Any, array: Array) -> Values:
-    values = numbers(name, given, np.float64)
-    if isinstance(given, bool):
-        raise ProblemError(f"{name} is {given}: must be a number, or {array.shape}")
+def _by_taxel(name: str, value: Any, array: Array) -> Values:
+    values = numbers(name, value, np.float64)
+    if isinstance(value, bool):
+        raise ProblemError(f"{name} is {value}: must be a number, or {array.shape}")
     if values.shape not in ((), array.shape):
         raise ProblemError(f"{name} has shape {values.shape}: must be a number, or {array.shape}")
     if np.isinf(values).any():
@@ -692,11 +692,11 @@ def _by_taxel(name: str, given: Any, array: Array) -> Values:
     return every
 
 
-def _iso(given: object) -> str:
-    if given is None:
+def _iso(value: object) -> str:
+    if value is None:
         return day.today().isoformat()
-    said = checked_text("date", given)
+    written = checked_text("date", value)
     try:
-        return day.fromisoformat(said).isoformat()
+        return day.fromisoformat(written).isoformat()
     except ValueError:
-        raise ProblemError(f"date is {shown(said)}: must be a day as 2026-11-21") from None
+        raise ProblemError(f"date is {shown(written)}: must be a day as 2026-11-21") from None

@@ -33,8 +33,8 @@ class Curve(Protocol):
         """Return the readings of values: the inverse."""
         ...
 
-    def said(self) -> dict[str, Any]:
-        """Return what a file holds of it."""
+    def to_dict(self) -> dict[str, Any]:
+        """Return the curve as plain values, as files hold it."""
         ...
 
     def bent(self, exponent: float) -> Curve:
@@ -43,7 +43,7 @@ class Curve(Protocol):
 
 
 class Power:
-    """The reading above rest to a power; of a gain, the value where it is 1."""
+    """A power of the reading above rest; the gain is the value where that reading is 1."""
 
     def __init__(self, exponent: object) -> None:
         self.exponent = above_0("exponent", exponent)
@@ -54,7 +54,7 @@ class Power:
     def readings(self, values: Values, rest: Values) -> Values:
         return np.asarray(rest + values ** (1 / self.exponent))
 
-    def said(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         return {"power": {"exponent": self.exponent}}
 
     def bent(self, exponent: float) -> Power:
@@ -62,7 +62,7 @@ class Power:
 
 
 class Table:
-    """Straight lines through known points, of one taxel for all or of each; beyond the last point what stands there."""
+    """Straight lines through known points, of one taxel for all or of each; the last value holds beyond its point."""
 
     def __init__(self, readings: Any, values: Any) -> None:
         self.x, self.y = numbers("readings", readings, np.float64), floats("values", values)
@@ -86,11 +86,11 @@ class Table:
         if not np.any(at_rest):
             self.x, self.y = np.concatenate([0 * self.x[:1], self.x]), np.append(0.0, self.y)
 
-    def _each(self, given: Values, *, back: bool) -> Values:
+    def _each(self, inputs: Values, *, back: bool) -> Values:
         if self.x.ndim == 1:
-            return np.asarray(np.interp(given, *((self.y, self.x) if back else (self.x, self.y))))
-        out = np.empty(np.broadcast_shapes(given.shape, self.x.shape[1:]))
-        whole = np.broadcast_to(given, out.shape)
+            return np.asarray(np.interp(inputs, *((self.y, self.x) if back else (self.x, self.y))))
+        out = np.empty(np.broadcast_shapes(inputs.shape, self.x.shape[1:]))
+        whole = np.broadcast_to(inputs, out.shape)
         for row, column in np.ndindex(self.x.shape[1:]):
             known = self.x[:, row, column]
             points = (self.y, known) if back else (known, self.y)
@@ -103,7 +103,7 @@ class Table:
     def readings(self, values: Values, rest: Values) -> Values:
         return np.asarray(rest + self._each(values, back=True))
 
-    def said(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}
 
     def bent(self, exponent: float) -> Table:  # noqa: ARG002  what a curve with an exponent takes
@@ -128,8 +128,8 @@ class Law:
     def rest(self) -> float:
         return _core.law_rest(self.text, self.ramp)
 
-    def _of(self, given: Values, rest: Values, back: bool) -> Values:
-        both = np.broadcast_arrays(given, rest)
+    def _of(self, inputs: Values, rest: Values, back: bool) -> Values:
+        both = np.broadcast_arrays(inputs, rest)
         values, at_rest = (np.ascontiguousarray(column, np.float64).ravel() for column in both)
         return _core.law_of(self.text, self.ramp, values, at_rest, back).reshape(both[0].shape)
 
@@ -139,23 +139,23 @@ class Law:
     def readings(self, values: Values, rest: Values) -> Values:
         return self._of(values / self.share, rest, back=True)
 
-    def said(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         return {"law": {"ramp": self.ramp, **self.sensor}}
 
     def bent(self, exponent: float) -> Law:
         return Law(self.ramp, self.unit, **{**self.sensor, "exponent": 1 / exponent})
 
 
-def curve_of(said: Mapping[str, Any], unit: str) -> Curve:
+def curve_of(document: Mapping[str, Any], unit: str) -> Curve:
     """Return the curve that a file describes."""
     kinds: dict[str, Any] = {
         "power": Power,
         "table": Table,
         "law": lambda ramp, **sensor: Law(ramp, unit, **sensor),
     }
-    if len(said) != 1 or next(iter(said)) not in kinds:
-        raise ProblemError(f"{shown(dict(said))}: must be one of {', '.join(kinds)}")
-    ((kind, values),) = said.items()
+    if len(document) != 1 or next(iter(document)) not in kinds:
+        raise ProblemError(f"{shown(dict(document))}: must be one of {', '.join(kinds)}")
+    ((kind, values),) = document.items()
     try:
         curve: Curve = kinds[kind](**mapping(kind, values))
     except TypeError as error:
@@ -164,7 +164,7 @@ def curve_of(said: Mapping[str, Any], unit: str) -> Curve:
 
 
 def above_0(name: str, value: object) -> float:
-    found = number(name, value)
-    if not 0 < found < math.inf:
+    checked = number(name, value)
+    if not 0 < checked < math.inf:
         raise ProblemError(f"{name} is {shown(value)}: must be above 0 and finite")
-    return found
+    return checked

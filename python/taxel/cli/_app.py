@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import errno
+import inspect
 import re
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 from typer.core import TyperCommand
 
+from taxel._base.options import with_options
 from taxel._core import Error
 from taxel.cli._added import WithAdded
 
-__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app"]
+__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app", "with_typed"]
+
+_Typed = TypeVar("_Typed")
 
 #: Exit codes: the user's input is wrong; board, socket or disk; stopped by Ctrl-C.
 WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
@@ -92,3 +96,15 @@ app = App(
     help="Touch as events: from the bytes of a tactile array to decisions that say when.",
     no_args_is_help=True,
 )
+
+
+def with_typed(options: type[_Typed]) -> Callable[[Callable[[_Typed], None]], Callable[..., None]]:
+    """Let a command that is written for a dataclass of what is typed have its fields as arguments and options."""
+
+    def decorate(work: Callable[[_Typed], None]) -> Callable[..., None]:
+        command = with_options(options)(work)
+        # typer reads annotations, not their text.
+        command.__signature__ = inspect.signature(options, eval_str=True)  # type: ignore[attr-defined]
+        return command
+
+    return decorate

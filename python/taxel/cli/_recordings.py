@@ -131,6 +131,14 @@ def _taken(recording: Recording, source: Events | Frames, stop_us: int) -> Tare:
     return tare
 
 
+def span_us(recording: Recording) -> tuple[int, int]:
+    """Return the first and the last time of a recording; refuse an empty one."""
+    times = recording.events.t if recording.has_events else recording.frames().t
+    if not len(times):
+        raise ProblemError(f"{recording.path}: holds nothing")
+    return int(times.min()), int(times.max())
+
+
 def new_report(folder: Path) -> Path:
     """Return the page of a report in a folder, which is made."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -173,10 +181,7 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
     """Return the events that lie within a recording; those outside are left out, with a warning."""
     from taxel.recording import kind_of_file  # noqa: PLC0415  the command line starts quickly
 
-    times = recording.events.t if recording.has_events else recording.frames().t
-    if not len(times):
-        raise ProblemError(f"{recording.path}: holds nothing")
-    first, last = int(times.min()), int(times.max())
+    first, last = span_us(recording)
     found = table.of(recording)
     inside = {label: t[(t >= first) & (t <= last + 1_000_000)] for label, t in found.items()}
     total = sum(map(len, found.values()))

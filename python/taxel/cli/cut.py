@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from taxel import _core
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._recordings import of_source
+from taxel.cli._recordings import of_source, span_us
+
+if TYPE_CHECKING:
+    from taxel.recording import Recording
 
 __all__ = ["cut"]
 
@@ -52,8 +55,9 @@ def cut(
     import taxel  # noqa: PLC0415  the command line starts quickly
     from taxel.recording import open_recording  # noqa: PLC0415
 
+    whole = of_source(open_recording(recording), source)
     parts = taxel.cut(
-        of_source(open_recording(recording), source),
+        whole,
         start_us=float("-inf") if start is None else start * 1e6,
         stop_us=float("inf") if stop is None else stop * 1e6,
         columns=_range("--columns", columns),
@@ -62,6 +66,7 @@ def cut(
         before_us=before * 1e6,
         after_us=after * 1e6,
     )
+    _reaching(whole, start, stop)
     if not parts:
         raise ProblemError(f"{recording}: no note {label!r} with a time in it; taxel info says which there are")
     written = []
@@ -75,6 +80,18 @@ def cut(
                 typer.echo(f"  not kept: {what}")
     if as_json:
         typer.echo(json.dumps({"recording": str(recording), "written": written}))
+
+
+def _reaching(recording: Recording, start: float | None, stop: float | None) -> None:
+    """Refuse a stretch before or after all of a recording, whose file would be empty; one of silence within is none."""
+    if start is None and stop is None:
+        return
+    first, last = (t / 1e6 for t in span_us(recording))
+    lasts = f"{recording.path} lasts from {first} to {last} s"
+    if start is not None and start > last:
+        raise ProblemError(f"--from {start}: {lasts}; must be at most its end")
+    if stop is not None and stop <= first:
+        raise ProblemError(f"--to {stop}: {lasts}; must be above its beginning")
 
 
 def _range(option: str, said: str | None) -> slice | None:

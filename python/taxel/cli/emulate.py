@@ -7,7 +7,7 @@ import secrets
 import sys
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -19,9 +19,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from taxel._base.files import try_whole
 from taxel._base.options import about
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import app, with_typed
 from taxel.cli._recordings import progress
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
+from taxel.live.sending import PORT
 from taxel.recording.opening import open_any
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
@@ -44,57 +45,84 @@ def _in_ms(name: str) -> Any:
     return typer.Option(help=found["help"], min=to_ms(found["min"]), max=to_ms(found["max"]))
 
 
-@app.command()
-def emulate(
-    port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port to send to.")] = 5208,
-    host: Annotated[str, typer.Option(help="The machine to send to, by name or address.")] = "127.0.0.1",
-    scenes: Annotated[int | None, typer.Option(min=0, help="Number of scenes. Default: play until Ctrl-C.")] = None,
+@dataclass(frozen=True)
+class _Typed:
+    """Hold what is typed."""
+
+    port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port to send to.")] = PORT
+    host: Annotated[str, typer.Option(help="The machine to send to, by name or address.")] = "127.0.0.1"
+    scenes: Annotated[int | None, typer.Option(min=0, help="Number of scenes. Default: play until Ctrl-C.")] = None
     scene: Annotated[
         Path | None, typer.Option(help="Play the scene of this .toml, repeatedly, instead of random ones.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(max=TRAINING_SEED - 1, **about(EmulateOptions, "seed"))] = None,
-    replay: Annotated[Path | None, typer.Option(help="Play a recording instead of scenes.")] = None,
+    ] = None
+    seed: Annotated[int | None, typer.Option(max=TRAINING_SEED - 1, **about(EmulateOptions, "seed"))] = None
+    replay: Annotated[Path | None, typer.Option(help="Play a recording instead of scenes.")] = None
     speed: Annotated[
         float | None, typer.Option(help="With --replay: playback speed; 2 takes half the time. Default: 1.")
-    ] = None,
+    ] = None
     pipe: Annotated[
         bool, typer.Option("--pipe", help="Send events of another sensor, whose frames come on standard input.")
-    ] = False,
+    ] = False
     noise_floor: Annotated[
         int | None,
         typer.Option(min=0, max=255, help="With --pipe: a change above this makes an event. Default: 3."),
-    ] = None,
-    tare: Annotated[float | None, typer.Option(min=0, max=60, help=about(EmulateOptions, "tare_ms")["help"])] = None,
-    preset: Annotated[str | None, _option("preset")] = None,
-    wire: Annotated[int | None, _option("wire")] = None,
-    board: Annotated[int, _option("board", of=Version2)] = Version2.board,
-    session: Annotated[int, _option("seed", of=Version2)] = Version2.seed,
-    hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us),
-    heartbeat: Annotated[float, _in_ms("heartbeat_us")] = to_ms(Version2.heartbeat_us),
-    states: Annotated[float, _in_ms("states_us")] = to_ms(Version2.states_us),
-    reset_every: Annotated[float | None, _option("reset_every_s")] = EmulateOptions.reset_every_s,
-    drift: Annotated[float, _option("drift_ppm")] = EmulateOptions.drift_ppm,
-    circuit: Annotated[list[str] | None, _option("circuit", metavar="NAME=VALUE")] = None,
-    asynchronous: Annotated[bool, _option("asynchronous", "--asynchronous")] = EmulateOptions.asynchronous,
-    flaw: Annotated[list[str] | None, _option("flaws", metavar="NAME=SIZE[:SEED]")] = None,
-    fault: Annotated[list[str] | None, _option("faults", metavar="NAME=SHARE")] = None,
-    control: Annotated[int | None, typer.Option(help=about(EmulateOptions, "control")["help"])] = None,
-    line: Annotated[Path | None, _option("line")] = None,
-    baud: Annotated[int | None, _option("baud")] = None,
-    sync: Annotated[Path | None, _option("sync")] = None,
-    source_port: Annotated[int, _option("source_port")] = EmulateOptions.source_port,
+    ] = None
+    tare: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            max=60,
+            help="How long the noise floor is 0 before the start marker, s. Default: 0.05, or the scene's.",
+        ),
+    ] = None
+    preset: Annotated[str | None, _option("preset")] = None
+    wire: Annotated[int | None, _option("wire")] = None
+    board: Annotated[int, _option("board", of=Version2)] = Version2.board
+    session: Annotated[int, _option("seed", of=Version2)] = Version2.seed
+    hold: Annotated[float, _in_ms("hold_us")] = to_ms(Version2.hold_us)
+    heartbeat: Annotated[float, _in_ms("heartbeat_us")] = to_ms(Version2.heartbeat_us)
+    states: Annotated[float, _in_ms("states_us")] = to_ms(Version2.states_us)
+    reset_every: Annotated[float | None, _option("reset_every_s")] = EmulateOptions.reset_every_s
+    drift: Annotated[float, _option("drift_ppm")] = EmulateOptions.drift_ppm
+    circuit: Annotated[list[str] | None, _option("circuit", metavar="NAME=VALUE")] = None
+    asynchronous: Annotated[bool, _option("asynchronous", "--asynchronous")] = EmulateOptions.asynchronous
+    flaw: Annotated[list[str] | None, _option("flaws", metavar="NAME=SIZE[:SEED]")] = None
+    fault: Annotated[list[str] | None, _option("faults", metavar="NAME=SHARE")] = None
+    control: Annotated[int | None, typer.Option(help=about(EmulateOptions, "control")["help"])] = None
+    line: Annotated[Path | None, _option("line")] = None
+    baud: Annotated[int | None, _option("baud")] = None
+    sync: Annotated[Path | None, _option("sync")] = None
+    source_port: Annotated[int, _option("source_port")] = EmulateOptions.source_port
     rest: Annotated[
         bool, typer.Option("--rest", help="Let the ball bounce until it rests, instead of catching it.")
-    ] = False,
+    ] = False
     labels: Annotated[
         Path | None,
         typer.Option(
             "--truth", help="Write the true times of the touches to this CSV, label,t_us,host_ns, as they happen."
         ),
-    ] = None,
-    overwrite: Annotated[bool, _option("overwrite", "--overwrite")] = EmulateOptions.overwrite,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False,
-) -> None:
+    ] = None
+    overwrite: Annotated[bool, _option("overwrite", "--overwrite")] = EmulateOptions.overwrite
+    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False
+
+
+@dataclass(frozen=True)
+class _Played:
+    """Hold what the board plays, and how: the scene's array, sensor and preset (`board`), the touch and its text."""
+
+    seed: int
+    tare_ms: float
+    board: SceneFile
+    flaws: Flaws | None
+    faults: Faults | None
+    circuit: Circuit | None
+    touch: Any
+    text: str
+
+
+@app.command()
+@with_typed(_Typed)
+def emulate(typed: _Typed) -> None:
     """Emulate a board that sends its events by UDP, in real time, until Ctrl-C.
 
     In each scene a ball is dropped on foam over 64 x 64 taxels, caught in flight, pressed by hand and lifted. The board
@@ -108,35 +136,79 @@ def emulate(
 
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
-    _together(scene=scene, replay=replay, pipe=pipe, rest=rest, counted=scenes is not None or labels is not None)
-    _only_with(
-        ("--speed", speed, "--replay", replay), ("--noise-floor", noise_floor, "--pipe", pipe or None),
-        ("--baud", baud, "--line", line),
-    )  # fmt: skip
-    if labels is not None:
-        try_whole(labels, overwrite=overwrite)
-    with progress(quiet=True):
-        written = None if scene is None else SceneFile.open(scene)
-    said_by = _with(written or SceneFile(Scene({})), preset, known=replay is None and not pipe)
-    tare = said_by.tare_ms / 1e3 if tare is None else tare
-    seed = (secrets.randbelow(TRAINING_SEED) if written is None else written.seed) if seed is None else seed
-    flaws, faults, lines = _flaws(flaw or [], seed), _faults(fault or [], seed), _circuit(circuit or [], seed)
-    console = Console(stderr=True, quiet=as_json)
-    if replay is not None:
-        touch, said = _again(replay, 1.0 if speed is None else speed)
-    elif pipe:
-        touch, said = _piped(3 if noise_floor is None else noise_floor)
-    elif written is not None:
-        touch, said = _written(written, scenes, 1e3 * tare), f"{scene}, seed {seed}"
+    _together(typed)
+    if typed.labels is not None:
+        try_whole(typed.labels, overwrite=typed.overwrite)
+    played = _played(typed)
+    console = Console(stderr=True, quiet=typed.as_json)
+    report = _emulated(typed, played, console)
+    if typed.labels is not None:
+        console.print(f"truth: {typed.labels}", soft_wrap=True)
+    if typed.as_json:
+        summary: dict[str, Any] = {"seed": played.seed, "scenes": typed.scenes, "preset": played.board.preset}
+        summary |= {"held": report.held, "verdict": report.verdict}
+        summary |= {"wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
+        typer.echo(json.dumps({**summary, **asdict(report)}))
     else:
-        touch, said = _scenes(seed, scenes, 1e3 * tare, rest)
-    console.print(f"{said}, to {host}:{port}", soft_wrap=True)
+        _say(report, in_time=not typed.pipe)
+
+
+def _together(typed: _Typed) -> None:
+    """Refuse options that do not go together."""
+    others = typed.replay is not None or typed.pipe
+    if typed.replay is not None and typed.pipe:
+        raise ProblemError("--replay and --pipe: give one of them")
+    if typed.scene is not None and (others or typed.rest):
+        raise ProblemError("--scene: leave out --replay, --pipe and --rest")
+    if others and (typed.scenes is not None or typed.labels is not None or typed.rest):
+        raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
+    for name, value, other, there in (
+        ("--speed", typed.speed, "--replay", typed.replay is not None),
+        ("--noise-floor", typed.noise_floor, "--pipe", typed.pipe),
+        ("--baud", typed.baud, "--line", typed.line is not None),
+    ):
+        if value is not None and not there:
+            raise ProblemError(f"{name} without {other}")
+
+
+def _played(typed: _Typed) -> _Played:
+    """Return what the board plays; a wrong preset is refused before anything else, where the array is known."""
+    with progress(quiet=True):
+        written = None if typed.scene is None else SceneFile.open(typed.scene)
+    board = written or SceneFile(Scene({}))
+    if typed.preset is not None:
+        board = replace(board, preset=typed.preset)
+    if typed.replay is None and not typed.pipe:
+        fitting(board.preset, board.array)
+    tare_ms = board.tare_ms if typed.tare is None else 1e3 * typed.tare
+    drawn_seed = secrets.randbelow(TRAINING_SEED) if written is None else written.seed
+    seed = drawn_seed if typed.seed is None else typed.seed
+    spoilt = _flaws(typed.flaw or [], seed), _faults(typed.fault or [], seed), _circuit(typed.circuit or [], seed)
+    if typed.replay is not None:
+        touch: Any = Replay(open_any(typed.replay), 1.0 if typed.speed is None else typed.speed)
+        text = f"{typed.replay} again"
+    elif typed.pipe:
+        touch, text = _piped(3 if typed.noise_floor is None else typed.noise_floor)
+    elif written is not None:
+        touch, text = _written(written, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}"
+    else:
+        touch, text = _scenes(seed, typed.scenes, tare_ms, typed.rest)
+    return _Played(seed, tare_ms, board, *spoilt, touch, text)
+
+
+def _emulated(typed: _Typed, played: _Played, console: Console) -> EmulatorReport:
+    """Run the board until its end or Ctrl-C, and show how far it is."""
+    host, port, line, wire = typed.host, typed.port, typed.line, typed.wire
+    version_2 = Version2(
+        typed.board, typed.session, *(round(1e3 * ms) for ms in (typed.hold, typed.heartbeat, typed.states))
+    )
+    console.print(f"{played.text}, to {host}:{port}", soft_wrap=True)
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(pulse_style="bar.complete"), TextColumn("{task.fields[said]}"),
-        TimeElapsedColumn(), console=console, transient=True, disable=as_json,
+        TimeElapsedColumn(), console=console, transient=True, disable=typed.as_json,
     )  # fmt: skip
     last: list[EmulatorReport] = []
-    with bar, _Diary(labels, overwrite) as diary:
+    with bar, _Diary(typed.labels, typed.overwrite) as diary:
         task = bar.add_task("playing", total=None, said="")
 
         def begun(address: str | None) -> None:
@@ -155,26 +227,26 @@ def emulate(
             last[:] = [
                 run(
                     f"[{host}]:{port}" if ":" in host else f"{host}:{port}",
-                    touch,
-                    seed=seed,
-                    preset=said_by.preset,
-                    tare_ms=1e3 * tare,
-                    array=said_by.array,
-                    sensor=said_by.sensor,
-                    wire=(2 if asynchronous else None) if wire is None else 2 if wire == 2 else 1,
-                    version_2=Version2(board, session, round(1e3 * hold), round(1e3 * heartbeat), round(1e3 * states)),
-                    circuit=lines,
-                    asynchronous=asynchronous,
-                    flaws=flaws,
-                    faults=faults,
-                    reset_every_s=reset_every,
-                    drift_ppm=drift,
-                    control=None if control is None else f"127.0.0.1:{control}",
+                    played.touch,
+                    seed=played.seed,
+                    preset=played.board.preset,
+                    tare_ms=played.tare_ms,
+                    array=played.board.array,
+                    sensor=played.board.sensor,
+                    wire=(2 if typed.asynchronous else None) if wire is None else 2 if wire == 2 else 1,
+                    version_2=version_2,
+                    circuit=played.circuit,
+                    asynchronous=typed.asynchronous,
+                    flaws=played.flaws,
+                    faults=played.faults,
+                    reset_every_s=typed.reset_every,
+                    drift_ppm=typed.drift,
+                    control=None if typed.control is None else f"127.0.0.1:{typed.control}",
                     line=line,
-                    baud=EmulateOptions.baud if baud is None else baud,
-                    sync=sync,
-                    overwrite=overwrite,
-                    source_port=source_port,
+                    baud=EmulateOptions.baud if typed.baud is None else typed.baud,
+                    sync=typed.sync,
+                    overwrite=typed.overwrite,
+                    source_port=typed.source_port,
                     begun=begun,
                     watch=watch,
                     touched=diary.take,
@@ -182,48 +254,10 @@ def emulate(
             ]
         except KeyboardInterrupt:
             # Where scenes repeat without end, Ctrl-C is the regular end; else it interrupts the command.
-            if not last or scenes is not None or replay is not None:
+            if not last or typed.scenes is not None or typed.replay is not None:
                 raise
-        report = last[0]
-        diary.write(report)
-    if labels is not None:
-        console.print(f"truth: {labels}", soft_wrap=True)
-    if as_json:
-        summary: dict[str, Any] = {"seed": seed, "scenes": scenes, "preset": said_by.preset, "held": report.held}
-        summary |= {"verdict": report.verdict, "wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
-        typer.echo(json.dumps({**summary, **asdict(report)}))
-    else:
-        _say(report, in_time=not pipe)
-
-
-def _with(file: SceneFile, preset: str | None, *, known: bool) -> SceneFile:
-    """Return what the board plays by; a wrong preset is said before anything else, where the array is known."""
-    chosen = file if preset is None else replace(file, preset=preset)
-    if known:
-        fitting(chosen.preset, chosen.array)
-    return chosen
-
-
-def _together(*, scene: Path | None, replay: Path | None, pipe: bool, rest: bool, counted: bool) -> None:
-    """Refuse options that do not go together; `counted`: a number of scenes, or their truth, was asked for."""
-    if replay is not None and pipe:
-        raise ProblemError("--replay and --pipe: give one of them")
-    if scene is not None and (replay is not None or pipe or rest):
-        raise ProblemError("--scene: leave out --replay, --pipe and --rest")
-    if (replay is not None or pipe) and (counted or rest):
-        raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
-
-
-def _only_with(*options: tuple[str, object, str, object]) -> None:
-    """Refuse an option that is given without the one that it says something of."""
-    for name, value, other, there in options:
-        if value is not None and there is None:
-            raise ProblemError(f"{name} without {other}")
-
-
-def _again(replay: Path, speed: float) -> tuple[Any, str]:
-    """Return a recording to play, and what that is."""
-    return Replay(open_any(replay), speed), f"{replay} again"
+        diary.write(last[0])
+    return last[0]
 
 
 def _piped(noise_floor: int) -> tuple[Any, str]:

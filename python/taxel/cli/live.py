@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,7 +17,7 @@ from rich.text import Text
 
 from taxel._base.files import try_whole
 from taxel._core import ProblemError
-from taxel.cli._app import SecondsOption, app
+from taxel.cli._app import SecondsOption, app, with_typed
 from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
@@ -44,6 +45,7 @@ from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_v
 from taxel.detect import Readout
 from taxel.detections import Detection
 from taxel.device import Cable
+from taxel.encode import Encoder
 from taxel.live import Live, Panel, Summary, Viewer, delays
 from taxel.live.options import LiveOptions
 from taxel.spikes import to_ms
@@ -52,55 +54,61 @@ from taxel.tare import Tare
 __all__ = ["live"]
 
 
-@app.command()
-def live(
-    readout: ReadoutOption = None,
-    port: PortOption = LiveOptions.port,
-    host: HostOption = LiveOptions.host,
+@dataclass(frozen=True)
+class _Typed:
+    """Hold what is typed."""
+
+    readout: ReadoutOption = None
+    port: PortOption = LiveOptions.port
+    host: HostOption = LiveOptions.host
     array: Annotated[
         str | None,
         typer.Option(
             metavar="ROWSxCOLUMNS[xMM]",
             help="Rows, columns and pitch of the sensor, as 24x20x5. Default: the readout's.",
         ),
-    ] = None,
-    preset: PresetOption = None,
-    differences: DifferencesOption = LiveOptions.differences,
-    address: FromOption = None,
-    congestion: CongestionOption = None,
-    tare: TareOption = None,
+    ] = None
+    preset: PresetOption = None
+    differences: DifferencesOption = LiveOptions.differences
+    address: FromOption = None
+    congestion: CongestionOption = None
+    tare: TareOption = None
     control: Annotated[
         str | None,
         typer.Option(
             help="The board's serial line (/dev/ttyUSB0, host:port), for the panel's registers and for a noise floor "
             "of 0 while a tare is taken."
         ),
-    ] = None,
-    save_tare: Annotated[Path | None, typer.Option(help="Save the tare that was taken, in a new file (JSON).")] = None,
-    record: RecordOption = None,
-    seconds: SecondsOption = None,
-    guard_frames: GuardFramesOption = LiveOptions.guard_frames,
-    send: SendOption = None,
+    ] = None
+    save_tare: Annotated[Path | None, typer.Option(help="Save the tare that was taken, in a new file (JSON).")] = None
+    record: RecordOption = None
+    seconds: SecondsOption = None
+    guard_frames: GuardFramesOption = LiveOptions.guard_frames
+    send: SendOption = None
     report: Annotated[
         Path | None,
         typer.Option(
             help="With --record: write a report to this folder: potential, weights, errors, the worst events."
         ),
-    ] = None,
-    panel: Annotated[bool, typer.Option("--panel", help="Show the board in a browser.")] = False,
-    panel_host: PanelHostOption = "127.0.0.1",
-    panel_port: PanelPortOption = 0,
+    ] = None
+    panel: Annotated[bool, typer.Option("--panel", help="Show the board in a browser.")] = False
+    panel_host: PanelHostOption = "127.0.0.1"
+    panel_port: PanelPortOption = 0
     folder: Annotated[
         Path | None, typer.Option(help="With --panel: the folder of the recordings. Default: this folder.")
-    ] = None,
-    opens: OpenOption = False,
-    to: ToOption = None,
-    encoder: SpikesOption = None,
-    values: SpikesSetOption = None,
+    ] = None
+    opens: OpenOption = False
+    to: ToOption = None
+    encoder: SpikesOption = None
+    values: SpikesSetOption = None
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one line of JSON for each detection, and nothing else.")
-    ] = False,
-) -> None:
+    ] = False
+
+
+@app.command()
+@with_typed(_Typed)
+def live(typed: _Typed) -> None:
     """Receive a board's events and print what a readout detects, live; with --panel or --to, show them.
 
     Prints one line for each detection, and shows rates, losses and latency. With --json each detection is one line of
@@ -116,75 +124,89 @@ def live(
     Example: taxel live --to rerun --to foxglove --encoder fa1
     Example: taxel live --from zenoh:192.168.1.5:7447/left --panel
     """
-    spikes = spikes_of(to, encoder, values)
-    _together(
-        readout, panel=panel, viewers=bool(to), of_a_readout=bool(tare or report or send), of_a_panel=folder is not None
-    )
-    trained = None if readout is None else Readout.load(readout)
-    rest = rest_of(tare)
-    _fresh(rest, save_tare, None if panel else control)
-    if report is not None:
-        if record is None or record.suffix != ".mcap":
+    spikes = spikes_of(typed.to, typed.encoder, typed.values)
+    _together(typed)
+    trained = None if typed.readout is None else Readout.load(typed.readout)
+    rest = rest_of(typed.tare)
+    _fresh(typed, rest)
+    if typed.report is not None:
+        if typed.record is None or typed.record.suffix != ".mcap":
             raise ProblemError("--report is made from the recording: give --record FILE.mcap")
-        try_whole(new_report(report))
-    console = Console(stderr=True, quiet=as_json)
+        try_whole(new_report(typed.report))
+    console = Console(stderr=True, quiet=typed.as_json)
     with contextlib.ExitStack() as at_rest:
-        if control is not None and isinstance(rest, float):
-            at_rest.enter_context(at_rest.enter_context(Cable(control)).floor(0))
-        far = at_rest.enter_context(remote(address, congestion, keeps=record is not None or trained is not None))
+        if typed.control is not None and isinstance(rest, float):
+            at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
+        keeps = typed.record is not None or trained is not None
+        far = at_rest.enter_context(remote(typed.address, typed.congestion, keeps=keeps))
         with Live(
-            port,
-            host=host,
+            typed.port,
+            host=typed.host,
             remote=far,
-            array=None if array is None else geometry(array),
-            registers=preset,
-            differences=differences,
+            array=None if typed.array is None else geometry(typed.array),
+            registers=typed.preset,
+            differences=typed.differences,
             readout=trained,
             tare=rest,
-            record=record,
-            guard_frames=guard_frames,
-            lines=as_json,
-            send=send or (),
+            record=typed.record,
+            guard_frames=typed.guard_frames,
+            lines=typed.as_json,
+            send=typed.send or (),
         ) as pipeline:
-            # A program that stops reading the lines ends it as Ctrl-C does.
-            shows: Panel | None = None
-            looks: list[Viewer] = []
-            with contextlib.ExitStack() as shown, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
-                if panel:
-                    if isinstance(rest, float):
-                        # A serial line has one user at a time: the tare first.
-                        _tared(pipeline, at_rest, console)
-                    shows = shown.enter_context(
-                        Panel(pipeline, control=control, folder=folder, host=panel_host, port=panel_port)
-                    )
-                    announce(shows, opens, console)
-                fresh = isinstance(rest, float) and not panel
-                if spikes is not None and isinstance(rest, Tare):
-                    spikes = spikes.with_tare(rest)
-                looks = viewers(shown, pipeline if shows is None else shows, to or (), spikes)
-                _watch(pipeline, shows, looks, seconds, console, at_rest, fresh=fresh)
-            last = pipeline if shows is None or shows.live is None else shows.live
+            if spikes is not None and isinstance(rest, Tare):
+                spikes = spikes.with_tare(rest)
+            last, looks = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
-            taken = summary.tare
             # Detections that were made while it was ending.
             _drain(last, console, typer.echo)
-    if save_tare is not None and taken is not None:
-        taken.save(save_tare)
-        console.print(f"tare written to {save_tare}")
-    if report is not None and trained is not None and summary.path is not None:
-        _report(report, trained, summary.path, taken if taken is not None else rest)
-        console.print(f"report: {report / 'report.html'}", soft_wrap=True)
+    taken = summary.tare
+    if typed.save_tare is not None and taken is not None:
+        taken.save(typed.save_tare)
+        console.print(f"tare written to {typed.save_tare}")
+    if typed.report is not None and trained is not None and summary.path is not None:
+        _report(typed.report, trained, summary.path, taken if taken is not None else rest)
+        console.print(f"report: {typed.report / 'report.html'}", soft_wrap=True)
     _unsent(summary)
-    report_viewers(looks, quiet=as_json)
-    if not as_json:
-        _say(summary, guard_frames)
+    report_viewers(looks, quiet=typed.as_json)
+    if not typed.as_json:
+        _say(summary, typed.guard_frames)
     elif summary.nothing_came or summary.lost:
         typer.echo(f"taxel: {summary.verdict}", err=True)
-    if save_tare is not None and taken is None and not summary.nothing_came:
+    if typed.save_tare is not None and taken is None and not summary.nothing_came:
+        seconds = summary.counters["seconds"]
         raise ProblemError(
-            f"--tare {tare}: not complete after {summary.counters['seconds']:.1f} s; {save_tare} was not written"
+            f"--tare {typed.tare}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
         )
     raise typer.Exit(exit_code(summary, pipeline.array))
+
+
+def _shown(
+    typed: _Typed,
+    pipeline: Live,
+    spikes: Encoder | None,
+    console: Console,
+    at_rest: contextlib.ExitStack,
+    *,
+    fresh: bool,
+) -> tuple[Live, list[Viewer]]:
+    """Show what comes in terminal, panel and viewers until the end; return what receives then, and the viewers."""
+    shows: Panel | None = None
+    looks: list[Viewer] = []
+    # A program that stops reading the lines ends it as Ctrl-C does.
+    with contextlib.ExitStack() as shown, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
+        if typed.panel:
+            if fresh:
+                # A serial line has one user at a time: the tare first.
+                _tared(pipeline, at_rest, console)
+            shows = shown.enter_context(
+                Panel(
+                    pipeline, control=typed.control, folder=typed.folder, host=typed.panel_host, port=typed.panel_port
+                )
+            )
+            announce(shows, typed.opens, console)
+        looks = viewers(shown, pipeline if shows is None else shows, typed.to or (), spikes)
+        _watch(pipeline, shows, looks, typed.seconds, console, at_rest, fresh=fresh and not typed.panel)
+    return pipeline if shows is None or shows.live is None else shows.live, looks
 
 
 def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | None) -> None:
@@ -228,24 +250,24 @@ def _unsent(summary: Summary) -> None:
             )
 
 
-def _together(readout: Path | None, *, panel: bool, viewers: bool, of_a_readout: bool, of_a_panel: bool) -> None:
+def _together(typed: _Typed) -> None:
     """Refuse options that nothing would use."""
-    if readout is None and not panel and not viewers:
+    if typed.readout is None and not typed.panel and not typed.to:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel or --to VIEWER to look")
-    if readout is None and of_a_readout:
+    if typed.readout is None and (typed.tare or typed.report or typed.send):
         raise ProblemError("--tare, --report and --send belong to a readout: give --readout FILE")
-    if of_a_panel and not panel:
+    if typed.folder is not None and not typed.panel:
         raise ProblemError("--folder belongs to the panel: give --panel")
 
 
-def _fresh(rest: Tare | float | None, save_tare: Path | None, control: str | None) -> None:
+def _fresh(typed: _Typed, rest: Tare | float | None) -> None:
     """Refuse what only a fresh tare could use."""
     if isinstance(rest, float):
-        if save_tare is not None:
-            try_whole(save_tare)
-    elif save_tare is not None:
+        if typed.save_tare is not None:
+            try_whole(typed.save_tare)
+    elif typed.save_tare is not None:
         raise ProblemError("--save-tare without a fresh tare: give --tare SECONDS")
-    elif control is not None:
+    elif typed.control is not None and not typed.panel:
         raise ProblemError("--control without a fresh tare: give --tare SECONDS, or --panel")
 
 

@@ -1,1 +1,1 @@
-"""The main job, shown: scenes on the emulated board, recorded, detected and judged."""
+"""The demo: scenes on the emulated board, recorded, detected and scored."""

@@ -31,7 +31,7 @@ class Evaluation:
     """From the start marker on."""
     area: SpikeTrains
     """Contact area of these events."""
-    found: Detections
+    detections: Detections
     plain: Detections
     contacts: list[Contact]
     force_n: NDArray[np.float32]
@@ -51,7 +51,7 @@ class Evaluation:
 
     def crossings(self, label: str) -> NDArray[np.float64]:
         """Return when a neuron's potential crossed its threshold, ms."""
-        return to_ms(self.found[label].t) + self.readout.neurons[label].delay_ms
+        return to_ms(self.detections[label].t) + self.readout.neurons[label].delay_ms
 
     def potential(self, label: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a neuron's potential at `times` (ms), mV."""
@@ -80,15 +80,15 @@ def evaluate_acts(
 
 
 def evaluate_events(
-    events: Events, acts: Sequence[Act], readout: Readout, found: Detections | None = None
+    events: Events, acts: Sequence[Act], readout: Readout, detections: Detections | None = None
 ) -> Evaluation:
-    """Run the readout on events, those of the tare among them; or judge the detections `found` live."""
+    """Run the readout on events, those of the tare among them; or judge detections that were reported live."""
     start = events.markers[0][0]
     tare = Tare.take(events, stop_us=start)
-    if found is None:
-        found = run(readout, events, frame_us=FRAME_US, tare=tare)
+    if detections is None:
+        detections = run(readout, events, frame_us=FRAME_US, tare=tare)
     # Before the start marker the board sends the rest of every taxel, which is no touch.
-    found = found[found.t >= start]
+    detections = detections[detections.t >= start]
     area = ContactArea(tare=tare).encode(events)
     area = area.between(to_ms(start), area.stop)
     contacts, force = truth(acts)
@@ -98,10 +98,10 @@ def evaluate_events(
         tare=tare,
         events=events.between(start, np.inf),
         area=area,
-        found=found,
+        detections=detections,
         plain=plain,
         contacts=contacts,
         force_n=force,
-        judged=judge(found, contacts),
+        judged=judge(detections, contacts),
         judged_plain=judge(plain, contacts),
     )

@@ -38,7 +38,7 @@ GOALS = {"contact": 1.0, "lift": 1.5}
 
 
 class Row(NamedTuple):
-    """How the touches of one class were found, by one label."""
+    """Touches of one class, and how the detections of one label match them."""
 
     name: str
     label: str
@@ -52,7 +52,7 @@ class Row(NamedTuple):
 
     @property
     def found(self) -> int:
-        """How many were found."""
+        """How many touches were detected."""
         return len(self.errors_ms)
 
     def to_dict(self) -> dict[str, Any]:
@@ -101,7 +101,7 @@ class Judged(NamedTuple):
         }
 
 
-def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
+def judge(detections: Detections, contacts: Sequence[Contact]) -> Judged:
     """Match detections with touches in order: impacts within 10 ms, presses and all others within 50.
 
     Parameters
@@ -120,7 +120,7 @@ def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
     within: dict[str, int] = {}
     for label, begin in (("contact", True), ("lift", False)):
         true = np.array([c.start_us if begin else c.stop_us for c in contacts], np.float64)
-        mine = found[label]
+        mine = detections[label]
         # Scored on whole us; errors are taken from the truth itself.
         result = score(mine, {label: np.rint(true).astype(np.int64)}, {label: windows})
         mine_at, touch = result.pairs[:, 0], result.pairs[:, 1]
@@ -136,7 +136,7 @@ def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
 
 
 def plain_rule(area: SpikeTrains, frame_us: float) -> Detections:
-    """Say contact when two taxels are loaded, lift when fewer are: no neuron.
+    """Detect contact where two taxels are loaded, and lift where fewer are: the plain rule, without a neuron.
 
     Parameters
     ----------

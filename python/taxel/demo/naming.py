@@ -28,19 +28,28 @@ from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["ANSWERED_MS", "QUESTIONS", "Drops", "Question", "board_of_drops", "named", "shipped_drops", "write_drops"]
+__all__ = [
+    "ANSWERED_MS",
+    "QUESTIONS",
+    "Drops",
+    "Question",
+    "board_of_drops",
+    "estimates",
+    "shipped_drops",
+    "write_drops",
+]
 
-#: How long after the contact an answer is asked for, ms.
+#: Times after the contact for which an answer is computed, ms.
 ANSWERED_MS = (1, 2, 5, 10)
-#: When the picture is looked at for it, ms: an answer rests on those up to its time.
+#: Times of the pictures, ms: an answer depends on those up to its own time.
 LOOKED_MS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 #: What a loaded taxel reads above rest, ticks: the board's noise floor and half a tick.
 _ABOVE = 3.5
 #: Boards of the shipped set, and drops on each; their seeds are the demo's training's own, far behind the readout's.
 _BOARDS, _DROPS, _FIRST_SEED = 30, 20, TRAINING_SEED + 500_000
-#: How long a ball is looked at after its fall, ms; then a hand lifts it so fast, mm/s.
+#: How long a ball is recorded after its fall, ms, and how fast a hand then lifts it, mm/s.
 _AFTER_FALL_MS, _LIFT_MM_S = 30.0, 500.0
-#: Of the discriminants: pictures that follow each other say nearly the same.
+#: Ridge of the discriminants: consecutive pictures are nearly equal.
 _RIDGE = 0.01
 
 
@@ -68,7 +77,7 @@ QUESTIONS = {
 }
 #: Of a picture: loaded taxels, their sum, the largest, and how far along the rows their middle has moved.
 _NUMBERS = 4
-#: That is kept in hundredths of a taxel.
+#: The move is stored in hundredths of a taxel.
 _MOVED = 100
 
 
@@ -113,7 +122,7 @@ def look(events: Events, tare: Tare, begin_us: float) -> NDArray[np.int64]:
     """Return what the host's picture holds at each time of `LOOKED_MS` after the first rise, shape (times, 4)."""
     assert events.intensity is not None  # the board sends them
     index = events.array.index(events.x, events.y)
-    rest, found = tare.rest.ravel(), np.zeros((len(LOOKED_MS), _NUMBERS), np.int64)
+    rest, features = tare.rest.ravel(), np.zeros((len(LOOKED_MS), _NUMBERS), np.int64)
     x = np.arange(len(rest)) % events.array.columns
     first = middle = None
     begin = int(np.searchsorted(events.t, begin_us - FRAME_US))
@@ -128,8 +137,8 @@ def look(events: Events, tare: Tare, begin_us: float) -> NDArray[np.int64]:
             first = middle if first is None else first
         moved = 0.0 if first is None or middle is None else middle - first
         above = above[loaded]
-        found[k] = len(above), round(float(above.sum())), round(float(above.max(initial=0.0))), round(_MOVED * moved)
-    return found
+        features[k] = len(above), round(float(above.sum())), round(float(above.max(initial=0.0))), round(_MOVED * moved)
+    return features
 
 
 def _truth(scene: Scene) -> tuple[float, float, float]:
@@ -194,7 +203,7 @@ def shipped_drops() -> Drops:
     return Drops(table[:, 0], table[:, 1], table[:, 2], pictures)
 
 
-def named(evaluation: Evaluation, scenes: Sequence[Scene]) -> dict[str, Any]:
+def estimates(evaluation: Evaluation, scenes: Sequence[Scene]) -> dict[str, Any]:
     """Estimate which ball fell first in each scene, from how high on which slant, by time since the first event.
 
     Parameters
@@ -240,8 +249,8 @@ def named(evaluation: Evaluation, scenes: Sequence[Scene]) -> dict[str, Any]:
 
 def _chance(known: Drops) -> dict[str, float]:
     """Return how often the answer that the set has most of would be right, by question."""
-    found = {}
+    shares = {}
     for name, question in QUESTIONS.items():
         right = [question.of(value) for value in getattr(known, question.column)]
-        found[name] = float(np.bincount(right).max() / len(right))
-    return found
+        shares[name] = float(np.bincount(right).max() / len(right))
+    return shares

@@ -24,7 +24,7 @@ __all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates
 #: How many taxels of a side a map shows.
 _CROP = 28
 
-#: Truth, contact, lift, quiet.
+#: Colours of truth, contact, lift, and what is less important.
 _TRUE, _COLOURS, _QUIET = "#e8b04b", {"contact": "#b5423c", "lift": "#2f6690"}, "#8a8a8a"
 
 
@@ -53,9 +53,9 @@ def scene_picture(evaluation: Evaluation, start_us: float, stop_us: float) -> Fi
         threshold = evaluation.readout.neurons[label].neuron.theta_0 * evaluation.readout.run_threshold
         axis.plot(times * 1e-3, evaluation.potential(label, times), color=colour, linewidth=0.9, label="potential")
         axis.axhline(threshold, color=_QUIET, linewidth=0.8, linestyle="--", label="its threshold")
-        found = evaluation.found[label].between(start_us, stop_us)
+        detections = evaluation.detections[label].between(start_us, stop_us)
         for place in (axis, top):
-            for k, at in enumerate(found.known):
+            for k, at in enumerate(detections.known):
                 name = f"{label} detected" * (k == 0)
                 place.axvline(at * 1e-6, color=colour, linewidth=0.9, alpha=0.9, label=name)
         axis.set(ylabel="potential (mV)", title=f"Potential of the neuron for {label}")
@@ -91,7 +91,7 @@ def close_up(evaluation: Evaluation, contact: Contact, reach_us: float = 5_000.0
         area.set_ylabel("taxels loaded")
         for axis in (force, raster, area):
             axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0, label="true moment")
-            for k, known in enumerate(evaluation.found[label].between(begin, end).known):
+            for k, known in enumerate(evaluation.detections[label].between(begin, end).known):
                 name = f"{label} known" * (k == 0)
                 axis.axvline(to_ms(known - at), color=_COLOURS[label], linewidth=1.0, label=name)
             axis.legend()
@@ -160,7 +160,7 @@ def _bits(value: float) -> str:
 
 
 def delays_by_class(judged: Judged, plain: Judged) -> Figure:
-    """Draw when it was known, touch by touch, by class; neuron above, plain rule below."""
+    """Draw the delay of each touch's detection by class; neuron above, plain rule below."""
     figure, axes = _figure(1, 2, (9.5, 3.6), sharey=True)
     names = [row.name for row in judged.rows if row.label == "contact" and row.touches]
     jitter = np.random.default_rng(1)
@@ -187,17 +187,17 @@ def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
     figure, axes = _figure(1, 1, (9.5, 0.9 + 0.34 * max(1, len(parts))))
     axis = axes[0, 0]
     colours = {"physics": _TRUE, "kernel": "#b5423c", "frame": "#2f6690", "host": "#4b8f4b"}
-    named: set[str] = set()
+    labelled: set[str] = set()
     for place, split in enumerate(parts.values()):
         left = 0.0
         for name, value in split.items():
             # A bar of no width would have the axis end where it stands, and clip the others.
             if value == 0.0:
                 continue
-            # Below 0, as where the base loses the ball before it leaves: thin, and over what starts there.
+            # A part below 0 (the base loses the ball before it leaves) is drawn thin, over the part that starts there.
             shape = {"height": 0.7} if value >= 0 else {"height": 0.25, "zorder": 3}
-            axis.barh(place, value, left=left, color=colours[name], label=None if name in named else name, **shape)
-            named.add(name)
+            axis.barh(place, value, left=left, color=colours[name], label=None if name in labelled else name, **shape)
+            labelled.add(name)
             left += value
     axis.set_yticks(range(len(parts)), list(parts))
     axis.invert_yaxis()
@@ -214,10 +214,10 @@ def noise(evaluation: Evaluation) -> Figure:
     each = np.histogram((evaluation.events.t - evaluation.start_us) * 1e-6, np.append(seconds, seconds[-1] + 1.0))[0]
     axis.bar(seconds + 0.5, each, width=0.9, color=_QUIET, label="events")
     for label in LABELS:
-        for k, at in enumerate(evaluation.found[label].t):
+        for k, at in enumerate(evaluation.detections[label].t):
             axis.axvline((at - evaluation.start_us) * 1e-6, color=_COLOURS[label], label=f"{label} detected" * (k == 0))
     axis.legend()
-    counts: Sequence[str] = [f"{len(evaluation.found[label])} times {label}" for label in LABELS]
+    counts: Sequence[str] = [f"{len(evaluation.detections[label])} times {label}" for label in LABELS]
     axis.set_xlim(0.0, seconds[-1] + 1.0)
     axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: detected {' and '.join(counts)}")
     return figure

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import taxel
+from taxel._base.messages import counted
 from taxel._core import DeviceError
 from taxel.demo.evaluation import Evaluation, evaluate_events
 from taxel.demo.script import script
@@ -26,20 +27,20 @@ __all__ = ["Playing", "Screen", "play_live"]
 #: How often the screen is drawn anew, s.
 _DRAW_EVERY_S = 0.1
 
-#: How long the host listens on after the board's process has ended, s.
+#: How long the host goes on receiving after the board's process has ended, s.
 _LISTEN_ON_S = 0.3
 
 
 class Screen(Protocol):
-    """What is drawn while it runs."""
+    """The display while the demo runs."""
 
-    def draw(self, counters: dict[str, Any], picture: Any, said: list[Detection]) -> None:
-        """Draw what came up to now."""
+    def draw(self, counters: dict[str, Any], picture: Any, detections: list[Detection]) -> None:
+        """Draw counters, picture and detections so far."""
 
 
 @dataclass(frozen=True)
 class Playing:
-    """A play in real time, and what was counted."""
+    """A run in real time, and its counters."""
 
     evaluation: Evaluation
     counters: dict[str, Any]
@@ -77,7 +78,7 @@ def play_live(
     contacts, force = truth(acts)
     shown = screen(contacts, len(force) * FRAME_US * 1e-6)
     recording = folder / "recording.mcap"
-    said: list[Detection] = []
+    detections: list[Detection] = []
     # The tare ends where the board marks its start, well before a second is over.
     with Live(0, host="127.0.0.1", readout=readout, tare=1.0, record=recording) as live:
         command = [sys.executable, "-m", "taxel", "emulate", "--json", "--port", str(live.address[1])]
@@ -89,12 +90,12 @@ def play_live(
             while ended is None or time.monotonic() < ended + _LISTEN_ON_S:
                 one = live.next(0.05)
                 if one is not None:
-                    said.append(one)
+                    detections.append(one)
                 if ended is None and board.poll() is not None:
                     ended = time.monotonic()
                 if time.monotonic() > drawn + _DRAW_EVERY_S:
                     drawn = time.monotonic()
-                    shown.draw(live.counters, live.picture, said)
+                    shown.draw(live.counters, live.picture, detections)
             printed, complaint = board.communicate()
         finally:
             if board.poll() is None:
@@ -103,24 +104,24 @@ def play_live(
         if board.returncode != 0:
             raise DeviceError(f"the board's process ended with code {board.returncode}: {complaint.strip()[-300:]}")
         while (one := live.next(0.0)) is not None:
-            said.append(one)
+            detections.append(one)
         tare = live.tare
         summary = live.stop()
     emulator = json.loads(printed)
-    found = heard(said)
+    reported = heard(detections)
     events = taxel.open(recording).events
     again = run(readout, events, frame_us=FRAME_US, tare=tare)
-    evaluation = evaluate_events(events, acts, readout, found)
+    evaluation = evaluate_events(events, acts, readout, reported)
     again = again[again.t >= evaluation.start_us]
-    mine = evaluation.found
+    mine = evaluation.detections
     agrees = len(again) == len(mine) and bool(
         (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
     )
     verdicts = [emulator["verdict"], summary.verdict]
     if summary.counters["late"]:
         verdicts.append(
-            f"{summary.counters['late']} events came after the readout's time had moved on, 5 frames behind the host's "
-            "clock: this machine was too busy, and detections of them came late, moved or were missed; the recording "
-            "has every event, and --no-clock simulates without the clock"
+            f"{counted(summary.counters['late'], 'event')} came after the readout's time had moved on, 5 frames behind "
+            "the host's clock: this machine was too busy, and detections of them came late, moved or were missed; the "
+            "recording has every event, and --no-clock simulates without the clock"
         )
     return Playing(evaluation, summary.counters, emulator, verdicts, recording, agrees)

@@ -19,7 +19,7 @@ import taxel
 from taxel.demo import pictures
 from taxel.demo.evaluation import Evaluation
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
-from taxel.demo.naming import ANSWERED_MS, QUESTIONS, named
+from taxel.demo.naming import ANSWERED_MS, QUESTIONS, estimates
 from taxel.demo.script import script
 from taxel.live import delays
 from taxel.report.charts import STYLE, chart
@@ -97,7 +97,7 @@ def figures(material: Material) -> dict[str, Any]:
         "neuron": evaluation.judged.to_dict(),
         "plain_rule": evaluation.judged_plain.to_dict(),
         "delay_split_ms": _split(evaluation),
-        "which_drop": named(evaluation, scenes),
+        "which_drop": estimates(evaluation, scenes),
         "events": len(every),
         "events_per_s": len(every) / seconds,
         "events_per_s_in_first_impacts": _quantiles(impacts),
@@ -110,7 +110,7 @@ def figures(material: Material) -> dict[str, Any]:
             "clock": "none",
             "seconds": noise_s,
             "events_per_s": len(material.noise.events) / noise_s,
-            "said": {label: len(material.noise.found[label]) for label in LABELS},
+            "said": {label: len(material.noise.detections[label]) for label in LABELS},
             "plain_rule_said": {label: len(material.noise.plain[label]) for label in LABELS},
         },
         "dashpot_ms": {f"{ms:g}": other.judged.to_dict() for ms, other in material.dashpots.items()},
@@ -162,7 +162,7 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
         dashpots=_dashpots({1.0: evaluation, **material.dashpots}),
         goals=GOALS,
         firsts={label: evaluation.judged.row("first", label).touches for label in LABELS},
-        detections=sum(len(evaluation.found[label]) for label in LABELS),
+        detections=sum(len(evaluation.detections[label]) for label in LABELS),
         rest_s=evaluation.start_us * 1e-6,
         within={label: _share(evaluation.judged.within_goal(label)) for label in LABELS},
         guesses=GUESSES,
@@ -202,7 +202,7 @@ def _split(evaluation: Evaluation) -> dict[str, dict[str, float]]:
     for row in evaluation.judged.rows:
         if row.name not in ("first impact", "bounce, 0.4 m/s and more") or not row.found:
             continue
-        mine = evaluation.found[row.label]
+        mine = evaluation.detections[row.label]
         delay = evaluation.readout.neurons[row.label].delay_ms
         parts = []
         for touch, place in row.places:
@@ -265,10 +265,10 @@ def _line(row: Row) -> dict[str, str]:
     }
 
 
-def _which_drop(found: Mapping[str, Any]) -> dict[str, Any]:
+def _which_drop(estimates: Mapping[str, Any]) -> dict[str, Any]:
     """Return a line a drop and question: the truth, and the most probable answer after each time."""
     lines = []
-    for n, drop in enumerate(found["drops"]):
+    for n, drop in enumerate(estimates["drops"]):
         for name, question in QUESTIONS.items():
             answers = [
                 {
@@ -281,9 +281,9 @@ def _which_drop(found: Mapping[str, Any]) -> dict[str, Any]:
             lines.append(
                 {"drop": n + 1, "of": name, "true": f"{drop['true'][name]:.0f} {question.unit}", "said": answers}
             )
-    count = len(found["drops"])
-    right = {name: [f"{k} of {count}" for k in counts] for name, counts in found["right"].items()}
-    return {"lines": lines, "right": right, "chance": {name: _share(v) for name, v in found["chance"].items()}}
+    count = len(estimates["drops"])
+    right = {name: [f"{k} of {count}" for k in counts] for name, counts in estimates["right"].items()}
+    return {"lines": lines, "right": right, "chance": {name: _share(v) for name, v in estimates["chance"].items()}}
 
 
 def _dashpots(by_ms: Mapping[float, Evaluation]) -> list[dict[str, str]]:
@@ -318,7 +318,7 @@ def _quantiles(values: list[float]) -> dict[str, float] | None:
 
 
 def _machine() -> dict[str, Any]:
-    """Return what a figure of time hangs on."""
+    """Return the machine and the versions on which measured times depend."""
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():

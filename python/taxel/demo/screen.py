@@ -41,8 +41,8 @@ class Screen:
         self._before: tuple[float, int] = (0.0, 0)
         self._rate = 0.0
 
-    def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], said: list[Detection]) -> None:
-        """Draw what came up to now."""
+    def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], detections: list[Detection]) -> None:
+        """Draw counters, picture and detections so far."""
         now = (counters["board_us"] or 0) * 1e-6
         then, events = self._before
         if now > then:
@@ -59,30 +59,30 @@ class Screen:
             ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
             ("arrived to decoded", delays(counters["decode_latency"])),
             ("known to detected", delays(counters["said_latency"])),
-            *((label, str(sum(one.label == label for one in said))) for label in LABELS),
+            *((label, str(sum(one.label == label for one in detections))) for label in LABELS),
         ):
             rows.add_row(Text(name, style="dim"), value)
         state = "taring" if counters["taring"] else f"{min(now, self._seconds):5.1f} of {self._seconds:.1f} s"
         width, height = self._drawing.console.size
         if width < _PICTURE_WIDTH + _LEAST_WIDTH or height < _PICTURE_HEIGHT + _LEAST_HEIGHT:
             # No room for the picture: counters and detections alone.
-            pictured, taken = [], len(rows.rows) + 2
+            pictured, panel_height = [], len(rows.rows) + 2
         else:
-            pictured, taken = [Panel(_blocks(picture), title="pressure", width=_PICTURE_WIDTH)], _PICTURE_HEIGHT
+            pictured, panel_height = [Panel(_blocks(picture), title="pressure", width=_PICTURE_WIDTH)], _PICTURE_HEIGHT
         above = Table.grid()
-        above.add_row(*pictured, Panel(rows, title=state, height=taken))
+        above.add_row(*pictured, Panel(rows, title=state, height=panel_height))
         self._drawing.update(
             Group(
                 above,
                 ProgressBar(total=self._seconds, completed=min(now, self._seconds), width=min(80, width)),
-                *self._newest(said, width, height - taken - 2),
+                *self._newest(detections, width, height - panel_height - 2),
             )
         )
 
-    def _newest(self, said: list[Detection], width: int, rows: int) -> list[Text]:
+    def _newest(self, detections: list[Detection], width: int, rows: int) -> list[Text]:
         """Return the last lines that find room, the newest last; a long one takes more than one row."""
         lines: list[Text] = []
-        for one in reversed(said):
+        for one in reversed(detections):
             line = self._line(one)
             rows -= -(-line.cell_len // width)
             if rows < 0 and lines:
@@ -90,14 +90,14 @@ class Screen:
             lines.insert(0, line)
         return lines
 
-    def _line(self, said: Detection) -> Text:
-        true = self._true[said.label]
-        colour = "red" if said.label == "contact" else "blue"
-        line = Text(f"{said.t * 1e-6:8.3f} s  ").append(f"{said.label:<8}", style=f"bold {colour}")
+    def _line(self, detection: Detection) -> Text:
+        true = self._true[detection.label]
+        colour = "red" if detection.label == "contact" else "blue"
+        line = Text(f"{detection.t * 1e-6:8.3f} s  ").append(f"{detection.label:<8}", style=f"bold {colour}")
         if len(true):
-            nearest = int(np.abs(true - said.t).argmin())
-            line.append(f"{self._kinds[nearest]:<7} known {to_ms(said.known - true[nearest]):+6.2f} ms, ")
-            line.append(f"out {to_ms(said.said - true[nearest]):+6.2f} ms after the truth", style="dim")
+            nearest = int(np.abs(true - detection.t).argmin())
+            line.append(f"{self._kinds[nearest]:<7} known {to_ms(detection.known - true[nearest]):+6.2f} ms, ")
+            line.append(f"out {to_ms(detection.said - true[nearest]):+6.2f} ms after the truth", style="dim")
         return line
 
 
@@ -114,6 +114,6 @@ def _blocks(picture: NDArray[np.uint16]) -> Text:
 
 
 def _colour(share: float) -> str:
-    """Return night over red and yellow to white."""
+    """Return the colours of a picture: from dark blue through red and yellow to white."""
     red, green, blue = (int(255 * min(1.0, max(0.0, 2.6 * share - k))) for k in (0.0, 0.8, 1.6))
     return f"#{max(red, 18):02x}{max(green, 16):02x}{max(blue, 26):02x}"

@@ -1,4 +1,4 @@
-"""What the demo plays."""
+"""The acts that the demo plays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taxel.simulate import Act, Scene, Silence
 
 __all__ = ["SLANTS_DEG", "TRAINING_SEED", "Draw", "drawn", "endless", "fall_ms", "left_to_rest", "script"]
 
-#: Which scene a seed and an index stand for.
+#: Function that draws the scene of a seed and an index.
 Draw = Callable[[int, int], Scene]
 
 #: Silence between the tare and the first scene, ms.
@@ -69,10 +69,10 @@ def script(
     draw : function of seed and index
         Gives each scene.
     """
-    found = [draw(seed, index) for index in range(scenes)]
+    drawn_scenes = [draw(seed, index) for index in range(scenes)]
     if dashpot_ms is not None:
-        found = [scene.replace(foam={"dashpot_ms": dashpot_ms}) for scene in found]
-    return [Silence(tare_ms + _LEAD_MS), *found, Silence(100.0)]
+        drawn_scenes = [scene.replace(foam={"dashpot_ms": dashpot_ms}) for scene in drawn_scenes]
+    return [Silence(tare_ms + _LEAD_MS), *drawn_scenes, Silence(100.0)]
 
 
 def endless(seed: int, *, tare_ms: float = 50.0, draw: Draw = drawn) -> Iterator[Act]:

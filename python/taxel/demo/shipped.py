@@ -65,7 +65,7 @@ def examples(
     list of Example
         One a board: the spikes of the recipe's encoder, from the start marker on (what lies before is the tare's).
     """
-    found = []
+    labelled = []
     for n in range(2 * boards):
         progress(f"playing training scenes, board {n + 1} of {2 * boards}")
         seed = TRAINING_SEED + 1000 * draw + n
@@ -74,8 +74,8 @@ def examples(
         start = events.markers[0][0]
         area = ContactArea(tare=Tare.take(events, stop_us=start)).encode(events)
         area = area.between(to_ms(start), area.stop)
-        found.append(Example(area, _labels(area, truth(acts)[0])))
-    return found
+        labelled.append(Example(area, _labels(area, truth(acts)[0])))
+    return labelled
 
 
 def _labels(area: SpikeTrains, contacts: list[Contact]) -> dict[str, NDArray[np.int64]]:

@@ -15,6 +15,7 @@ from rich.live import Live as Drawing
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.demo.evaluation import Evaluation, evaluate_acts
 from taxel.demo.footfalls import NOTE, footfalls
@@ -28,7 +29,7 @@ from taxel.simulate import Act, Silence
 
 __all__ = ["show"]
 
-#: Of the dashpot, whose 1 ms is a guess: what the delays are shown with as well, ms.
+#: Other time constants of the dashpot for which delays are shown as well, ms, as its 1 ms is a guess.
 _DASHPOTS = (0.3, 0.0)
 
 
@@ -77,13 +78,17 @@ def show(
         folder = Path(f"taxel-demo-{datetime.now().astimezone():%Y%m%d-%H%M%S}-{seed}")
     folder.mkdir(parents=True)
     began = time.monotonic()
-    console.print(f"[bold]taxel demo[/bold]: {scenes} scene(s) of seed [bold]{seed}[/bold]")
+    console.print(f"[bold]taxel demo[/bold]: {counted(scenes, 'scene')} of seed [bold]{seed}[/bold]")
     counters: dict[str, Any] = {}
     if not live:
-        evaluation = _evaluate(console, f"playing {scenes} scenes without the clock", script(seed, scenes), used, seed)
+        evaluation = _evaluate(
+            console, f"playing {counted(scenes, 'scene')} without the clock", script(seed, scenes), used, seed
+        )
     else:
         with Drawing(console=console, refresh_per_second=10, transient=True) as drawing:
-            playing = play_live(used, folder, seed=seed, scenes=scenes, screen=lambda *given: Screen(drawing, *given))
+            playing = play_live(
+                used, folder, seed=seed, scenes=scenes, screen=lambda *arguments: Screen(drawing, *arguments)
+            )
         evaluation = playing.evaluation
         counters = {
             "counters": playing.counters,
@@ -157,12 +162,14 @@ def _print_table(console: Console, evaluation: Evaluation, quiet: Evaluation) ->
     noise_s = (quiet.stop_us - quiet.start_us) * 1e-6
     within = sum(evaluation.judged.false_within.values())
     off = f" ({within} within a press, more than 50 ms off)" if within else ""
-    console.print(f"false detections: {false} in the scenes{off}, {len(quiet.found)} in {noise_s:.0f} s of noise")
+    console.print(f"false detections: {false} in the scenes{off}, {len(quiet.detections)} in {noise_s:.0f} s of noise")
 
 
-def _print_answers(console: Console, found: dict[str, Any]) -> None:
-    """Print how often ball, height and slant were named rightly, by time."""
-    count = len(found["drops"])
-    for name, right in found["right"].items():
-        by_time = ", ".join(f"{k} after {ms} ms" for k, ms in zip(right, found["answered_ms"], strict=True))
-        console.print(f"{name} named rightly, of {count} drops: {by_time} (by chance {found['chance'][name]:.0%})")
+def _print_answers(console: Console, estimates: dict[str, Any]) -> None:
+    """Print how often ball, height and slant were estimated correctly, by time."""
+    count = len(estimates["drops"])
+    for name, right in estimates["right"].items():
+        by_time = ", ".join(f"{k} after {ms} ms" for k, ms in zip(right, estimates["answered_ms"], strict=True))
+        console.print(
+            f"{name} estimated correctly, of {count} drops: {by_time} (by chance {estimates['chance'][name]:.0%})"
+        )

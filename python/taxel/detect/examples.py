@@ -1,4 +1,4 @@
-"""The labelled example: what a readout learns from and is judged on; and what came of one.
+"""The labelled example, on which a readout is trained and scored, and the outcome of one.
 
 Neighbours that differ: `taxel.formats.Trial` is a recording of a published data set, with its subject and condition;
 `taxel.information.LabelledTrial` a stretch of time with one label as a whole, which a classifier tells from others.
@@ -61,7 +61,7 @@ class Outcome(NamedTuple):
     name : str
         Of the recording, for reports.
     example : Example
-        Without labels where nobody knows what happened.
+        Without labels where the truth is not known.
     found : Detections
     score : Score, optional
         None of an example without labels.

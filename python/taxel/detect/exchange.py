@@ -8,7 +8,7 @@ where an input spike adds ``w_in / tau_syn`` to the current times the spike's ar
 - double exponential: ``CubaLIF`` with ``tau_syn = tau_s``;
 - exponential: ``LIF``.
 
-What NIR has no words for stands in the graph's metadata, so that taxel reads back the very same readout.
+What NIR cannot express stands in the graph's metadata, so that taxel reads back the very same readout.
 """
 
 from __future__ import annotations
@@ -80,23 +80,23 @@ def write_nir(readout: Parts, path: str | os.PathLike[str], *, spike_ms: float |
 
 
 def lost(readout: Parts) -> list[str]:
-    """Return what NIR's nodes cannot say of a readout, one line each."""
+    """Return what NIR's nodes cannot hold of a readout, one line each."""
     neurons = [one.neuron for one in readout.neurons.values()]
-    said = [
+    lines = [
         "the encoder: the graph's inputs are its spike trains",
         "labels and trained delays: outputs come in the order of the labels",
     ]
     if any(neuron.refractory > 0 for neuron in neurons):
-        said.append("the refractory time: a NIR neuron may fire again at once")
+        lines.append("the refractory time: a NIR neuron may fire again at once")
     if any(neuron.theta_plus > 0 for neuron in neurons):
-        said.append("the rise of the threshold by a spike")
-    said.append(
+        lines.append("the rise of the threshold by a spike")
+    lines.append(
         f'after_spike="{readout.after_spike}": a NIR neuron falls to 0 and keeps its current; first spikes agree, later'
         " ones need not"
     )
     if readout.time == "continuous":
-        said.append("continuous time: each simulator has a step of its own, and fires as late as that")
-    return said
+        lines.append("continuous time: each simulator has a step of its own, and fires as late as that")
+    return lines
 
 
 def read_nir(
@@ -108,7 +108,7 @@ def read_nir(
     neuron: Neuron | None,
     spike_ms: float | None,
 ) -> R:
-    """Read a readout from a file; what the nodes say wins over the metadata.
+    """Read a readout from a file; its nodes take precedence over the metadata.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def read_nir(
     open(place, "rb").close()  # a missing file is Python's own error
     try:
         graph = nir.read(place)
-    except Exception as error:  # whatever h5py and nir say of a foreign or broken file
+    except Exception as error:  # h5py and nir raise errors of many kinds for a foreign or broken file
         raise FormatError(f"{place}: no NIR graph that can be read: {shown(str(error))}") from None
     held = graph.metadata.get(READOUT)
     try:
@@ -165,7 +165,7 @@ def _gains(neuron: Neuron, spike_s: float | None) -> tuple[str, dict[str, float]
     """
     tau = neuron.tau / 1000.0
     area = 1.0 if spike_s is None else spike_s
-    # A simulator that steps adds 1 a step: it wants r = tau/step, and reads best what leaves inputs unscaled.
+    # A simulator with a fixed step adds 1 a step: with r = tau/step its inputs stay unscaled.
     r = tau if spike_s is None else tau / spike_s
     if neuron.kernel == "exponential":
         return "LIF", {"tau": tau, "r": r}, tau / (area * r)
@@ -242,7 +242,7 @@ def _parts(
     neuron: Neuron | None,
     spike_ms: float | None,
 ) -> Parts:
-    """Return a readout's parts from nodes; what they do not say comes from the caller, the metadata, or by default."""
+    """Return a readout's parts from nodes; the rest comes from the caller, the metadata, or by default."""
     encoder = encoder or (own.encoder if own is not None else None)
     if encoder is None:
         raise ProblemError("NIR holds no encoder: say which with encoder=")
@@ -255,12 +255,12 @@ def _parts(
     trained = {}
     for k, (label, template, row) in enumerate(zip(labels, templates, weights, strict=True)):
         rest = neuron or (template.neuron if template is not None else Neuron())
-        said, factor = _kernel(cells, k, spike_s)
-        said["theta_0"] = _threshold(cells, k)
+        constants, factor = _kernel(cells, k, spike_s)
+        constants["theta_0"] = _threshold(cells, k)
         if own is not None and neuron is None:
             # The nodes' threshold holds the factor already.
-            said["theta_plus"] = rest.theta_plus * own.run_threshold
-        one = Neuron(**{**rest.get_params(), **said})
+            constants["theta_plus"] = rest.theta_plus * own.run_threshold
+        one = Neuron(**{**rest.get_params(), **constants})
         trained[label] = TrainedNeuron(one, 1000.0 * row * factor, 0.0 if template is None else template.delay_ms)
     array = None if own is None else own.array
     return Parts(encoder, trained, array, delays_ms)
@@ -272,26 +272,26 @@ def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], 
     def value(name: str) -> float:
         return float(getattr(cells, name)[k])
 
-    said: dict[str, Any]
+    constants: dict[str, Any]
     if type(cells).__name__ == "LIF":
         # Such a potential only jumps, so taxel compares it on a grid.
-        tau, said = value("tau"), {"kernel": "exponential", "tau_s": None, "time": "grid"}
+        tau, constants = value("tau"), {"kernel": "exponential", "tau_s": None, "time": "grid"}
     else:
         tau, tau_syn = value("tau_mem"), value("tau_syn")
         if not (np.isfinite(tau_syn) and 0 < tau_syn <= tau):
             raise FormatError(
                 f"neurons[{k}]: tau_syn is {tau_syn} s: taxel's kernels need 0 < tau_syn <= tau_mem = {tau}"
             )
-        said = {"kernel": "double_exponential", "tau_s": 1000.0 * tau_syn}
+        constants = {"kernel": "double_exponential", "tau_s": 1000.0 * tau_syn}
         if abs(tau_syn - tau) <= 1e-9 * tau:
-            said = {"kernel": "alpha", "tau_s": None}
+            constants = {"kernel": "alpha", "tau_s": None}
     if not (np.isfinite(tau) and tau > 0):
         raise FormatError(f"neurons[{k}]: time constant {tau} s: must be above 0")
-    said["tau"] = 1000.0 * tau
-    _, ours, gain = _gains(Neuron(**said), spike_s)
-    # `gain` holds for our own r and w_in; theirs may be shared out otherwise.
+    constants["tau"] = 1000.0 * tau
+    _, ours, gain = _gains(Neuron(**constants), spike_s)
+    # `gain` is for taxel's own r and w_in; a graph may split their product otherwise.
     scale = value("r") / ours["r"] * (value("w_in") / ours["w_in"] if "w_in" in ours else 1.0)
-    return said, scale / gain
+    return constants, scale / gain
 
 
 def _threshold(cells: Any, k: int) -> float:
@@ -311,10 +311,10 @@ def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
     kinds = {name: type(node).__name__ for name, node in nodes.items()}
 
     def only(kind: str) -> str:
-        named = [name for name, k in kinds.items() if k == kind]
-        if len(named) != 1:
-            raise FormatError(f"{len(named)} nodes of kind {kind}: a readout has one")
-        return named[0]
+        matches = [name for name, k in kinds.items() if k == kind]
+        if len(matches) != 1:
+            raise FormatError(f"{len(matches)} nodes of kind {kind}: a readout has one")
+        return matches[0]
 
     def alone(name: str) -> str | None:
         return into[name][0] if len(into.get(name, [])) == 1 else None

@@ -97,7 +97,7 @@ class Trained(NamedTuple):
 
 @dataclass(frozen=True)
 class Judged:
-    """How readouts did on data that they were not trained on.
+    """Scores of readouts on data that they were not trained on.
 
     Attributes
     ----------
@@ -170,7 +170,7 @@ def judge(
     ways, how = _folds(examples, k)
     patterns = encoded(examples, instance("recipe", recipe, Recipe), report)
     array = array_of(examples)
-    found: dict[int, list[Detections]] = {}
+    detections: dict[int, list[Detections]] = {}
     trained = []
     for n, fold in enumerate(ways):
         report(f"fold {n + 1} of {len(ways)}")
@@ -182,11 +182,11 @@ def judge(
             learners = fit([_of(part, patterns) for part in fold.train], plan, report)
         trained.append(Trained(plan, learners, readout_of(learners, plan, array)))
         for part in fold.test:
-            found.setdefault(part.example, []).append(_found(trained[-1].readout, examples, part, frame_us))
-    heard = [reduce(add, found[place]) for place in sorted(found)]
+            detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, frame_us))
+    joined = [reduce(add, detections[place]) for place in sorted(detections)]
     truths = _truths(examples, ways, recipe._labels(examples))
-    scores = tuple(score(*both, window) for both in zip(heard, truths, strict=True))
-    return Judged(scores, score_together(heard, truths, window), how, tuple(trained))
+    scores = tuple(score(*both, window) for both in zip(joined, truths, strict=True))
+    return Judged(scores, score_together(joined, truths, window), how, tuple(trained))
 
 
 def choose(
@@ -277,9 +277,9 @@ def _marks(
     frame_us: float | None,
     report: Callable[[str], object],
 ) -> list[tuple[int, float]]:
-    """Return what each of several recipes for one label comes to over all folds: its `Score.rank`."""
+    """Return the `Score.rank` over all folds of each of several recipes for one label."""
     array = array_of(examples)
-    found: list[dict[int, list[Detections]]] = [{} for _ in plans]
+    detections: list[dict[int, list[Detections]]] = [{} for _ in plans]
     for n, fold in enumerate(folds):
         training = [_of(part, patterns) for part in fold.train]
         rows: Fitting | None = None
@@ -290,20 +290,20 @@ def _marks(
             with _quiet():
                 readout = readout_of({label: rows.fit(plan)}, plan, array)
             for part in fold.test:
-                found[m].setdefault(part.example, []).append(_found(readout, examples, part, frame_us))
+                detections[m].setdefault(part.example, []).append(_detected(readout, examples, part, frame_us))
     truths = _truths(examples, folds, (label,))
-    return [score_together([reduce(add, of[place]) for place in sorted(of)], truths, window).rank for of in found]
+    return [score_together([reduce(add, of[place]) for place in sorted(of)], truths, window).rank for of in detections]
 
 
 def _quiet() -> Any:
-    """Return a context without warnings of readouts that are not kept: their scores show what they miss."""
+    """Return a context without warnings of readouts that are only scored: their scores show what they miss."""
     return warnings.catch_warnings(action="ignore", category=UserWarning)
 
 
-def _found(readout: Readout, examples: Sequence[Example], part: Part, frame_us: float | None) -> Detections:
+def _detected(readout: Readout, examples: Sequence[Example], part: Part, frame_us: float | None) -> Detections:
     source, _, tare = examples[part.example]
-    found = run(readout, source, tare=tare, frame_us=frame_us)  # type: ignore[arg-type]
-    return found[(found.t >= part.start) & (found.t < part.stop)]
+    detections = run(readout, source, tare=tare, frame_us=frame_us)  # type: ignore[arg-type]
+    return detections[(detections.t >= part.start) & (detections.t < part.stop)]
 
 
 def _of(part: Part, patterns: Sequence[Example]) -> Example:

@@ -55,7 +55,7 @@ class Readout:
         By label. All of the same `time` and `after_spike`; others are refused. Weights in mV, one a train of the
         encoder; where its spikes are signed first all ON trains, then all OFF (`SpikeTrains.split_by_sign`).
     array : Array, optional
-        The sensor that it was trained on, the only one it then listens to. Left out, any will do that gives as many
+        The sensor that it was trained on; it then accepts no other. Left out, any will do that gives as many
         trains.
     delay_ms : float, or mapping of str to float, ms, 0 or more
         How much later than the event the neurons were trained to fire, the encoder's latency apart: target = event +
@@ -63,7 +63,7 @@ class Readout:
     run_threshold : float, above 0
         A factor on every threshold after training; below 1 the neurons fire on less, and earlier.
     delays_ms : float64, shape (delays,), ms, 0 or more, ascending
-        Every train is heard once at each of these delays, as `SpikeTrains.delayed` copies them; weights are then one a
+        Every train is an input once at each of these delays, as `SpikeTrains.delayed` copies it; weights are then one a
         copy: first all trains at the first delay, then all at the second.
 
     Raises
@@ -153,7 +153,7 @@ class Readout:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What it can say."""
+        """The labels that it detects."""
         return tuple(self._parts["neurons"])
 
     @property
@@ -173,7 +173,7 @@ class Readout:
 
     @property
     def delays_ms(self) -> NDArray[np.float64]:
-        """The delays at each of which every train is heard, ms."""
+        """The delays at each of which every train is an input, ms."""
         return np.array(self._parts.get("delays_ms", [0.0]), np.float64)
 
     def to_json(self) -> str:
@@ -470,7 +470,7 @@ class ReadoutStream:
 
     @property
     def now_us(self) -> int | None:
-        """Up to where everything has been said, us; None before anything came."""
+        """The time up to which all detections have been returned, us; None before any input."""
         return None if self._core is None else self._core.now
 
     @property
@@ -515,7 +515,7 @@ def run(
     Returns
     -------
     Detections
-        In the order in which they could be said.
+        In the order in which they became known.
 
     Raises
     ------
@@ -545,8 +545,8 @@ def run(
         return _run_spikes(readout, source)
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
-        said = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
-        return Detections._from_parts(said)
+        columns = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
+        return Detections._from_parts(columns)
     if not isinstance(source, Frames):
         raise ProblemError(
             f"source is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
@@ -559,14 +559,14 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     trains = trains.split_by_sign() if trains.signed else trains
     trains = trains.delayed(readout.delays_ms)
     trains = SpikeTrains(trains.times, trains.offsets, trains.start, trains.stop + SILENCE_MS)
-    found = Detections([], [], [])
+    detections = Detections([], [], [])
     for label, one in readout.neurons.items():
         spikes, slopes = one.neuron._run(one.weights, trains, readout.run_threshold)
         t, known = (
             np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - (readout.encoder.latency_ms + one.delay_ms), spikes)
         )
-        found += Detections([label] * len(spikes), t, known, slopes)
-    return found[np.argsort(found.known, kind="stable")]
+        detections += Detections([label] * len(spikes), t, known, slopes)
+    return detections[np.argsort(detections.known, kind="stable")]
 
 
 def _tare(tare: Tare | None) -> str | None:

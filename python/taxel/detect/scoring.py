@@ -19,7 +19,7 @@ from taxel.spikes import to_us
 
 __all__ = ["Score", "Spread", "score", "score_together"]
 
-#: No detection of one recording may meet an event of another when all are scored together, us.
+#: So far apart, us, no detection of one recording pairs with an event of another when all are scored together.
 _APART_US = 10**12
 
 
@@ -106,12 +106,12 @@ class Score:
 
     @property
     def found(self) -> int:
-        """How many reference events were found."""
+        """How many reference events were detected."""
         return len(self.pairs)
 
     @property
     def missed(self) -> int:
-        """How many reference events nothing was said of."""
+        """How many reference events have no detection."""
         return len(self.missed_events)
 
     @property
@@ -221,8 +221,8 @@ def score(
     labels, times = _truth(found, truth)
     tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
     scores = {}
-    for label, said, events, missed, false, near, errors, delays in tallies:
-        scores[label] = Score(label, np.column_stack([said, events]), missed, false, near, errors, delays)
+    for label, detected, events, missed, false, near, errors, delays in tallies:
+        scores[label] = Score(label, np.column_stack([detected, events]), missed, false, near, errors, delays)
     return Score(
         "all" if len(scores) != 1 else next(iter(scores)),
         np.concatenate([one.pairs for one in scores.values()] or [np.empty((0, 2), np.int64)]),
@@ -236,11 +236,13 @@ def score(
 
 
 def score_together(
-    heard: Sequence[Detections], truths: Sequence[Mapping[str, NDArray[np.int64]]], window_ms: float
+    detections: Sequence[Detections], truths: Sequence[Mapping[str, NDArray[np.int64]]], window_ms: float
 ) -> Score:
-    """Score what was said of several recordings as one, with the events of each by the same labels (us)."""
-    later = range(0, len(heard) * _APART_US, _APART_US)
-    moved = [Detections._of(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(heard, later, strict=True)]
+    """Score the detections in several recordings as one, with the events of each by the same labels (us)."""
+    later = range(0, len(detections) * _APART_US, _APART_US)
+    moved = [
+        Detections._of(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(detections, later, strict=True)
+    ]
     happened = {
         label: np.concatenate([truth[label] + by for truth, by in zip(truths, later, strict=True)])
         for label in truths[0]
@@ -248,7 +250,7 @@ def score_together(
     return score(reduce(add, moved), happened, window_ms)
 
 
-def _truth(found: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -> tuple[list[str], NDArray[np.int64]]:
+def _truth(detections: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -> tuple[list[str], NDArray[np.int64]]:
     """Return the reference events as labels and times."""
     if isinstance(truth, Detections):
         return truth.label.tolist(), truth.t
@@ -260,9 +262,9 @@ def _truth(found: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -> tup
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
     times = column("truth", truth, np.int64, "us")
-    if len(found.labels) > 1:
-        raise ProblemError(f"truth has no labels, found has {', '.join(found.labels)}: give times by label")
-    return [(found.labels or ("event",))[0]] * len(times), times
+    if len(detections.labels) > 1:
+        raise ProblemError(f"truth has no labels, found has {', '.join(detections.labels)}: give times by label")
+    return [(detections.labels or ("event",))[0]] * len(times), times
 
 
 def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
@@ -275,15 +277,15 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
             mine = np.array([other == label for other in labels])
             windows[mine] = _windows([label] * int(mine.sum()), window_ms[label])
         return windows
-    given = numbers("window_ms", window_ms, np.float64, "ms")
-    if given.ndim > 1 or (given.ndim == 1 and len(given) != len(labels)):
+    widths = numbers("window_ms", window_ms, np.float64, "ms")
+    if widths.ndim > 1 or (widths.ndim == 1 and len(widths) != len(labels)):
         raise ProblemError(
-            f"window_ms has shape {given.shape}: must be one number, or one each of {len(labels)} events"
+            f"window_ms has shape {widths.shape}: must be one number, or one each of {len(labels)} events"
         )
-    wrong = ~((given >= 0) & (given <= 3_600_000))
+    wrong = ~((widths >= 0) & (widths <= 3_600_000))
     if wrong.any():
         raise ProblemError(
-            f"window_ms is {np.atleast_1d(given)[np.atleast_1d(wrong)][0]}: must lie between 0 and 3600000"
+            f"window_ms is {np.atleast_1d(widths)[np.atleast_1d(wrong)][0]}: must lie between 0 and 3600000"
         )
-    windows[:] = np.rint(to_us(given))
+    windows[:] = np.rint(to_us(widths))
     return windows

@@ -1,4 +1,4 @@
-"""What a readout holds of each label."""
+"""The trained neuron, of which a readout holds one a label."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import callback, finite, instance, mapping, number, parameters, several, shown, text
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import recipes
@@ -27,13 +28,13 @@ from taxel.spikes import SpikeTrains, to_ms
 __all__ = ["Recipe", "train"]
 
 
-#: What a recipe's file says and a recipe does not hold: for which recordings it is, whose parameters other labels take.
+#: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
 _OF_THE_FILE = ("fits", "other")
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """Say how to train a readout.
+    """Describe how to train a readout.
 
     Parameters
     ----------
@@ -217,7 +218,7 @@ class Recipe:
 
 
 def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values with others put in at dotted keys; what is said for all neurons comes before what one has."""
+    """Return values changed at dotted keys; a change for all neurons takes precedence over a neuron's own value."""
     if not isinstance(changes, Mapping):
         raise ProblemError(f"changes is {shown(changes)}: must be values by dotted key")
     values = json.loads(json.dumps(values))
@@ -252,7 +253,7 @@ def train(
         All of the same array. A label that an example lacks is not in it: that teaches silence.
     recipe : Recipe
     progress : function of str, optional
-        Told what is done next.
+        Called with a line before each step.
 
     Returns
     -------
@@ -288,15 +289,15 @@ def train(
 def encoded(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> list[Example]:
     """Return (checked) examples with the spike trains of the recipe's encoder as their sources."""
     array_of(examples)
-    found = []
+    results = []
     for k, example in enumerate(examples):
         trains = example.source
         if not isinstance(trains, SpikeTrains):
             report(f"encoding {k + 1} of {len(examples)}")
             encoder = recipe.encoder if example.tare is None else recipe.encoder.with_tare(example.tare)
             trains = encoder.encode(trains)
-        found.append(example._replace(source=trains.split_by_sign() if trains.signed else trains))
-    return found
+        results.append(example._replace(source=trains.split_by_sign() if trains.signed else trains))
+    return results
 
 
 def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | None) -> Readout:
@@ -308,21 +309,21 @@ def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | Non
 def fit(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> dict[str, ConeR]:
     """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
     learners = {}
-    for label in _wanted(examples, recipe):
+    for label in _labels_to_learn(examples, recipe):
         learners[label] = Fitting(examples, recipe, label, report).fit(recipe)
     return learners
 
 
-def _wanted(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
-    wanted = recipe._labels(examples)
-    if not wanted:
+def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
+    labels = recipe._labels(examples)
+    if not labels:
         raise ProblemError("no label in any example: there is nothing to learn")
-    for label in {label for example in examples for label in example.labels} - set(wanted):
+    for label in {label for example in examples for label in example.labels} - set(labels):
         raise ProblemError(
-            f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, wanted))}; "
+            f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, labels))}; "
             f"give it [neurons.{label}], or leave it out of the labels"
         )
-    return wanted
+    return labels
 
 
 class Fitting:
@@ -355,7 +356,7 @@ class Fitting:
         count = sum(map(len, self._targets))
         if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
-        self._what = f"learning {label} from {count} events"
+        self._what = f"learning {label} from {counted(count, 'event')}"
         self._report = report
         report(self._what)
         self._rows = learner.prepare(trains, self._targets)
@@ -366,7 +367,7 @@ class Fitting:
         return self._needs == _rows_of(recipe, self._label)
 
     def fit(self, recipe: Recipe) -> ConeR:
-        """Fit the learner that a recipe describes, beginning at the fit before, if any; warn in the words of events."""
+        """Fit the learner that a recipe describes, beginning at the fit before, if any; warnings name events."""
         cone, _ = recipe.learner_of(self._label)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
@@ -392,14 +393,14 @@ def _rows_of(recipe: Recipe, label: str) -> str:
 def _remarks(
     cone: ConeR, targets: Sequence[NDArray[np.float64]], shift_ms: float, caught: Sequence[warnings.WarningMessage]
 ) -> Iterator[str]:
-    """Give what a fit warns of, in the words of events and examples."""
+    """Yield the warnings of a fit, which name events and examples."""
     missed = cone.unreachable_
     if missed:
         places = [f"{targets[p][k] - shift_ms:.10g} ms" + f" of example {p}" * (len(targets) > 1) for p, k in missed]
-        named = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
+        listed = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
         yield (
             f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too few input spikes come before "
-            f"them ({named}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
+            f"them ({listed}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the "
             "recipe's points (taxel train --search) may reach them"
         )
     # The learner names unreachable targets, if any, first.
@@ -407,7 +408,7 @@ def _remarks(
 
 
 def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:
-    """Return the same trains, listened to until the last target at least: it may come after the last spike."""
+    """Return the trains with an end after the last target, which may come after the last spike."""
     stop = max(trains.stop, *targets, trains.start)
     return SpikeTrains(trains.times, trains.offsets, trains.start, stop, trains.values)
 

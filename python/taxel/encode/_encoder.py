@@ -179,7 +179,7 @@ class Encoder(Value):
         --------
         >>> from taxel.encode import LevelCrossing
         >>> LevelCrossing([10.0]).encode(Frames([[[0.0]], [[12.0]]], [0, 1000]))
-        SpikeTrains(1 trains, 1 spikes, signed, 0 to 1 ms)
+        SpikeTrains(1 train, 1 spike, signed, 0 to 1 ms)
         """
         x = recorded(x)
         if isinstance(x, Events):
@@ -220,7 +220,7 @@ class Encoder(Value):
         --------
         >>> from taxel.encode import LevelCrossing
         >>> LevelCrossing([10.0]).transform([Frames([[[0.0]], [[12.0]]], [0, 1000])])
-        [SpikeTrains(2 trains, 1 spikes, 0 to 1 ms)]
+        [SpikeTrains(2 trains, 1 spike, 0 to 1 ms)]
         """
         encoded = [self.encode(one) for one in several("recordings", recordings)]
         return [trains.split_by_sign() if trains.signed else trains for trains in encoded]
@@ -245,7 +245,7 @@ class Encoder(Value):
         --------
         >>> from taxel.encode import LevelCrossing
         >>> LevelCrossing([10.0]).stream().push(Frames([[[0.0]], [[12.0]]], [0, 1000]))
-        SpikeTrains(1 trains, 1 spikes, signed, 0 to 1 ms)
+        SpikeTrains(1 train, 1 spike, signed, 0 to 1 ms)
         """
         return EncoderStream(self, array)
 
@@ -272,7 +272,7 @@ class EncoderStream:
     >>> from taxel.encode import LevelCrossing
     >>> stream = LevelCrossing([10.0]).stream(Array(1, 1))
     >>> stream.push(Frames([[[0.0]], [[12.0]]], [0, 1000]))
-    SpikeTrains(1 trains, 1 spikes, signed, 0 to 1 ms)
+    SpikeTrains(1 train, 1 spike, signed, 0 to 1 ms)
     """
 
     def __init__(self, encoder: Encoder, array: Array | None = None) -> None:

@@ -98,8 +98,8 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
         checked_text("format", format, FORMATS)
     names = [format] if format else [name for name, kind in FORMATS.items() if kind.files(place)]
     if len(names) != 1:
-        said = "no known format" if not names else "several formats (" + ", ".join(names) + ")"
-        raise FormatError(f"{place}: holds {said}; say format= one of {', '.join(FORMATS)}")
+        problem = "no known format" if not names else "several formats (" + ", ".join(names) + ")"
+        raise FormatError(f"{place}: holds {problem}; say format= one of {', '.join(FORMATS)}")
     try:
         yield from FORMATS[names[0]].trials(place)
     except MemoryError as error:

@@ -42,8 +42,8 @@ _NEWTON = {"kPa": 0.1, "N/cm2": 1.0}
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.lst`` whose head names the matrix and the time a picture."""
-    found = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [f for f in found if f.suffix.lower() == ".lst" and _is_export(f)]
+    candidates = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [f for f in candidates if f.suffix.lower() == ".lst" and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:
@@ -72,10 +72,10 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should (names file and line)
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no emed .lst in it")
-    for file in found:
+    for file in paths:
         yield _read(file)
 
 
@@ -128,21 +128,21 @@ def _head(file: Path, content: Sequence[str]) -> tuple[tuple[int, int], tuple[fl
     """Return rows and columns, the size of a sensor in cm, and the time a picture in ms."""
     first = next((k for k, line in enumerate(content) if _PICTURE.search(line)), len(content))
     head = "\n".join(content[: first + 1])
-    found = {name: pattern.search(head) for name, pattern in _HEAD.items()}
-    wanted = {"matrix": "Matrix: 64x95", "size": "Sensor size: 0.500x0.500 cm", "period": "Time/picture:10.0 ms"}
-    for name, match in found.items():
+    matches = {name: pattern.search(head) for name, pattern in _HEAD.items()}
+    expected = {"matrix": "Matrix: 64x95", "size": "Sensor size: 0.500x0.500 cm", "period": "Time/picture:10.0 ms"}
+    for name, match in matches.items():
         if match is None:
-            raise FormatError(f"{file.name}, line {first + 1}: no '{wanted[name]}' before it")
-    said = {name: tuple(float(n) for n in match.groups()) for name, match in found.items() if match is not None}
-    for name, numbers in said.items():
+            raise FormatError(f"{file.name}, line {first + 1}: no '{expected[name]}' before it")
+    values = {name: tuple(float(n) for n in match.groups()) for name, match in matches.items() if match is not None}
+    for name, numbers in values.items():
         if min(numbers) <= 0:
-            raise FormatError(f"{file.name}, line {first + 1}: before it a {name} of 0; must be as '{wanted[name]}'")
+            raise FormatError(f"{file.name}, line {first + 1}: before it a {name} of 0; must be as '{expected[name]}'")
     # Columns come first: the rows that are printed reach beyond the first number.
-    columns, rows = (int(n) for n in said["matrix"])
+    columns, rows = (int(n) for n in values["matrix"])
     if max(rows, columns) > 65_535:
         raise FormatError(f"{file.name}: a matrix of {columns} x {rows}; at most 65535 a side")
     sensor(file.name, Array(rows, columns))
-    return (rows, columns), (said["size"][0], said["size"][1]), said["period"][0]
+    return (rows, columns), (values["size"][0], values["size"][1]), values["period"][0]
 
 
 def _page(file: Path, content: Sequence[str], begin: int, end: int, shape: tuple[int, int]) -> _Page:

@@ -35,8 +35,8 @@ _SOURCE = "step times that the authors derived from this very channel (left foot
 
 def files(path: Path) -> list[Path]:
     """Find the headers of this format: ``NAME.hea`` with ``NAME.let`` beside it."""
-    found = sorted(path.glob("*.hea")) if path.is_dir() else [path]
-    return [f for f in found if f.suffix == ".hea" and f.with_suffix(".let").exists()]
+    candidates = sorted(path.glob("*.hea")) if path.is_dir() else [path]
+    return [f for f in candidates if f.suffix == ".hea" and f.with_suffix(".let").exists()]
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -53,10 +53,10 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should (names file and line or byte)
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no NAME.hea with NAME.let in it")
-    for header in found:
+    for header in paths:
         rate, samples, signals = _header(header)
         steps = header.with_suffix(".ts")
         for name, first, checksum in signals:
@@ -162,11 +162,11 @@ def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
     rate = text.number(record[2].split("/")[0].split("(")[0], path, k, "rate")
     samples = int(text.number(record[3], path, k, "number of samples"))
     if not 0 < rate <= 1e6 or samples < 1 or signals < 1:
-        said = f"{signals} signals, {rate:g} Hz, {samples} samples"
-        raise FormatError(f"{path.name}, line {k}: {said}; must be above 0, at most 1000000 Hz")
+        values = f"{signals} signals, {rate:g} Hz, {samples} samples"
+        raise FormatError(f"{path.name}, line {k}: {values}; must be above 0, at most 1000000 Hz")
     if len(rows) < 1 + signals:
         raise FormatError(f"{path.name}: {len(rows) - 1} signal lines for {signals} signals")
-    found = []
+    channels = []
     for k, cells in rows[1 : 1 + signals]:
         if len(cells) < 7:
             raise FormatError(f"{path.name}, line {k}: {len(cells)} cells; must hold file, format ... checksum")
@@ -175,8 +175,8 @@ def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
         if not re.fullmatch(r"[\w.-]+", cells[0]):
             raise FormatError(f"{path.name}, line {k}: {cells[0]!r} is not a plain file name")
         first, checksum = (int(text.number(cells[c], path, k, w)) for c, w in ((5, "first value"), (6, "checksum")))
-        found.append((cells[0], first, checksum))
-    return rate, samples, found
+        channels.append((cells[0], first, checksum))
+    return rate, samples, channels
 
 
 def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.int16]:
@@ -189,8 +189,8 @@ def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.
             f"{path.name}: {len(data)} bytes; {samples} samples of format 212 are {3 * ((samples + 1) // 2)}"
         )
     values = format_212(data, path.name)[:samples]
-    said = NO_SAMPLE if first == -32768 else first
-    if values[0] != said:
+    expected = NO_SAMPLE if first == -32768 else first
+    if values[0] != expected:
         raise FormatError(f"{path.name}: first value {values[0]}; the header says {first}")
     # The header's sum takes a sample that is not valid as -32768.
     total = int(np.where(values == NO_SAMPLE, -32768, values).sum(dtype=np.int64))

@@ -35,8 +35,8 @@ _SOURCE = "the foot's own total force: contact above 50 N, foot-off below 25 N, 
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format, by their names."""
-    found = sorted(path.glob("*_*.txt*")) if path.is_dir() else [path]
-    return [f for f in found if _NAME.fullmatch(f.name)]
+    candidates = sorted(path.glob("*_*.txt*")) if path.is_dir() else [path]
+    return [f for f in candidates if _NAME.fullmatch(f.name)]
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -54,11 +54,11 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should (names file, line and column)
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no file such as GaCo02_01.txt in it")
     known = _events_table((place if place.is_dir() else place.parent) / "events.csv")
-    for file in found:
+    for file in paths:
         match = _NAME.fullmatch(file.name)
         if match is None:
             raise FormatError(f"{file.name}: must be named such as GaCo02_01.txt")
@@ -115,9 +115,9 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     """
     total = arguments.floats("total", total)
     # +1 above 50, -1 below 25, 0 between: the state is the last one that is not 0.
-    said = (total > 50).astype(np.int64) - (total < 25)
-    last = np.maximum.accumulate(np.where(said != 0, np.arange(len(total)), -1))
-    loaded = (last >= 0) & (said[last] > 0)
+    state = (total > 50).astype(np.int64) - (total < 25)
+    last = np.maximum.accumulate(np.where(state != 0, np.arange(len(total)), -1))
+    loaded = (last >= 0) & (state[last] > 0)
     edges = np.diff(loaded.astype(np.int64))
     ups, downs = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
     downs = downs[np.searchsorted(downs, ups[0], side="right") :] if len(ups) else downs[:0]
@@ -129,10 +129,10 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
 def _events_table(path: Path) -> dict[tuple[str, str], NDArray[np.int64]]:
     if not path.exists():
         return {}
-    found: dict[tuple[str, str], list[list[int]]] = {}
+    stances: dict[tuple[str, str], list[list[int]]] = {}
     for row in text.table(path, ["person", "foot", "contact_sample", "off_sample"]):
         samples = [int(text.number(row[c], path, int(row["line"]), c)) for c in ("contact_sample", "off_sample")]
         if not 0 <= samples[0] < samples[1]:
             raise FormatError(f"{path.name}, line {row['line']}: contact {samples[0]}, off {samples[1]}; must ascend")
-        found.setdefault((row["person"], row["foot"]), []).append(samples)
-    return {key: np.array(rows, np.int64) for key, rows in found.items()}
+        stances.setdefault((row["person"], row["foot"]), []).append(samples)
+    return {key: np.array(rows, np.int64) for key, rows in stances.items()}

@@ -28,8 +28,8 @@ _JOINTS = tuple(f"joint{k}" for k in range(7, 16))
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: tables whose first line names trial, slice and the thumb's taxels."""
-    found = sorted([*path.glob("*.csv.gz"), *path.glob("*.csv")]) if path.is_dir() else [path]
-    return [f for f in found if f.name.endswith((".csv", ".csv.gz")) and _begins_so(f)]
+    candidates = sorted([*path.glob("*.csv.gz"), *path.glob("*.csv")]) if path.is_dir() else [path]
+    return [f for f in candidates if f.name.endswith((".csv", ".csv.gz")) and _begins_so(f)]
 
 
 def _begins_so(path: Path) -> bool:
@@ -60,10 +60,10 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should (names file and line)
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no table of grasps (OBJECT.csv.gz) in it")
-    for file in found:
+    for file in paths:
         name = file.name.removesuffix(".gz").removesuffix(".csv")
         grasps: dict[str, list[dict[str, str]]] = {}
         for row in text.table(file, ["trial", "slice", *_JOINTS, *_TAXELS]):

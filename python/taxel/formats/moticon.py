@@ -35,8 +35,8 @@ _SOURCE = "the maker's step finder (neither the first nor the last loaded frame)
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.txt`` with a comment that names the sensor insoles."""
-    found = sorted(path.glob("*.txt")) if path.is_dir() else [path]
-    return [f for f in found if f.suffix == ".txt" and _is_export(f)]
+    candidates = sorted(path.glob("*.txt")) if path.is_dir() else [path]
+    return [f for f in candidates if f.suffix == ".txt" and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:
@@ -62,11 +62,11 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should (names file, line and column)
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no Moticon text export in it (lines of # that name the sensor insoles)")
     steps = _steps_table((place if place.is_dir() else place.parent) / "steps.csv")
-    for file in found:
+    for file in paths:
         yield from _read(file, steps.get(file.stem))
 
 
@@ -143,7 +143,7 @@ def _column(names: list[str], pattern: str, file: Path, line: int) -> int:
 def _markers(
     rows: list[list[str]], names: list[str], t: NDArray[np.int64], file: Path, first: int
 ) -> dict[tuple[str, str], NDArray[np.int64]]:
-    found: dict[tuple[str, str], list[int]] = {place: [] for place in MARKERS.values()}
+    by_place: dict[tuple[str, str], list[int]] = {place: [] for place in MARKERS.values()}
     columns = [k for k, name in enumerate(names) if re.match(r"(left|right) steps", name)]
     for k, row in enumerate(rows):
         for c in columns:
@@ -151,18 +151,18 @@ def _markers(
                 code = int(text.number(row[c], file, first + k, names[c]))
                 if code not in MARKERS:
                     raise FormatError(f"{file.name}, line {first + k}: marker {code}; must be one of {sorted(MARKERS)}")
-                found[MARKERS[code]].append(int(t[k]))
-    return {place: np.array(times, np.int64) for place, times in found.items()}
+                by_place[MARKERS[code]].append(int(t[k]))
+    return {place: np.array(times, np.int64) for place, times in by_place.items()}
 
 
 def _steps_table(path: Path) -> dict[str, dict[tuple[str, str], list[float]]]:
     if not path.exists():
         return {}
-    found: dict[str, dict[tuple[str, str], list[float]]] = {}
+    recordings: dict[str, dict[tuple[str, str], list[float]]] = {}
     for row in text.table(path, ["recording", "foot", "contact_s", "toe_off_s"]):
-        places = found.setdefault(row["recording"], {(f, e): [] for f, e in MARKERS.values()})
+        places = recordings.setdefault(row["recording"], {(f, e): [] for f, e in MARKERS.values()})
         if row["foot"] not in {"left", "right"}:
             raise FormatError(f"{path.name}, line {row['line']}: foot {row['foot']!r}; must be left or right")
         for column, event in (("contact_s", "contact"), ("toe_off_s", "foot_off")):
             places[row["foot"], event].append(text.number(row[column], path, int(row["line"]), column))
-    return found
+    return recordings

@@ -28,8 +28,8 @@ _SOURCE = "the insole's own sum, 10 % of its largest: no truth of its own"
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.asc`` whose head names time in seconds."""
-    found = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [f for f in found if f.suffix.lower() == ".asc" and _is_export(f)]
+    candidates = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [f for f in candidates if f.suffix.lower() == ".asc" and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:
@@ -51,10 +51,10 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should (names file, line and column)
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no pedar .asc in it")
-    for file in found:
+    for file in paths:
         yield from _read(file)
 
 

@@ -39,8 +39,8 @@ _SOURCE = (
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``subj*.h5``."""
-    found = sorted(path.glob("subj*.h5")) if path.is_dir() else [path]
-    return [f for f in found if re.fullmatch(r"subj\w+\.h5", f.name)]
+    candidates = sorted(path.glob("subj*.h5")) if path.is_dir() else [path]
+    return [f for f in candidates if re.fullmatch(r"subj\w+\.h5", f.name)]
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -62,12 +62,12 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no file subjNNN.h5 in it")
     folder = place if place.is_dir() else place.parent
     known, about = _events_table(folder / "events.csv"), _trials_table(folder / "trials.csv")
-    for file in found:
+    for file in paths:
         person = file.stem
         with H5File(file) as h5:
             for name in sorted(h5.entries):

@@ -26,8 +26,8 @@ _NAME = re.compile(r"([a-z]+)(\d*)(?:_(\d+))?")
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: a .npz with ``readings`` and ``pose``."""
-    found = sorted(path.glob("*.npz")) if path.is_dir() else [path]
-    return [f for f in found if f.suffix == ".npz" and _holds_poses(f)]
+    candidates = sorted(path.glob("*.npz")) if path.is_dir() else [path]
+    return [f for f in candidates if f.suffix == ".npz" and _holds_poses(f)]
 
 
 def _holds_poses(path: Path) -> bool:
@@ -52,10 +52,10 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no .npz with readings and pose in it")
-    for file in found:
+    for file in paths:
         held = read_arrays(file, ("readings", "pose"))
         missing = [name for name in ("readings", "pose") if name not in held]
         if missing:

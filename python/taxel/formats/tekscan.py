@@ -42,8 +42,8 @@ _RAW_SUM = re.compile(r"Raw Sum=\s*,*\s*([^,\s]+)")
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.asf``, ``.csv`` and ``.txt`` whose first line names the data's type."""
-    found = sorted(path.iterdir()) if path.is_dir() else [path]
-    return [f for f in found if f.suffix.lower() in _ENDINGS and _is_export(f)]
+    candidates = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [f for f in candidates if f.suffix.lower() in _ENDINGS and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:
@@ -75,10 +75,10 @@ def trials(path: str | Path) -> Iterator[Trial]:
     FormatError : a file that does not hold what it should (names file, line and cell)
     """
     place = Path(arguments.path("path", path))
-    found = files(place)
-    if not found:
+    paths = files(place)
+    if not paths:
         raise FormatError(f"{place}: no Tekscan movie in it (text that begins with DATA_TYPE)")
-    for file in found:
+    for file in paths:
         yield _read(file)
 
 
@@ -118,9 +118,9 @@ def _read(file: Path) -> Trial:
                 f"in frame {numbers[0]} it is {'a number' if exists[row, column] else 'B'}"
             )
         values[k][there] = _numbers(file, cells, there, at + 2)
-        said = _RAW_SUM.search(content[at])
-        if said is not None:
-            sums[k] = text.number(said[1], file, at + 1, "Raw Sum")
+        match = _RAW_SUM.search(content[at])
+        if match is not None:
+            sums[k] = text.number(match[1], file, at + 1, "Raw Sum")
         made = values[k].sum(dtype=np.float64)
         if unit == "counts" and not np.isnan(sums[k]) and sums[k] != made:
             raise FormatError(f"{file.name}, line {at + 1}: Raw Sum is {sums[k]:g}; the cells make {made:g}")
@@ -182,9 +182,9 @@ class _Header:
     def length_mm(self, key: str) -> float:
         words = self.text(key).split()
         if len(words) != 2 or words[1].lower() not in _LENGTHS_MM:
-            said = arguments.shown(self.text(key))
+            cell = arguments.shown(self.text(key))
             raise FormatError(
-                f"{self.file.name}, line {self.line(key)}: {key} is {said}; must be a number and "
+                f"{self.file.name}, line {self.line(key)}: {key} is {cell}; must be a number and "
                 "millimeters, centimeters or inches"
             )
         value = text.number(words[0], self.file, self.line(key), key) * _LENGTHS_MM[words[1].lower()]
@@ -235,8 +235,8 @@ def _times(
     The two differ: a movie of 0.1 s a frame states steps of 0.1 and 0.11 s.
     """
     if all(stated):
-        said = zip(stated, places, strict=True)
-        seconds = np.array([text.number(time, file, at + 1, "time") for time, at in said])
+        pairs = zip(stated, places, strict=True)
+        seconds = np.array([text.number(time, file, at + 1, "time") for time, at in pairs])
     else:
         seconds = (np.array(numbers, np.float64) - 1) * period
     far = np.flatnonzero(np.abs(seconds) * 1e6 > TIME_US)

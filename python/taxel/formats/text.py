@@ -43,8 +43,8 @@ def lines(path: Path) -> list[str]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
-    found = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return found[:-1] if found and not found[-1] else found
+    content = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return content[:-1] if content and not content[-1] else content
 
 
 def number(cell: str, path: Path, line: int, what: str) -> float:
@@ -59,10 +59,10 @@ def number(cell: str, path: Path, line: int, what: str) -> float:
         value = float(text)
     except ValueError:
         if _DECIMAL_COMMA.fullmatch(text):
-            said = f"has a decimal comma ({shown(text)}); export with decimal points"
+            problem = f"has a decimal comma ({shown(text)}); export with decimal points"
         else:
-            said = f"is {shown(text)}, not a number" if text else "is empty, not a number"
-        raise FormatError(f"{path.name}, line {line}: {what} {said}") from None
+            problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
+        raise FormatError(f"{path.name}, line {line}: {what} {problem}") from None
     # Pictures hold 32 bits.
     if not abs(value) <= VALUE or "_" in text:
         raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number")
@@ -98,8 +98,8 @@ def table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
     ------
     FormatError : a column is missing, or a row has another length than the header (names file and line)
     """
-    found = HeaderTable.read(path.name, lines(path))
-    if not found.header:
+    parsed = HeaderTable.read(path.name, lines(path))
+    if not parsed.header:
         raise FormatError(f"{path.name}: empty; must begin with a line of column names")
-    found.has(columns)
-    return [{**cells, "line": str(line)} for line, cells in found]
+    parsed.has(columns)
+    return [{**cells, "line": str(line)} for line, cells in parsed]

@@ -1,4 +1,4 @@
-"""What the room's classifiers share: scikit-learn's manners, without needing scikit-learn."""
+"""Base class of the classifiers: scikit-learn's estimator interface, without scikit-learn."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Classifier", "labelled"]
 
 
 class Classifier(Parameters):
-    """Share scikit-learn's manners: `clone` and `cross_val_score` work. The core does not know its parameters."""
+    """Base of classifiers that scikit-learn's `clone` and `cross_val_score` accept; Python checks the parameters."""
 
     classes_: NDArray[np.generic]
     _pairwise: ClassVar[bool] = False
@@ -33,7 +33,7 @@ class Classifier(Parameters):
         return float(np.mean(self.predict(x) == words("y", y)))
 
     def __sklearn_tags__(self) -> Any:
-        # Only scikit-learn asks, so it is there already.
+        # Only scikit-learn calls this, so scikit-learn is installed.
         tags = sys.modules["sklearn.utils"]
         return tags.Tags(
             estimator_type="classifier",
@@ -55,10 +55,10 @@ def labelled(y: ArrayLike, trials: int) -> tuple[NDArray[np.generic], NDArray[np
     ------
     ProblemError : another number of labels than trials, or one class
     """
-    named = words("y", y)
-    if len(named) != trials:
-        raise ProblemError(f"y has {len(named)} entries: must be {trials}, one a trial")
-    classes, row = np.unique(named, return_inverse=True)
+    labels = words("y", y)
+    if len(labels) != trials:
+        raise ProblemError(f"y has {len(labels)} entries: must be {trials}, one a trial")
+    classes, row = np.unique(labels, return_inverse=True)
     if len(classes) < 2:
         raise ProblemError(f"y names {len(classes)} class: must be two at least")
     return classes, row

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import shown
 from taxel._core import ProblemError
 
-#: So many labels are sorted or looked up by one NumPy call, which does not answer Ctrl-C: of texts some 30 ms.
+#: Labels that one call of NumPy sorts or looks up (30 ms for texts): Ctrl-C is answered between calls.
 _AT_ONCE = 1 << 17
 
 __all__ = ["belonging", "distinct", "numbered", "one_label_a_group", "words"]
@@ -44,10 +44,10 @@ def numbered(classes: NDArray[np.generic], column: NDArray[np.generic]) -> NDArr
 
 def belonging(groups: ArrayLike, trials: int) -> NDArray[np.int64]:
     """Return the number of each trial's group."""
-    named = words("groups", groups)
-    if len(named) != trials:
-        raise ProblemError(f"groups has {len(named)} entries: must be {trials}, one a trial")
-    return numbered(distinct(named), named)
+    names = words("groups", groups)
+    if len(names) != trials:
+        raise ProblemError(f"groups has {len(names)} entries: must be {trials}, one a trial")
+    return numbered(distinct(names), names)
 
 
 def one_label_a_group(row: NDArray[np.int64], groups: NDArray[np.int64]) -> bool:

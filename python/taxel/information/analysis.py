@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from taxel._base.arguments import callback, instance, several, text, whole
 from taxel.encode import ChangeEvents, Encoder
-from taxel.information.answers import Answer, Point, is_told
+from taxel.information.answers import Answer, Point, is_above_chance
 from taxel.information.controls import controls
 from taxel.information.estimate import Estimate, estimate, zero_test
 from taxel.information.keeping import Verdict, keeps
@@ -30,13 +30,13 @@ from taxel.spikes import to_ms
 
 __all__ = ["CLASSIFIERS", "answer"]
 
-#: Beside the discriminants of every answer, at the reference setting.
+#: Classifiers that `answer` can also run at the reference setting, beside the discriminants of every setting.
 CLASSIFIERS = ("neighbours", "cone_r", "tempotron")
 #: Numbers of neighbours that are tried.
 NEIGHBOURS = (1, 3, 5, 9, 15)
-#: From so many trials on their matrices are worth more than one thread.
+#: Number of trials from which several threads are used for their matrices.
 _WORTH_THREADS = 1000
-#: Pictures are held against events where they fit in so many values.
+#: Pictures are compared with events only where they have at most so many values.
 _MOST_VALUES = 2**28
 
 
@@ -57,7 +57,7 @@ def answer(
     seed: int = 0,
     progress: Callable[[str, int, int], object] | None = None,
 ) -> Answer:
-    """Ask labelled trials how many bits their events hold about the labels, by period, time, taxels and cost.
+    """Estimate how many bits the events of labelled trials hold about the labels, by period, time, taxels and cost.
 
     Parameters
     ----------
@@ -73,9 +73,9 @@ def answer(
     taxels : sequence of int, optional
         Numbers of taxels that are drawn at random among those that ever send an event; 10, 30, 100, 300 where left out.
     pools : sequence of int, optional
-        Taxels of so many by so many taken for one; 2, 4 and 7 where left out.
+        Sides of the squares of taxels that are averaged into one; 2, 4 and 7 where left out.
     taxels_at_ms : float, ms, optional
-        The period at which taxels are taken away or pooled, one of those asked for; the finest where it is left out.
+        The period at which taxels are left out or pooled, one of `periods_ms`; the finest where it is left out.
     draws : int, 1 or more
         Of sampling phases and of random taxels; answers are their means.
     folds : int, 2 or more
@@ -102,20 +102,20 @@ def answer(
     for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
         whole(name, value, least)
     also = [text("classifiers", one, CLASSIFIERS) for one in several("classifiers", classifiers)]
-    asked = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed), progress)
-    asked.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms, len(also), int(shuffles))
-    # Threads that wait for each other over small matrices cost more than they bring, and very much on a busy machine.
+    answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed), progress)
+    answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms, len(also), int(shuffles))
+    # On small matrices several threads are slower than one, and far slower where other processes compute as well.
     with threadpool_limits(1 if len(listed) < _WORTH_THREADS else None):
-        return asked.answer(also, int(shuffles))
+        return answering.answer(also, int(shuffles))
 
 
 class _Answering(Question):
-    """Answers a question setting by setting."""
+    """Computes the answer to a question, setting by setting."""
 
     def answer(self, classifiers: list[str], shuffles: int) -> Answer:
-        """Answer all."""
+        """Return the answer for all settings."""
         values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
-        said: dict[tuple[int, float], list[Any]] = {}
+        responses_at: dict[tuple[int, float], list[Any]] = {}
         about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
         frames: dict[int, list[Any]] = {}
         by_column: dict[tuple[str, int], list[Any]] = {}
@@ -127,12 +127,12 @@ class _Answering(Question):
                 spikes = self.spikes(period, draw)
                 for window, grams in zip(self.windows, self.grams(spikes, self.windows), strict=True):
                     sizes = [features(spikes, window)] * len(grams)
-                    found = self.nested(grams, sizes, draw=draw)
-                    said.setdefault((period, window), []).append(found.responses)
+                    nested = self.nested(grams, sizes, draw=draw)
+                    responses_at.setdefault((period, window), []).append(nested.responses)
                     about.setdefault((period, window), []).append(_about(spikes, window, values))
-                    missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in found.missing}
+                    missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
                     if reference is None and window == self.windows[-1]:
-                        reference = spikes, grams, sizes, found
+                        reference = spikes, grams, sizes, nested
                 for name, column in self.columns.items():
                     self.tell(f"{to_ms(period):g} ms, {name}")
                     by_column.setdefault((name, period), []).append(self.nested(grams, sizes, column, draw).responses)
@@ -141,7 +141,7 @@ class _Answering(Question):
                 if picture is not None:
                     frames.setdefault(period, []).append(self.nested(*picture, draw=draw).responses)
         assert reference is not None  # there are a period, a draw and a window at least
-        estimates = {key: self.estimate(responses) for key, responses in said.items()}
+        estimates = {key: self.estimate(responses) for key, responses in responses_at.items()}
         everything = len(self.active)
         points = []
         for (period, window), one in estimates.items():
@@ -162,7 +162,7 @@ class _Answering(Question):
         )
         self._warn(missing)
         taxels = self._by_taxels(full, values)
-        if not is_told(full.found, zero):
+        if not is_above_chance(full.found, zero):
             points = [_with_nothing(p) if p.window_ms == full.window_ms else p for p in points]
             taxels = tuple(map(_with_nothing, taxels))
         return Answer(
@@ -197,12 +197,12 @@ class _Answering(Question):
         return frame_grams(values, spikes, [self.window_us]), [bins * active]
 
     def _by_taxels(self, full: Point, values: bool) -> tuple[Point, ...]:
-        """Answer by number of taxels."""
+        """Return the points with fewer or larger taxels."""
         period = self.taxels_at
         window = self.window_us
-        found = []
+        points = []
         for kind, size in [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]:
-            said, about, taxels = [], [], size
+            responses, about, taxels = [], [], size
             for draw in range(self.draws):
                 self.tell(f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}")
                 if kind == "random":
@@ -213,11 +213,11 @@ class _Answering(Question):
                     spikes = self.spikes(period, draw, size)
                     taxels = spikes.taxels
                 grams = self.grams(spikes, [window])[0]
-                said.append(self.nested(grams, [features(spikes, window)] * len(grams), draw=draw).responses)
+                responses.append(self.nested(grams, [features(spikes, window)] * len(grams), draw=draw).responses)
                 about.append(_about(spikes, window, values))
-            one = self.estimate(said)
-            found.append(_point(period, window, taxels, kind, one, about, keeps(one, full.found, groups=self.groups)))
-        return tuple(found)
+            one = self.estimate(responses)
+            points.append(_point(period, window, taxels, kind, one, about, keeps(one, full.found, groups=self.groups)))
+        return tuple(points)
 
     def _training(
         self, grams: list[NDArray[np.float64]], sizes: list[int], first: Nested
@@ -227,8 +227,8 @@ class _Answering(Question):
         most = least - -(-least // self.folds)
         steps = sorted({max(2, most // k) for k in (12, 6, 3, 2)} - {most})
         steps = [n for n in steps if n < most]
-        said = training_curve(grams, sizes, self.labels, first, steps, seed=self.seed)
-        curve = [(n, estimate(self.labels, one, redraws=2).bits) for n, one in zip(steps, said, strict=True)]
+        responses = training_curve(grams, sizes, self.labels, first, steps, seed=self.seed)
+        curve = [(n, estimate(self.labels, one, redraws=2).bits) for n, one in zip(steps, responses, strict=True)]
         return (*curve, (most, estimate(self.labels, first.responses, redraws=2).bits))
 
     def _classified(self, name: str, spikes: Spikes, grams: list[NDArray[np.float64]], sizes: list[int]) -> Estimate:
@@ -241,13 +241,13 @@ class _Answering(Question):
     def _columns_answered(
         self, by_column: dict[tuple[str, int], list[Any]], about: dict[Any, Any], everything: int
     ) -> dict[str, tuple[Point, ...]]:
-        found: dict[str, list[Point]] = {}
-        for (name, period), said in by_column.items():
-            one = self.estimate(said, self.columns[name])
-            found.setdefault(name, []).append(
+        by_name: dict[str, list[Point]] = {}
+        for (name, period), responses in by_column.items():
+            one = self.estimate(responses, self.columns[name])
+            by_name.setdefault(name, []).append(
                 _point(period, self.windows[-1], everything, "all", one, about[period, self.windows[-1]], None)
             )
-        return {name: tuple(points) for name, points in found.items()}
+        return {name: tuple(points) for name, points in by_name.items()}
 
     def _warn(self, missing: set[str]) -> None:
         self.notes += sorted(missing)[:3]
@@ -270,12 +270,14 @@ def _about(spikes: Spikes, window: float, values: bool) -> tuple[float, float, f
 
 
 def _point(
-    period: int, window: float, taxels: int, kind: str, found: Estimate, about: list[Any], verdict: Verdict | None
+    period: int, window: float, taxels: int, kind: str, estimated: Estimate, about: list[Any], verdict: Verdict | None
 ) -> Point:
     events, silent, kbps = np.mean(about, axis=0)
-    return Point(to_ms(period), to_ms(window), taxels, kind, found, float(events), float(silent), float(kbps), verdict)
+    return Point(
+        to_ms(period), to_ms(window), taxels, kind, estimated, float(events), float(silent), float(kbps), verdict
+    )
 
 
 def _with_nothing(point: Point) -> Point:
-    """Return a setting that is held against one whose bits are not told from nothing."""
+    """Return a point with the verdict "nothing": the full setting's bits are not above those of shuffled labels."""
     return point if point.verdict is None else replace(point, verdict=replace(point.verdict, says="nothing"))

@@ -1,4 +1,4 @@
-"""What is answered of a user's own sensor: bits by setting, what they cost, and what else would tell as much."""
+"""The answer about a user's own sensor: bits by setting, their cost, and controls."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from taxel.information.estimate import Estimate, ZeroTest
 from taxel.information.keeping import Verdict
 from taxel.information.wire_rate import WIRE
 
-__all__ = ["Answer", "Control", "Point", "is_told"]
+__all__ = ["Answer", "Control", "Point", "is_above_chance"]
 
-#: A control that tells this share of the answer comes near it.
+#: A control with at least this share of the answer's bits is reported as a warning.
 _NEAR = 0.8
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Hold what one setting tells.
+    """Hold the bits of one setting, and their cost.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Point:
 
     @property
     def millibits_per_event(self) -> float:
-        """Bits over events: highest where least is known, so no figure of merit."""
+        """Bits divided by events, in thousandths: highest where least is known, so no figure of merit."""
         return 1000.0 * self.found.bits / self.events if self.events else 0.0
 
     def to_dict(self) -> dict[str, Any]:
@@ -79,7 +79,7 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """Hold how many bits something else than the touch's pattern gives.
+    """Hold the bits of a control: of something else than the touch's pattern.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Control:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Hold everything that was asked of the trials.
+    """Hold the results of `taxel.information.answer`.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class Answer:
         How many; 0 where none are named.
     encoder : str
     full : Point
-        The finest period, all taxels, the whole window: what the others are held against.
+        The finest period, all taxels, the whole window: the reference of all others.
     points : tuple of Point
         By period and window, all taxels.
     taxels : tuple of Point
@@ -155,39 +155,39 @@ class Answer:
     @property
     def empty(self) -> bool:
         """Whether the full setting's bits are not above 0, so that no other has anything to keep."""
-        return not is_told(self.full.found, self.zero) or any(
+        return not is_above_chance(self.full.found, self.zero) or any(
             p.verdict is not None and p.verdict.says == "nothing" for p in (*self.by_period, *self.taxels)
         )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before the full setting's bits are believed: nothing told, wrong answers, a control as good."""
-        found = self.full.found
-        said = []
-        if found.bits <= self.zero.level:
-            said.append(
+        """Reasons to doubt the full setting's bits: shuffled labels, wrong answers or a control give about as much."""
+        estimate = self.full.found
+        lines = []
+        if estimate.bits <= self.zero.level:
+            lines.append(
                 "not told from nothing: labels shuffled before training give as much "
                 f"(95 % below {self.zero.level:.2f})"
             )
-        guessed, least = _guessing(found)
-        if found.right < least:
-            said.append(
-                f"{100 * found.right:.0f} % are classified correctly, guessing gives {100 * guessed:.0f} %: the bits "
-                "are those of wrong answers" + (", as where a group has mostly one label" if self.groups else "")
+        guessed, least = _guessing(estimate)
+        if estimate.right < least:
+            lines.append(
+                f"{100 * estimate.right:.0f} % are classified correctly, guessing gives {100 * guessed:.0f} %: the "
+                "bits are those of wrong answers" + (", as where a group has mostly one label" if self.groups else "")
             )
         if not self.empty:
-            said += [
+            lines += [
                 f"{c.name} alone tells {c.found.bits:.2f} bits: the answer may be about that"
                 for c in self.controls
-                if c.found is not None and c.found.interval[0] > 0 and c.found.bits >= _NEAR * found.bits
+                if c.found is not None and c.found.interval[0] > 0 and c.found.bits >= _NEAR * estimate.bits
             ]
-        return (*said, *found.warnings)
+        return (*lines, *estimate.warnings)
 
     @property
     def cheapest(self) -> Point:
         """The setting of the lowest rate among those that keep 95 % of the full one's bits, or the full one."""
-        kept = [p for p in (*self.by_period, *self.taxels) if p.verdict is not None and p.verdict.says == "keeps"]
-        return min([self.full, *kept], key=lambda point: point.kbps)
+        sufficient = [p for p in (*self.by_period, *self.taxels) if p.verdict is not None and p.verdict.says == "keeps"]
+        return min([self.full, *sufficient], key=lambda point: point.kbps)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as JSON holds them."""
@@ -198,7 +198,7 @@ class Answer:
             "full": self.full.to_dict(),
             "points": [point.to_dict() for point in self.points],
             "taxels": [point.to_dict() for point in self.taxels],
-            "frames": [{"period_ms": period, **found.to_dict()} for period, found in self.frames.items()],
+            "frames": [{"period_ms": period, **estimate.to_dict()} for period, estimate in self.frames.items()],
             "controls": [
                 {"name": c.name, "about": c.about, **({} if c.found is None else c.found.to_dict())}
                 for c in self.controls
@@ -209,7 +209,7 @@ class Answer:
                 "shuffles": len(self.zero.shuffled),
             },
             "training": [{"trials": n, "bits": round(bits, 4)} for n, bits in self.training],
-            "classifiers": {name: found.to_dict() for name, found in self.classifiers.items()},
+            "classifiers": {name: estimate.to_dict() for name, estimate in self.classifiers.items()},
             "parameters": {name: [p.to_dict() for p in points] for name, points in self.parameters.items()},
             "cheapest": self.cheapest.to_dict(),
             "warnings": list(self.warnings),
@@ -224,13 +224,13 @@ class Answer:
         }
 
 
-def _guessing(found: Estimate) -> tuple[float, float]:
-    """Return the share that guessing names rightly, and the least that chance would let it (three deviations)."""
-    trials = found.counts[0].sum(1)
+def _guessing(estimate: Estimate) -> tuple[float, float]:
+    """Return the share of trials that guessing classifies correctly, and that less three standard deviations."""
+    trials = estimate.counts[0].sum(1)
     guessed = float(((trials / trials.sum()) ** 2).sum())
     return guessed, guessed - 3.0 * float(np.sqrt(guessed * (1 - guessed) / trials.sum()))
 
 
-def is_told(found: Estimate, zero: ZeroTest) -> bool:
-    """Whether bits are more than shuffled labels give, and not those of answers that are wrong as a rule."""
-    return found.bits > zero.level and found.right >= _guessing(found)[1]
+def is_above_chance(estimate: Estimate, zero: ZeroTest) -> bool:
+    """Whether the bits exceed those of shuffled labels, and trials are not classified worse than by guessing."""
+    return estimate.bits > zero.level and estimate.right >= _guessing(estimate)[1]

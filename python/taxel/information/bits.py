@@ -26,7 +26,7 @@ __all__ = [
     "relevant_responses",
 ]
 
-#: So many cells one NumPy call works on: Ctrl-C is answered between calls.
+#: Cells that one call of NumPy works on: Ctrl-C is answered between calls.
 _AT_ONCE = 1 << 20
 
 
@@ -58,13 +58,13 @@ def confusion_matrix(
     >>> counts.tolist(), classes.tolist()
     ([[1, 0], [1, 1]], ['ball', 'edge'])
     """
-    truth, said = words("labels", labels), words("responses", responses)
-    if len(truth) != len(said):
-        raise ProblemError(f"responses has {len(said)} entries: must be {len(truth)}, one a label")
+    truth, answered = words("labels", labels), words("responses", responses)
+    if len(truth) != len(answered):
+        raise ProblemError(f"responses has {len(answered)} entries: must be {len(truth)}, one a label")
     if not len(truth):
         raise ProblemError("labels is []: must hold a trial at least")
     try:
-        every = np.unique(np.concatenate([truth, said]))
+        every = np.unique(np.concatenate([truth, answered]))
         order = every if classes is None else words("classes", classes)
     except TypeError:
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers") from None
@@ -74,7 +74,7 @@ def confusion_matrix(
     if len(missing):
         raise ProblemError(f"classes does not name {shown(missing[0].item())}")
     place = np.argsort(order)
-    row, column = (place[np.searchsorted(order[place], x)] for x in (truth, said))
+    row, column = (place[np.searchsorted(order[place], x)] for x in (truth, answered))
     counts = np.zeros((len(order), len(order)), np.int64)
     np.add.at(counts, (row, column), 1)
     return counts, order
@@ -129,8 +129,8 @@ def plug_in(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
     """
     table = _table(counts)
     flat = table.reshape(*table.shape[:-2], -1)
-    found = _entropy(table.sum(-1)) + _entropy(table.sum(-2)) - _entropy(flat)
-    return np.maximum(found, 0.0)
+    bits = _entropy(table.sum(-1)) + _entropy(table.sum(-2)) - _entropy(flat)
+    return np.maximum(bits, 0.0)
 
 
 def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
@@ -164,15 +164,15 @@ def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
     """
     table = _counts(counts)
     rows = table.reshape(-1, table.shape[-1])
-    found = np.empty(len(rows), np.int64)
+    relevant = np.empty(len(rows), np.int64)
     for mine in _blocks(*rows.shape):
-        found[mine] = _relevant(rows[mine])
-    return np.asarray(found.reshape(table.shape[:-1]))
+        relevant[mine] = _relevant(rows[mine])
+    return np.asarray(relevant.reshape(table.shape[:-1]))
 
 
 def _relevant(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     trials, seen = rows.sum(-1), (rows > 0).sum(-1)
-    found, most = seen.copy(), rows.shape[-1]
+    count, most = seen.copy(), rows.shape[-1]
     share = rows / np.maximum(trials, 1)[:, None]
     off = np.abs(seen - _once(share, trials[:, None]).sum(-1))
     rising = np.flatnonzero((seen < most) & (trials > 0))
@@ -181,15 +181,15 @@ def _relevant(rows: NDArray[np.int64]) -> NDArray[np.int64]:
         if not len(rising):
             break
         n, r = trials[rising, None], seen[rising, None]
-        # `extra` responses that never came share gamma between them.
+        # The `extra` responses that did not occur share the probability gamma.
         gamma = extra * -np.expm1(np.log(n / (n + r)) / n)
         came = np.where(rows[rising] > 0, (1 - gamma) / (n + r) * (rows[rising] + 1), 0.0)
         expected = _once(came, n).sum(-1) + extra * _once(gamma / extra, n)[:, 0]
         now = np.abs(seen[rising] - expected)
         nearer = now < off[rising]
         rising = rising[nearer]
-        off[rising], found[rising] = now[nearer], seen[rising] + extra
-    return np.asarray(found)
+        off[rising], count[rising] = now[nearer], seen[rising] + extra
+    return np.asarray(count)
 
 
 def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
@@ -229,7 +229,7 @@ def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: int = 0) -> float:
     """Return the mutual information in bits, extrapolated from half and a quarter of the trials to endlessly many.
 
-    A second opinion beside `panzeri_treves`: that both agree is no proof (they err alike where trials are few).
+    A second estimate beside `panzeri_treves`. Their agreement is no proof: both err alike where trials are few.
 
     Parameters
     ----------
@@ -267,13 +267,13 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
     means = [float(plug_in(table))]
     for parts in (2, 4):
         ends = np.linspace(0, trials, parts + 1).astype(int)
-        found: list[Any] = []
+        values: list[Any] = []
         for _ in range(rounds):
             dealt = random.permutation(cells)
             tables = (np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends))
-            found += [plug_in(one.reshape(table.shape)) for one in tables]
-        means.append(float(np.mean(found)))
-    # Through (1, whole), (2, half), (4, quarter) in units of 1/N: the value at 0.
+            values += [plug_in(one.reshape(table.shape)) for one in tables]
+        means.append(float(np.mean(values)))
+    # The value at 0 of the parabola through (1, whole), (2, half) and (4, quarter), in units of 1/N.
     at_zero = (8 * means[0] - 6 * means[1] + means[2]) / 3
     return float(np.clip(at_zero, 0.0, label_entropy(table)))
 
@@ -301,13 +301,13 @@ def local_information(counts: ArrayLike) -> NDArray[np.float64]:
     table = _table(counts).astype(np.float64)
     total = table.sum((-1, -2), keepdims=True)
     expected = table.sum(-1, keepdims=True) * table.sum(-2, keepdims=True)
-    found = np.zeros_like(table)
+    bits = np.zeros_like(table)
     flat = [np.broadcast_to(x, table.shape).reshape(-1, table.shape[-1]) for x in (table, total, expected)]
     for mine in _blocks(*flat[0].shape):
         here, every, even = (x[mine] for x in flat)
         ratio = np.divide(here * every, even, out=np.ones_like(here), where=here > 0)
-        found.reshape(-1, table.shape[-1])[mine] = np.log2(ratio)
-    return np.asarray(found)
+        bits.reshape(-1, table.shape[-1])[mine] = np.log2(ratio)
+    return np.asarray(bits)
 
 
 def _once(p: NDArray[np.float64], trials: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -318,12 +318,12 @@ def _once(p: NDArray[np.float64], trials: NDArray[np.int64]) -> NDArray[np.float
 
 def _entropy(counts: NDArray[np.int64]) -> NDArray[np.float64]:
     rows = counts.reshape(-1, counts.shape[-1])
-    total, found = np.maximum(rows.sum(-1, keepdims=True), 1), np.zeros(len(rows))
+    total, entropy = np.maximum(rows.sum(-1, keepdims=True), 1), np.zeros(len(rows))
     for mine in _blocks(*rows.shape):
         for part in _blocks(rows.shape[1], 1):
             p = rows[mine, part] / total[mine]
-            found[mine] -= (p * np.log2(np.where(p > 0, p, 1.0))).sum(-1)
-    return np.asarray(found.reshape(counts.shape[:-1]) + 0.0)
+            entropy[mine] -= (p * np.log2(np.where(p > 0, p, 1.0))).sum(-1)
+    return np.asarray(entropy.reshape(counts.shape[:-1]) + 0.0)
 
 
 def _blocks(rows: int, columns: int) -> list[slice]:

@@ -63,12 +63,12 @@ class Code(ABC):
         >>> FirstSpikeLatency(window_ms=10.0).encode([0.5], onset_ms=3.0).times
         array([8.])
         """
-        given, onset = floats("values", values), number("onset_ms", onset_ms, "ms")
-        if given.ndim != 1 or not ((given >= 0) & (given <= 1)).all():
+        checked, onset = floats("values", values), number("onset_ms", onset_ms, "ms")
+        if checked.ndim != 1 or not ((checked >= 0) & (checked <= 1)).all():
             raise ProblemError(f"values are {shown(values)}: must be numbers of 0 to 1, one a train")
         if not math.isfinite(onset):
             raise ProblemError(f"onset_ms is {onset}: must be finite")
-        lists = [onset + np.asarray(times) for times in self._times(given)]
+        lists = [onset + np.asarray(times) for times in self._times(checked)]
         return SpikeTrains.from_lists(lists, start=onset, stop=onset + self.window_ms)
 
     def decode(self, trains: SpikeTrains, onset_ms: float | None = None) -> NDArray[np.float64]:
@@ -99,18 +99,18 @@ class Code(ABC):
         return self._values(trains, onset)
 
     def _first(self, trains: SpikeTrains, onset: float) -> NDArray[np.float64]:
-        """Return each train's first spike at or after the onset, ms, as finely as can be told; infinite where none."""
+        """Return the latency of each train's first spike at or after the onset, ms; infinite where there is none."""
         first = np.full(len(trains), np.inf)
         times, train = trains.to_numpy()
         later = times >= onset
         np.minimum.at(first, train[later], times[later] - onset)
         return first
 
-    def _told(self, latency: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return latencies as finely as they can be told."""
+    def _rounded(self, latency: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return latencies rounded down to whole steps of the resolution."""
         if not self.resolution_ms:
             return latency
-        # A time that is a whole number of steps but for rounding stays there.
+        # 1e-9 keeps a time in its step that is a whole number of steps but for its rounding error.
         return np.asarray(self.resolution_ms * np.floor(latency / self.resolution_ms + 1e-9))
 
     @abstractmethod
@@ -122,7 +122,7 @@ class Code(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class RateCode(Code):
-    """Say a value by how many spikes come within the window.
+    """Encode a value by the number of spikes within the window.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class RateCode(Code):
 
     def _times(self, values: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         counts = np.rint(values * self.most_hz * 1e-3 * self.window_ms).astype(np.int64)
-        # In the middle of their share of the window: none at its edges.
+        # Each spike lies in the middle of its share of the window, so none lies at the window's edges.
         return [(np.arange(n) + 0.5) * self.window_ms / max(1, n) for n in counts]
 
     def _values(self, trains: SpikeTrains, onset: float) -> NDArray[np.float64]:
@@ -190,7 +190,7 @@ class FirstSpikeLatency(Code):
         return [np.array([(1.0 - value) * self.window_ms] if value > 0 else []) for value in values]
 
     def _values(self, trains: SpikeTrains, onset: float) -> NDArray[np.float64]:
-        latency = self._told(self._first(trains, onset))
+        latency = self._rounded(self._first(trains, onset))
         return np.asarray(np.where(latency < self.window_ms, 1.0 - latency / self.window_ms, 0.0))
 
 
@@ -219,7 +219,7 @@ class RelativeLatency(FirstSpikeLatency):
 
     def _values(self, trains: SpikeTrains, onset: float) -> NDArray[np.float64]:
         first = self._first(trains, onset)
-        since = self._told(first - first.min()) if np.isfinite(first).any() else first
+        since = self._rounded(first - first.min()) if np.isfinite(first).any() else first
         return np.asarray(np.where(since < self.window_ms, 1.0 - since / self.window_ms, 0.0))
 
 
@@ -250,12 +250,14 @@ class RankOrder(RelativeLatency):
         first = self._first(trains, onset)
         if not np.isfinite(first).any():
             return np.zeros(len(first))
-        since = self._told(first - first.min())
+        since = self._rounded(first - first.min())
         fired = since < self.window_ms
         values = np.zeros(len(first))
         order = np.sort(since[fired])
         before = np.searchsorted(order, since[fired]), np.searchsorted(order, since[fired], side="right")
-        values[fired] = 1.0 - (sum(before) - 1.0) / 2.0 / len(first)  # those at the same time share their ranks
+        values[fired] = 1.0 - (sum(before) - 1.0) / 2.0 / len(
+            first
+        )  # spikes at the same time share the mean of their ranks
         return values
 
 
@@ -269,9 +271,9 @@ def compare_codes(
     folds: int = 10,
     seed: int = 0,
 ) -> dict[str, Estimate]:
-    """Estimate how many bits about labels each code hands on from the same spikes.
+    """Estimate how many bits about labels each code carries from the same spikes.
 
-    Linear discriminants name each trial by what the code reads of it, trained on the other folds; the bits are those of
+    Linear discriminants classify each trial by its decoded values, trained on the other folds; the bits are those of
     the confusion matrix (`estimate`).
 
     Parameters
@@ -305,22 +307,22 @@ def compare_codes(
     >>> round(compare_codes(trials, ["soft", "hard"] * 4, {"first": code}, folds=2)["first"].right, 2)
     1.0
     """
-    given = [instance("trials", one, SpikeTrains) for one in several("trials", trials)]
-    wanted: dict[str, Code] = mapping("codes", codes)
-    for name, code in wanted.items():
+    patterns = [instance("trials", one, SpikeTrains) for one in several("trials", trials)]
+    by_name: dict[str, Code] = mapping("codes", codes)
+    for name, code in by_name.items():
         if not isinstance(code, Code):
             raise ProblemError(f"codes[{name}] is {shown(code)}: must be a taxel.information.Code")
-    if not wanted:
+    if not by_name:
         raise ProblemError("codes is empty: name at least one")
-    if not given or len({len(one) for one in given}) > 1:
+    if not patterns or len({len(one) for one in patterns}) > 1:
         raise ProblemError("trials must be one or more, with equally many trains each")
-    onsets = [one.start for one in given] if onsets_ms is None else floats("onsets_ms", onsets_ms).tolist()
-    if len(onsets) != len(given):
-        raise ProblemError(f"onsets_ms has {len(onsets)} entries: must be {len(given)}, one a trial")
-    found = {}
-    for name, code in wanted.items():
-        read = np.array([code.decode(one, onset) for one, onset in zip(given, onsets, strict=True)])
+    onsets = [one.start for one in patterns] if onsets_ms is None else floats("onsets_ms", onsets_ms).tolist()
+    if len(onsets) != len(patterns):
+        raise ProblemError(f"onsets_ms has {len(onsets)} entries: must be {len(patterns)}, one a trial")
+    estimates = {}
+    for name, code in by_name.items():
+        read = np.array([code.decode(one, onset) for one, onset in zip(patterns, onsets, strict=True)])
         vary = max(1, int(np.count_nonzero(np.ptp(read, axis=0) > 0)))
-        named = nested_predictions([read @ read.T], [vary], labels, groups=groups, count=folds, seed=seed)
-        found[name] = estimate(labels, named.responses, groups=groups, seed=seed)
-    return found
+        nested = nested_predictions([read @ read.T], [vary], labels, groups=groups, count=folds, seed=seed)
+        estimates[name] = estimate(labels, nested.responses, groups=groups, seed=seed)
+    return estimates

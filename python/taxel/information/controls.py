@@ -1,4 +1,4 @@
-"""Controls beside an answer: what else than the pattern of events may tell the labels."""
+"""Controls: how many bits about the labels come from something else than the pattern of events."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ __all__ = ["controls"]
 
 
 def controls(question: Question) -> tuple[Control, ...]:
-    """Return what the stretch before the contact, the length, the count of events and the first picture tell."""
+    """Return the bits of the stretch before the contact, the length, the count of events and the first picture."""
     question.tell("controls")
     finest, window = question.periods[0], question.window_us
     spikes = question.spikes(finest, 0)
     count = spikes.counts(window).astype(np.float64)
-    found = [_before(question)]
+    results = [_before(question)]
     last = np.zeros(len(question.trials))
     np.maximum.at(last, spikes.trial, to_ms(spikes.first_us[spikes.trial] + spikes.bin * float(finest)))
     if question.ended:
         length = to_ms(spikes.length_us)
-        found.append(Control("length", _scalar(question, length), "from contact to the trial's end"))
+        results.append(Control("length", _scalar(question, length), "from contact to the trial's end"))
     else:
-        found.append(Control("length", _scalar(question, last), "from contact to the last event in the window"))
-    found.append(Control("event count", _scalar(question, count), "events to the whole window"))
+        results.append(Control("length", _scalar(question, last), "from contact to the last event in the window"))
+    results.append(Control("event count", _scalar(question, count), "events to the whole window"))
     if all(isinstance(one.source, Frames) for one in question.trials):
         start = [
             held.at(np.array([t.start_us - finest]))[0] for held, t in zip(question.held, question.trials, strict=True)
@@ -44,8 +44,8 @@ def controls(question: Question) -> tuple[Control, ...]:
         if np.ptp(first, axis=0).any():
             gram = [first @ first.T]
             bits = question.estimate(question.nested(gram, [first.shape[1]]).responses)
-            found.append(Control("first picture", bits, "the pressure itself before the start, no change since"))
-    return tuple(found)
+            results.append(Control("first picture", bits, "the pressure itself before the start, no change since"))
+    return tuple(results)
 
 
 def _scalar(question: Question, value: NDArray[np.float64]) -> Estimate | None:
@@ -59,8 +59,8 @@ def _scalar(question: Question, value: NDArray[np.float64]) -> Estimate | None:
 
 
 def _before(question: Question) -> Control:
-    """Ask the stretch before the contact: what it tells was there before the touch."""
-    assert question.encoder is not None  # set where it was left out
+    """Return the bits of the stretch before the contact, which the touch cannot have caused."""
+    assert question.encoder is not None  # the question has set the default
     begin = np.array([float(one.source.t.min()) for one in question.trials])
     for source in {id(one.source) for one in question.trials}:
         mine = [k for k, one in enumerate(question.trials) if id(one.source) == source]
@@ -89,9 +89,9 @@ def _before(question: Question) -> Control:
         moved, question.held, question.encoder, period_us=period, contact_us=at, window_us=length, random=random
     )
     grams = question.grams(spikes, [length])[0]
-    found = question.estimate(question.nested(grams, [features(spikes, length)] * len(grams)).responses)
+    estimate = question.estimate(question.nested(grams, [features(spikes, length)] * len(grams)).responses)
     without = int((room < length).sum())
     about = f"{to_ms(length):g} ms before it" + (
         f", {without} of {len(room)} have less and count as silent" if without else ""
     )
-    return Control("before contact", found, about)
+    return Control("before contact", estimate, about)

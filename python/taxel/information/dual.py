@@ -12,7 +12,7 @@ __all__ = ["Regression", "gram_matrix", "left_out", "solved_without_ridge"]
 
 #: Directions in which classes vary less than this share of the largest count as none.
 _CUT = 1e-10
-#: Digits that are kept of what the regression says, and of discriminants.
+#: Decimal digits to which the regression's predictions and the discriminants are rounded.
 _DIGITS = 9
 
 
@@ -60,20 +60,20 @@ class Regression:
 
 
 def left_out(regressions: list[Regression], out: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return what the discriminants of all other trials name the trials `out`, shape (regressions, trials)."""
+    """Return the classes that all other trials' discriminants predict for the trials `out`; (regressions, trials)."""
     which = regressions[0].which
     mine = np.ix_(out, out)
     left = np.stack([one.left[out] for one in regressions])
     off = np.linalg.solve(np.stack([one.residual[mine] for one in regressions]), left)
     counts = which.sum(0) - which[out].sum(0)
     share = counts / counts.sum()
-    # What the regression on the others says of them, summed by class, less the classes' shares.
+    # Predictions of the regression on the other trials, summed by class, less the classes' shares.
     sums = np.diag(counts) - np.stack([one.sums for one in regressions]) + np.swapaxes(left, 1, 2) @ off
     turn, offset = _discriminant(sums - counts[:, None] * share, np.broadcast_to(counts, (len(off), len(counts))))
-    # Rounding knows the trial's own label, and would name trials in which nothing varies: ties are to be ties.
-    told = np.round(which[out] - off - share, _DIGITS)
+    # Rounding errors depend on the trial's own label, so without this they would decide ties correctly.
+    predicted = np.round(which[out] - off - share, _DIGITS)
     with np.errstate(divide="ignore"):
-        scores = told @ turn + (offset + np.log(share))[:, None, :]
+        scores = predicted @ turn + (offset + np.log(share))[:, None, :]
     return np.asarray(np.round(scores, _DIGITS).argmax(-1))
 
 
@@ -101,16 +101,16 @@ def solved_without_ridge(
     within = square - mean @ (which.T @ square)
     within -= (within @ mean) @ which.T
     values, vectors = np.linalg.eigh((within + within.T) / 2)
-    kept = values > _CUT * max(values[-1], np.finfo(float).tiny)
-    if not kept.any():
+    varying = values > _CUT * max(values[-1], np.finfo(float).tiny)
+    if not varying.any():
         raise ProblemError("gram: nothing varies within classes")
-    vectors = vectors[:, kept]
+    vectors = vectors[:, varying]
     across = square @ (mean - 1 / trials)
     across -= mean @ (which.T @ across)
-    weights = (vectors / values[kept] ** 2) @ (vectors.T @ across) * trials
+    weights = (vectors / values[varying] ** 2) @ (vectors.T @ across) * trials
     weights -= mean @ (which.T @ weights)
     reach = square @ weights
-    return weights, -np.diag((mean + 1 / trials).T @ reach) / 2, int(kept.sum())
+    return weights, -np.diag((mean + 1 / trials).T @ reach) / 2, int(varying.sum())
 
 
 def _discriminant(
@@ -121,14 +121,14 @@ def _discriminant(
     Parameters
     ----------
     sums : float64, shape (..., classes, classes)
-        What the regression says of the training trials, summed by their class (rows), the classes' shares taken off.
+        The regression's predictions of the training trials, summed by their class (rows), less the classes' shares.
     counts : float64, shape (..., classes)
         Training trials by class; a class without any gets no discriminant.
 
     Returns
     -------
     turn : float64, shape (..., classes, classes)
-        Discriminants are what the regression says of a trial (less the shares), times this ...
+        Discriminants are the regression's prediction of a trial (less the shares), times this ...
     offset : float64, shape (..., classes)
         ... plus this, plus the logarithm of the prior; minus infinity without trials.
 

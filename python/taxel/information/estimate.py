@@ -1,4 +1,4 @@
-"""How many bits the answers hold, how sure that is, and whether it is more than nothing."""
+"""The bits that answers hold about labels, with an interval, and a test against zero."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from taxel.information.bits import (
 
 __all__ = ["Estimate", "ZeroTest", "estimate", "zero_test"]
 
-#: So many trials a label and relevant response keep the corrected value within .05 bit (simulated, 3 to 10 labels).
+#: Trials a label and relevant response that keep the corrected value within .05 bit (simulated, 3 to 10 labels).
 TRIALS_A_RESPONSE = 7
-#: Cells that are held at a time while trials are redrawn.
+#: Cells in memory at a time while trials are redrawn.
 _CELLS = 1 << 21
 #: Units that are redrawn, or trials that are counted, by one call of NumPy.
 _DRAWN = 1 << 19
@@ -98,7 +98,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class ZeroTest:
-    """Hold what labels shuffled before training still seem to give.
+    """Hold the bits that are estimated where labels are shuffled before training.
 
     Attributes
     ----------
@@ -162,20 +162,20 @@ def estimate(
     """
     truth = words("labels", labels)
     try:
-        given = np.asarray(responses)
+        array = np.asarray(responses)
     except (ValueError, TypeError):
-        given = np.empty(0, object)
-    said = np.stack([words("responses", row) for row in np.atleast_2d(given)]) if given.size else given
-    if said.ndim != 2 or said.shape[1] != len(truth) or not len(truth):
-        raise ProblemError(f"responses has shape {given.shape}: must be ({len(truth)},), one a label, or draws of it")
+        array = np.empty(0, object)
+    answered = np.stack([words("responses", row) for row in np.atleast_2d(array)]) if array.size else array
+    if answered.ndim != 2 or answered.shape[1] != len(truth) or not len(truth):
+        raise ProblemError(f"responses has shape {array.shape}: must be ({len(truth)},), one a label, or draws of it")
     share = number("confidence", confidence)
     if not 0 < share < 1:
         raise ProblemError(f"confidence is {shown(confidence)}: must lie between 0 and 1")
     rounds, random = whole("redraws", redraws, 2), np.random.default_rng(whole("seed", seed, 0))
-    if (truth.dtype.kind == "U") != (said.dtype.kind == "U"):
+    if (truth.dtype.kind == "U") != (answered.dtype.kind == "U"):
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers")
-    classes = np.unique(np.concatenate([distinct(truth), distinct(said.ravel())]))
-    row, column = numbered(classes, truth), numbered(classes, said)
+    classes = np.unique(np.concatenate([distinct(truth), distinct(answered.ravel())]))
+    row, column = numbered(classes, truth), numbered(classes, answered)
     if len(np.unique(row)) < 2:
         raise ProblemError(
             f"labels are all {shown(truth[0].item())}: must be two at least, or there is nothing to tell"
@@ -191,7 +191,7 @@ def estimate(
     tenth = int(np.ceil(384.0 * np.var(local)))
     prior, wrong = n[n > 0] / len(truth), int((row != counts.sum(0).argmax(0)[column]).any(0).sum())
     if wrong <= len(prior):
-        # Too few errors to tell by redraws where others would lie.
+        # With so few errors, redraws do not show where others would lie.
         low = min(low, most - bits - _left_open(prior, wrong, len(truth), share))
         times = np.geomspace(1, 100, 400)
         needed = (len(truth) * m for m in times if _left_open(prior, m * wrong, m * len(truth), 0.95) <= _FIFTH)
@@ -206,7 +206,7 @@ def estimate(
         if len(truth) >= 4
         else bits,
         most=most,
-        right=float(np.mean(said == truth)),
+        right=float(np.mean(answered == truth)),
         counts=counts,
         classes=classes,
         local=local,
@@ -224,7 +224,7 @@ def zero_test(
     shuffles: int = 20,
     seed: int = 0,
 ) -> ZeroTest:
-    """Shuffle the labels before training, and see how many bits still seem to be there.
+    """Test against zero: shuffle the labels before training, and estimate the bits again.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def zero_test(
         Trains anew on these labels and returns the responses, shape (trials,).
     labels : labels, shape (trials,)
     found : float, bits
-        What the labels as they are gave.
+        The estimate with the true labels.
     groups : labels, shape (trials,), optional
         Where each group has one label, whole groups change theirs; else labels are shuffled within each group.
     shuffles : int, 1 or more
@@ -262,11 +262,11 @@ def zero_test(
     bits = []
     for _ in range(whole("shuffles", shuffles, 1)):
         mixed = _shuffled(row, belongs, random)
-        said = np.searchsorted(classes, words("responses", answer(classes[mixed])))
-        if said.shape != row.shape or said.max() >= len(classes):
+        answered = np.searchsorted(classes, words("responses", answer(classes[mixed])))
+        if answered.shape != row.shape or answered.max() >= len(classes):
             raise ProblemError("answer does not return one of the labels a trial")
         bits.append(
-            float(panzeri_treves(_tables(mixed * len(classes) + said, np.ones((1, len(row))), len(classes))[0]))
+            float(panzeri_treves(_tables(mixed * len(classes) + answered, np.ones((1, len(row))), len(classes))[0]))
         )
     return ZeroTest(
         tuple(bits),
@@ -291,14 +291,14 @@ def _shuffled(row: NDArray[np.int64], belongs: NDArray[np.int64] | None, random:
 def _tables(cells: NDArray[np.int64], weights: NDArray[Any], classes: int) -> NDArray[np.int64]:
     """Return the tables of each redraw and draw, shape (redraws, draws, labels, labels)."""
     draws = np.atleast_2d(cells)
-    found = np.empty((len(weights), len(draws), classes, classes), np.int64)
+    tables = np.empty((len(weights), len(draws), classes, classes), np.int64)
     for k, weight in enumerate(weights):
         for d, cell in enumerate(draws):
             # In pieces, as one NumPy call does not answer Ctrl-C; sums of whole numbers are exact.
             pieces = (slice(first, first + _DRAWN) for first in range(0, len(cell), _DRAWN))
             table = sum(np.bincount(cell[piece], weight[piece], classes**2) for piece in pieces)
-            found[k, d] = np.rint(table).reshape(classes, classes)
-    return found if cells.ndim == 2 else found[:, 0]
+            tables[k, d] = np.rint(table).reshape(classes, classes)
+    return tables if cells.ndim == 2 else tables[:, 0]
 
 
 def _interval(
@@ -315,18 +315,18 @@ def _interval(
 
     units = np.arange(len(row)) if belongs is None else belongs
     owner = np.unique(units, return_index=True)[1]
-    # Where a unit has one label the number of each label is by design, and stays.
+    # Where each unit has one label, the number of units a label is part of the design, and redraws keep it.
     strata = row[owner] if belongs is None or one_label_a_group(row, belongs) else np.zeros(len(owner), np.int64)
     members = [np.flatnonzero(strata == s) for s in np.unique(strata)]
-    found = []
+    estimates = []
     at_once = max(1, _CELLS // (len(cells) * classes**2))
     for first in range(0, redraws, at_once):
         count = min(at_once, redraws - first)
         weights = np.zeros((count, len(owner)), np.int64)
         for mine in members:
             weights[:, mine] = _redrawn(random, len(mine), count)
-        found.append(np.mean(panzeri_treves(_tables(cells, weights[:, units], classes)), axis=1))
-    redrawn = np.concatenate(found)
+        estimates.append(np.mean(panzeri_treves(_tables(cells, weights[:, units], classes)), axis=1))
+    redrawn = np.concatenate(estimates)
     ends = np.quantile(redrawn, [(1 - confidence) / 2, (1 + confidence) / 2]) - redrawn.mean()
     if belongs is not None:
         free = max(1, len(owner) - 1)
@@ -346,8 +346,8 @@ def _redrawn(random: np.random.Generator, units: int, count: int) -> NDArray[np.
         return np.asarray(random.multinomial(units, share, size=count))
     # The conditional probabilities of one call, with the rounding of its running difference.
     chance = share / np.subtract.accumulate(np.concatenate([[1.0], share[:-1]]))
-    found = np.zeros((count, units), np.int64)
-    for row in found:
+    draws = np.zeros((count, units), np.int64)
+    for row in draws:
         left = units
         for first in range(0, units - 2, _DRAWN):
             some = chance[first : min(first + _DRAWN, units - 2)]
@@ -358,7 +358,7 @@ def _redrawn(random: np.random.Generator, units: int, count: int) -> NDArray[np.
         # At a chance of one half a binomial is drawn the other way round, so the last two units take it as it was.
         row[-2] = random.binomial(left, chance[-2])
         row[-1] = left - row[-2]
-    return found
+    return draws
 
 
 def _left_open(prior: NDArray[np.float64], wrong: float, trials: float, confidence: float) -> float:
@@ -376,11 +376,11 @@ def _left_open(prior: NDArray[np.float64], wrong: float, trials: float, confiden
 
 
 def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth: int) -> tuple[str, ...]:
-    said = []
-    wanted = int(np.ceil(TRIALS_A_RESPONSE * relevant))
-    if least < wanted:
-        said.append(f"{least} trials of a label: below {wanted} the bits may read high by more than .05")
+    lines = []
+    needed = int(np.ceil(TRIALS_A_RESPONSE * relevant))
+    if least < needed:
+        lines.append(f"{least} trials of a label: below {needed} the bits may read high by more than .05")
     half = (interval[1] - interval[0]) / 2
     if half > 0.1:
-        said.append(f"uncertain by {half:.2f} bit: a tenth needs some {tenth} trials")
-    return tuple(said)
+        lines.append(f"uncertain by {half:.2f} bit: a tenth needs some {tenth} trials")
+    return tuple(lines)

@@ -18,8 +18,8 @@ from taxel.information.primal import ClassMoments, blocks, feature_table, is_exa
 
 __all__ = ["FoldSums", "fold_predictions"]
 
-#: Features from which on threads are worth it: NumPy and SciPy bring a pool each, and while one is at work the other's
-#: threads wait busily. At 1000 features two threads take twice as long as one.
+#: Number of features from which several threads are used: NumPy and SciPy have a pool each, and while one computes the
+#: threads of the other spin. At 1000 features two threads take twice as long as one.
 _WORTH_THREADS = 2500
 
 
@@ -82,14 +82,14 @@ class FoldSums:
             raise ProblemError(f"folds names {len(self._names)}: must be two at least")
         self._dtype = np.float32 if is_exact(self._table) else np.float64
         self._shift = None if self._dtype == np.float32 else self._table.mean(0, dtype=np.float64)
-        self._kept: dict[int, ClassMoments] = {}
+        self._sums: dict[int, ClassMoments] = {}
         total: ClassMoments | None = None
         with self._threads():
             for k, name in enumerate(self._names):
                 one = self._summed(name)
                 total = one if total is None else total + one
                 if keep == "folds":
-                    self._kept[int(name)] = one
+                    self._sums[int(name)] = one
                 del one
                 if progress is not None:
                     progress(k + 1, len(self._names))
@@ -100,8 +100,8 @@ class FoldSums:
         return threadpool_limits(1 if self._table.shape[1] < _WORTH_THREADS else None)
 
     def _summed(self, name: np.int64) -> ClassMoments:
-        if int(name) in self._kept:
-            return self._kept[int(name)]
+        if int(name) in self._sums:
+            return self._sums[int(name)]
         mine = np.flatnonzero(self.folds == name)
         return ClassMoments.of(
             self._table, self._row, len(self.classes), rows=mine, dtype=self._dtype, shift=self._shift
@@ -153,7 +153,7 @@ class FoldSums:
             )
         model.classes_ = classes
         shift = None if self._shift is None else self._shift[:used]
-        found = np.empty(len(self._table), classes.dtype)
+        predicted = np.empty(len(self._table), classes.dtype)
         with self._threads():
             for k, name in enumerate(self._names):
                 training = self._total - self._summed(name)
@@ -161,10 +161,10 @@ class FoldSums:
                     training = training.merged(into, len(classes))
                 model._from_moments(training if used == count else training.first(used), shift)
                 for block, mine in blocks(self._table[:, :used], np.flatnonzero(self.folds == name), np.float64, None):
-                    found[mine] = classes[(block @ model.coef_.T + model.intercept_).argmax(1)]
+                    predicted[mine] = classes[(block @ model.coef_.T + model.intercept_).argmax(1)]
                 if progress is not None:
                     progress(k + 1, len(self._names))
-        return found
+        return predicted
 
 
 def fold_predictions(

@@ -41,20 +41,20 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
     [0, 1, 0, 0, 1, 0, 1, 1]
     """
     truth = words("labels", labels)
-    wanted, random = whole("count", count, 2), np.random.default_rng(whole("seed", seed, 0))
+    parts, random = whole("count", count, 2), np.random.default_rng(whole("seed", seed, 0))
     classes, row = np.unique(truth, return_inverse=True)
     if len(classes) < 2:
-        said = f"all {shown(truth[0].item())}" if len(truth) else "[]"
-        raise ProblemError(f"labels are {said}: must be two at least, or there is nothing to tell")
+        values = f"all {shown(truth[0].item())}" if len(truth) else "[]"
+        raise ProblemError(f"labels are {values}: must be two at least, or there is nothing to tell")
     if groups is None:
-        if len(truth) < wanted:
-            raise ProblemError(f"{len(truth)} trials for {wanted} folds: must be a trial a fold at least")
+        if len(truth) < parts:
+            raise ProblemError(f"{len(truth)} trials for {parts} folds: must be a trial a fold at least")
         alone = np.flatnonzero(np.bincount(row) < 2)
         if len(alone):
             raise ProblemError(
                 f"label {shown(classes[alone[0]].item())} has one trial: must be two at least, to be trained and tested"
             )
-        return _dealt(row, wanted, random)
+        return _dealt(row, parts, random)
     belongs = belonging(groups, len(truth))
     for k, name in enumerate(classes):
         mine = np.unique(belongs[row == k])
@@ -64,16 +64,16 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
                 f"label {shown(name.item())}: all its trials lie in group {shown(group)}, so it could never be both "
                 f"trained and tested; must be two groups at least"
             )
-    return _whole_groups(row, belongs, wanted, random)
+    return _whole_groups(row, belongs, parts, random)
 
 
 def _dealt(row: NDArray[np.int64], count: int, random: np.random.Generator) -> NDArray[np.int64]:
     """Deal label after label, on from where the last one ended, so that folds are of one size, too."""
     order = random.permutation(len(row))
     order = order[np.argsort(row[order], kind="stable")]
-    found = np.empty(len(row), np.int64)
-    found[order] = np.arange(len(row)) % count
-    return found
+    fold = np.empty(len(row), np.int64)
+    fold[order] = np.arange(len(row)) % count
+    return fold
 
 
 def _whole_groups(

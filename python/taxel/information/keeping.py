@@ -14,7 +14,7 @@ from taxel.information.estimate import Estimate
 
 __all__ = ["Verdict", "keeps"]
 
-#: One-sided, as each verdict.
+#: Confidence of each verdict's one-sided bound.
 CONFIDENCE = 0.9
 
 
@@ -31,7 +31,7 @@ class Verdict:
     error : float, bits
         Of the margin, by trial or group, paired.
     trials_to_settle : int, 1 or more, optional
-        So many would settle an open one, were the margin as it seems; None where it is none, or settled.
+        Trials that would settle an open verdict if the margin is as estimated; None where it is 0, or settled.
     """
 
     says: str
@@ -69,7 +69,7 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
     Notes
     -----
     d = i_cheap - share * i_dear by trial, i being log2 p(response | label) / p(response); bounds at 90 %, one-sided, by
-    Student's t; i_dear itself is held against 0 in the same way. Near the edge the rule "within one standard error"
+    Student's t; i_dear itself is tested against 0 in the same way. Near the edge the rule "within one standard error"
     takes too cheap a setting in 44 to 70 % of simulated cases, this one in at most 13 % (from 40 trials a label on); it
     leaves many open instead.
 
@@ -104,5 +104,5 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
         return Verdict("keeps", margin, error)
     if margin < -reach * error:
         return Verdict("loses", margin, error)
-    wanted = (reach * error / margin) ** 2 * len(a) if margin else np.inf
-    return Verdict("open", margin, error, int(np.ceil(wanted)) if wanted < 1e6 else None)
+    needed = (reach * error / margin) ** 2 * len(a) if margin else np.inf
+    return Verdict("open", margin, error, int(np.ceil(needed)) if needed < 1e6 else None)

@@ -34,7 +34,7 @@ class LDA(Classifier):
     intercept_ : float64, shape (classes,)
     rank_ : int
         In how many directions the covariance within classes was inverted. Less than the features that vary where
-        these tell each other (or trials are fewer): the directions in which no class varies are left out, as by
+        these are linearly dependent (or trials are fewer): directions in which no class varies are left out, as by
         scikit-learn's `svd`.
 
     Raises
@@ -43,7 +43,7 @@ class LDA(Classifier):
 
     Notes
     -----
-    From `ClassMoments` and one Cholesky factor, with pivots where features tell each other; where trials are not more
+    From `ClassMoments` and one Cholesky factor, with pivots where features are dependent; where trials are not more
     than features, from the trials' Gram matrix, the same discriminants (`GramLDA`). The covariance is the scatter over
     the trials, and discriminants equal those of scikit-learn's ``LinearDiscriminantAnalysis``.
 
@@ -98,7 +98,7 @@ class LDA(Classifier):
             raise ProblemError("x: no feature varies")
         scale = varying.astype(np.float64)
         if self.ridge == 0:
-            # Directions that are left out depend on the features' scale: that of their spread, as with few features.
+            # Which directions are left out depends on the features' scale: their spread, as with few features.
             counts = np.bincount(row)
             means = np.stack([values[row == k].mean(0) for k in range(len(counts))])
             spread = np.sqrt(np.mean((values - means[row]) ** 2, axis=0))
@@ -113,12 +113,12 @@ class LDA(Classifier):
 
     def _from_moments(self, moments: ClassMoments, shift: NDArray[np.float64] | None = None) -> Self:
         """Learn from sums over trials from which `shift` was taken off; `classes_` is the caller's to set."""
-        found = solved(moments, _ridge(self.ridge), self.priors, shift)
-        self.coef_, self.intercept_, self.rank_ = found[:3]
-        if found.rank < found.weighed:
+        solution = solved(moments, _ridge(self.ridge), self.priors, shift)
+        self.coef_, self.intercept_, self.rank_ = solution[:3]
+        if solution.rank < solution.weighed:
             warnings.warn(
-                f"LDA: features tell each other within classes, so {found.rank} of {found.weighed} directions are "
-                "weighed",
+                f"LDA: features are linearly dependent within classes, so {solution.rank} of {solution.weighed} "
+                "directions are weighed",
                 UserWarning,
                 stacklevel=3,
             )
@@ -149,10 +149,10 @@ class LDA(Classifier):
         table = feature_table(x)
         if table.shape[1] != weights.shape[1]:
             raise ProblemError(f"x has {table.shape[1]} features: it was fitted to {weights.shape[1]}")
-        found = np.empty((len(table), len(weights)))
+        scores = np.empty((len(table), len(weights)))
         for block, mine in blocks(table, None, np.float64, None):
-            found[mine] = block @ weights.T + self.intercept_
-        return found
+            scores[mine] = block @ weights.T + self.intercept_
+        return scores
 
     def predict(self, x: ArrayLike) -> NDArray[Any]:
         """Return the class of the largest discriminant, trial by trial.

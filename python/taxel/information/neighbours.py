@@ -16,7 +16,7 @@ __all__ = ["NearestNeighbours", "distances_of", "majority", "squared_distances"]
 
 
 class NearestNeighbours(Classifier):
-    """Name a trial as most of its nearest neighbours are named; of equals, as the nearer ones.
+    """Classify a trial by the majority of its nearest neighbours; on a tie, by the nearer ones.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class NearestNeighbours(Classifier):
     -----
     Thesis 5.6.3. Distances are of any kind: `taxel.metrics.pairwise`, or those of a Gram matrix (`distances_of`). Take
     one that is Euclidean over all trains; `taxel.metrics.van_rossum` of patterns sums over trains, which has no inner
-    product and names 1 to 4 % fewer rightly.
+    product and classifies 1 to 4 % fewer correctly.
 
     Examples
     --------
@@ -54,7 +54,7 @@ class NearestNeighbours(Classifier):
         whole("neighbours", self.neighbours, 1)
 
     def fit(self, distances: ArrayLike, y: ArrayLike) -> Self:
-        """Keep the labels.
+        """Store the labels of the training trials.
 
         Parameters
         ----------
@@ -122,17 +122,17 @@ def distances_of(gram: ArrayLike) -> NDArray[np.float64]:
 
 
 def squared_distances(square: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the squares of the distances that inner products tell, down to their rounding."""
+    """Return the squared distances of inner products; rounding errors may leave some below 0."""
     length = np.diag(square)
     return np.asarray(length + length[:, None] - 2 * square)
 
 
 def majority(near: NDArray[np.int64], classes: int) -> NDArray[np.int64]:
-    """Return the most frequent class of each row; of equals that whose members come first."""
+    """Return the most frequent class of each row; on a tie, the class whose members come first."""
     votes = np.zeros((len(near), classes))
     rows = np.repeat(np.arange(len(near)), near.shape[1])
     np.add.at(votes, (rows, near.ravel()), 1.0)
-    # A vote more weighs more than all places together.
+    # One vote outweighs all differences in place.
     place = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
     np.add.at(votes, (rows, near.ravel()), -place / near.shape[1])
     return np.asarray(votes.argmax(1))

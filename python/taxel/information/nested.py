@@ -1,4 +1,4 @@
-"""Each trial named by training on the other folds, with smoothing and ridge chosen inside them."""
+"""Nested cross-validation: the other folds predict each trial, with smoothing and ridge chosen inside them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RIDGES = (10.0, 1.0, 0.1)
 
 @dataclass(frozen=True, eq=False)
 class Nested:
-    """Hold what each trial was named while it was in no training set.
+    """Hold the prediction of each trial, by training sets without it.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Nested:
     chosen : dict from fold to (int, float)
         Which matrix and which ridge (or how many neighbours) that fold's training trials chose among themselves.
     missing : tuple of (fold, class)
-        Training sets without a class: they can never name it.
+        Training sets without a class, which they cannot predict.
     """
 
     responses: NDArray[np.generic]
@@ -55,7 +55,7 @@ def nested_predictions(
     neighbours: Sequence[int] = (),
     seed: int = 0,
 ) -> Nested:
-    """Name each trial by linear discriminants of the other folds, chosen among matrices and ridges inside these.
+    """Predict each trial by linear discriminants of the other folds, chosen among matrices and ridges inside these.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def nested_predictions(
         ways: _Ways = _Neighbours(squares, row, len(classes), nearest)
     else:
         ways = _Discriminants(squares, sizes, row, len(classes), levels)
-    said, chosen, missing = np.empty(trials, np.int64), {}, []
+    predicted, chosen, missing = np.empty(trials, np.int64), {}, []
     for name in range(int(fold.max()) + 1):
         test, train = np.flatnonzero(fold == name), np.flatnonzero(fold != name)
         absent = np.setdiff1d(np.arange(len(classes)), row[train])
@@ -110,11 +110,11 @@ def nested_predictions(
         if ways.count > 1:
             for part in _inside(row[train], None if belongs is None else belongs[train], inner, seed):
                 held = train[part]
-                right += (ways.named(test, held)[:, len(test) :] == row[held]).sum(1)
+                right += (ways.predict(test, held)[:, len(test) :] == row[held]).sum(1)
         best = int(right.argmax())
-        said[test] = ways.named(test, np.empty(0, np.int64), best)[0]
+        predicted[test] = ways.predict(test, np.empty(0, np.int64), best)[0]
         chosen[name] = ways.way(best)
-    return Nested(classes[said], fold, chosen, tuple(missing))
+    return Nested(classes[predicted], fold, chosen, tuple(missing))
 
 
 def training_curve(
@@ -126,7 +126,7 @@ def training_curve(
     *,
     seed: int = 0,
 ) -> list[NDArray[np.generic]]:
-    """Name all trials once more, trained on so many trials a label only.
+    """Predict all trials again, by training on only so many trials a label.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def training_curve(
     """
     squares, features = _matrices(grams, features)
     classes, row = labelled(y, len(squares[0]))
-    random, found = np.random.default_rng(whole("seed", seed, 0)), []
+    random, curve = np.random.default_rng(whole("seed", seed, 0)), []
     used = sorted(set(instance("nested", nested, Nested).chosen.values()))
     if len(nested.folds) != len(row) or any(matrix >= len(squares) for matrix, _ in used):
         raise ProblemError("nested is of other trials or matrices")
@@ -157,14 +157,14 @@ def training_curve(
         for matrix, ridge in used
     }
     for size in several("sizes", sizes):
-        said = np.empty(len(row), np.int64)
+        predicted = np.empty(len(row), np.int64)
         for name, way in nested.chosen.items():
             test, train = np.flatnonzero(nested.folds == name), np.flatnonzero(nested.folds != name)
             mixed = random.permutation(train)
-            kept = np.concatenate([mixed[row[mixed] == k][: whole("sizes", size, 1)] for k in range(len(classes))])
-            said[test] = ways[way].named(test, np.setdiff1d(train, kept))[0, : len(test)]
-        found.append(classes[said])
-    return found
+            sample = np.concatenate([mixed[row[mixed] == k][: whole("sizes", size, 1)] for k in range(len(classes))])
+            predicted[test] = ways[way].predict(test, np.setdiff1d(train, sample))[0, : len(test)]
+        curve.append(classes[predicted])
+    return curve
 
 
 def _matrices(grams: object, features: object) -> tuple[list[NDArray[np.float64]], list[int]]:
@@ -191,12 +191,12 @@ def _inside(
 
 
 class _Ways:
-    """Name trials that are left out, in every way that is to be chosen among."""
+    """The classifiers to choose among ("ways"): their predictions of trials that are left out."""
 
     count: int
 
-    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
-        """Return by way what `test` and `held` are named when both are left out; shape (ways, trials)."""
+    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+        """Return the predictions of `test` and `held` when both are left out, by way; shape (ways, trials)."""
         raise NotImplementedError
 
     def way(self, number: int) -> tuple[int, float]:
@@ -219,7 +219,7 @@ class _Discriminants(_Ways):
         self.regressions = []
         for square, size in zip(squares, features, strict=True):
             spread = float(np.trace(square) - square.mean(0).sum())
-            # Where all trials are alike only rounding is left, and must not be taken for what varies.
+            # Where all trials are alike only rounding errors remain, which are no variance.
             unit = max(spread / size, 1e-9 * float(np.trace(square)) / len(row), 1e-300)
             self.regressions += [Regression(square, which, ridge * unit) for ridge in ridges]
         self.count = len(self.regressions)
@@ -227,7 +227,7 @@ class _Discriminants(_Ways):
     def way(self, number: int) -> tuple[int, float]:
         return number // len(self.ridges), float(self.ridges[number % len(self.ridges)])
 
-    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
         ways = self.regressions if only is None else [self.regressions[only]]
         return left_out(ways, np.concatenate([test, held]))
 
@@ -243,14 +243,14 @@ class _Neighbours(_Ways):
     def way(self, number: int) -> tuple[int, float]:
         return number // len(self.nearest), float(self.nearest[number % len(self.nearest)])
 
-    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
         out = np.concatenate([test, held])
-        kept = np.ones(len(self.row), bool)
-        kept[out] = False
+        training = np.ones(len(self.row), bool)
+        training[out] = False
         ways = range(self.count) if only is None else [only]
-        found = np.empty((len(ways), len(out)), np.int64)
+        predicted = np.empty((len(ways), len(out)), np.int64)
         for k, number in enumerate(ways):
             order = self.order[number // len(self.nearest)][out]
-            near = order[kept[order]].reshape(len(out), -1)[:, : self.nearest[number % len(self.nearest)]]
-            found[k] = majority(self.row[near], self.classes)
-        return found
+            near = order[training[order]].reshape(len(out), -1)[:, : self.nearest[number % len(self.nearest)]]
+            predicted[k] = majority(self.row[near], self.classes)
+        return predicted

@@ -17,14 +17,14 @@ __all__ = ["ClassMoments", "Primal", "blocks", "feature_table", "is_exact", "sol
 _ROWS = 2048
 #: Whole numbers up to this size are exact in float32.
 _EXACT = 2**24
-#: Below this share of its variance that is its own, a feature is told by the others: scatter counts as singular.
+#: A feature with a smaller share of variance of its own counts as dependent on the others: the scatter is singular.
 _SINGULAR = 1e-10
-#: Above it all others that are kept must lie, or eigenvectors decide what is told.
+#: The pivots of all other features must lie above it; else eigenvectors decide which features are dependent.
 _CLEAR = 1e-6
 
 
 class ClassMoments:
-    """Hold counts, sums and the scatter of trials by class: all that a linear discriminant asks for.
+    """Hold counts, sums and the scatter of trials by class: all that a linear discriminant needs.
 
     Moments add and subtract, so those of a training set are the whole less the fold that is tested.
 
@@ -219,20 +219,20 @@ def _where_classes_vary(
 ) -> tuple[NDArray[np.float64], int]:
     """Solve by the pseudo-inverse of a singular scatter (lower triangle), and return in how many directions.
 
-    Spikes of an array tell each other exactly: one factor with pivots finds which (a tenth of an eigendecomposition's
-    time). Where what is told is not parted clearly from what is not, eigenvectors decide.
+    Spikes of an array are exactly dependent: one factor with pivots finds which (in a tenth of an eigendecomposition's
+    time). Where the rank is not clear, eigenvectors decide.
     """
     where = np.flatnonzero(weighed)
     square = np.asfortranarray(square[np.ix_(where, where)])
-    found = _by_pivots(square, right[where])
-    values, rank = _by_eigenvectors(square, right[where]) if found is None else found
+    solution = _by_pivots(square, right[where])
+    values, rank = _by_eigenvectors(square, right[where]) if solution is None else solution
     solved = np.zeros_like(right)
     solved[where] = values
     return solved, rank
 
 
 def _by_pivots(square: NDArray[np.float64], right: NDArray[np.float64]) -> tuple[NDArray[np.float64], int] | None:
-    """Solve by a Cholesky factor with pivots and the null space that it tells; None where the rank is not clear.
+    """Solve by a Cholesky factor with pivots and the null space that it gives; None where the rank is not clear.
 
     With features in the order of pivots the factor is [L1; L2], and the columns of [-inv(L1') L2'; 1] span the
     directions in which no class varies. What lies in these is taken off the right side and off a solution.
@@ -244,19 +244,19 @@ def _by_pivots(square: NDArray[np.float64], right: NDArray[np.float64]) -> tuple
         return None
     order = pivots - 1
     upper = np.asfortranarray(factor[:rank, :rank])
-    told = -blas.dtrsm(1.0, upper, np.asfortranarray(factor[rank:, :rank].T), lower=1, trans_a=1)
-    gram, fault = lapack.dpotrf(np.eye(told.shape[1]) + told.T @ told, lower=1)
+    dependence = -blas.dtrsm(1.0, upper, np.asfortranarray(factor[rank:, :rank].T), lower=1, trans_a=1)
+    gram, fault = lapack.dpotrf(np.eye(dependence.shape[1]) + dependence.T @ dependence, lower=1)
     if fault != 0:
         return None
 
-    def without_told(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        along = lapack.dpotrs(gram, told.T @ values[:rank] + values[rank:], lower=1)[0]
-        return np.concatenate((values[:rank] - told @ along, values[rank:] - along))
+    def without_dependence(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        along = lapack.dpotrs(gram, dependence.T @ values[:rank] + values[rank:], lower=1)[0]
+        return np.concatenate((values[:rank] - dependence @ along, values[rank:] - along))
 
     basic = np.zeros_like(right)
-    basic[:rank] = lapack.dpotrs(upper, without_told(right[order])[:rank], lower=1)[0]
+    basic[:rank] = lapack.dpotrs(upper, without_dependence(right[order])[:rank], lower=1)[0]
     solved = np.empty_like(right)
-    solved[order] = without_told(basic)
+    solved[order] = without_dependence(basic)
     return solved, int(rank)
 
 
@@ -265,9 +265,9 @@ def _by_eigenvectors(square: NDArray[np.float64], right: NDArray[np.float64]) ->
     from scipy.linalg import eigh  # noqa: PLC0415  loads slowly
 
     values, vectors = eigh(square, lower=True)
-    kept = values > _SINGULAR * values[-1]
-    vectors = vectors[:, kept]
-    return vectors @ ((vectors.T @ right) / values[kept, None]), int(kept.sum())
+    varying = values > _SINGULAR * values[-1]
+    vectors = vectors[:, varying]
+    return vectors @ ((vectors.T @ right) / values[varying, None]), int(varying.sum())
 
 
 def is_exact(table: NDArray[Any]) -> bool:

@@ -1,4 +1,4 @@
-"""What is asked of labelled trials: their labels, contacts and windows, and the settings that are compared."""
+"""The settings that an analysis compares, and the labels, contacts and windows of its trials."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import number, several, shown, whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.frames import Frames
@@ -38,7 +39,7 @@ _STEPS = (1, 2, 5)
 
 @dataclass(eq=False)
 class Question:
-    """Labelled trials, and the settings at which they are asked for their information."""
+    """Labelled trials, and the settings at which their information is estimated."""
 
     trials: list[LabelledTrial]
     encoder: Encoder | None
@@ -102,7 +103,7 @@ class Question:
         if np.isfinite(reach) and (lengths < self.window_us).any():
             short = int((lengths < self.window_us).sum())
             self.notes.append(
-                f"{short} trials end before {to_ms(self.window_us):g} ms: what comes late may tell their length"
+                f"{counted(short, 'trial')} shorter than {to_ms(self.window_us):g} ms: late events may tell the length"
             )
 
     def set_out(
@@ -119,23 +120,23 @@ class Question:
         window = self.window_us
         if periods_ms is None:
             least = max(self.finest, window / 500)
-            found = [p for p in _series(least, window / 5) if p >= least]
-            self.periods = checked_periods([*([self.finest] if self.finest >= least else []), *found], self.finest)
+            coarser = [p for p in _series(least, window / 5) if p >= least]
+            self.periods = checked_periods([*([self.finest] if self.finest >= least else []), *coarser], self.finest)
             self.periods = self.periods[:7]
         else:
-            given = [to_us(number("periods_ms", p)) for p in several("periods_ms", periods_ms)]
-            if any(not 0 < p <= window or abs(p - round(p)) > 1e-6 for p in given):
+            chosen = [to_us(number("periods_ms", p)) for p in several("periods_ms", periods_ms)]
+            if any(not 0 < p <= window or abs(p - round(p)) > 1e-6 for p in chosen):
                 raise ProblemError(f"periods_ms is {shown(periods_ms)}: must be whole us, up to {to_ms(window):g} ms")
-            self.periods = checked_periods([round(p) for p in given], self.finest)
+            self.periods = checked_periods([round(p) for p in chosen], self.finest)
         if windows_ms is None:
             self.windows = [*[float(w) for w in _series(max(window / 40, self.finest), window * 0.99)], window]
         else:
-            wanted = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
-            if any(not self.finest <= w <= window for w in wanted):
+            chosen_windows = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
+            if any(not self.finest <= w <= window for w in chosen_windows):
                 raise ProblemError(
                     f"windows_ms is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
                 )
-            self.windows = sorted({*wanted, window})
+            self.windows = sorted({*chosen_windows, window})
         self.taxels_at = self.periods[0]
         if taxels_at_ms is not None:
             at = to_us(number("taxels_at_ms", taxels_at_ms))
@@ -154,19 +155,19 @@ class Question:
         if pools is not None and any(n > max(rows, columns) for n in sides):
             raise ProblemError(f"pools is {shown(pools)}: the array is {rows} x {columns}")
         self.pools = [n for n in sides if n <= max(rows, columns)]
-        self.columns = self._asked_like_labels()
+        self.columns = self._parameter_columns()
         settings = len(self.random_taxels) + len(self.pools)
         self.steps = self.draws * (len(self.periods) * (2 + len(self.columns)) + settings) + shuffles + classifiers + 8
 
     def tell(self, what: str, steps: int = 1) -> None:
-        """Report what is done next, so many steps on."""
+        """Report the next piece of work, and count the steps that are done."""
         self.done += steps
         if self.progress is not None:
             self.progress(what, min(self.done, self.steps), self.steps)
 
     def spikes(self, period: int, draw: int, pool: int = 1) -> Spikes:
         """Return the spikes of all trials at a period (us), in one draw of the sampling phases."""
-        assert self.encoder is not None  # set where it was left out
+        assert self.encoder is not None  # the constructor has set the default
         return spikes_of(
             self.trials,
             self.held,
@@ -181,7 +182,7 @@ class Question:
     def nested(
         self, grams: list[NDArray[np.float64]], sizes: list[int], y: Any = None, draw: int = 0, **ways: Any
     ) -> Nested:
-        """Return what the trials are named in nested folds; `y` are other labels than the question's."""
+        """Return the predictions for all trials in nested folds; `y` replaces the question's labels."""
         labels = self.labels if y is None else y
         return nested_predictions(
             grams, sizes, labels, groups=self.groups, count=self.folds, seed=self.seed + draw, **ways
@@ -198,11 +199,11 @@ class Question:
         taus = [tau for tau in taus if tau == 0 or to_us(tau) > spikes.period_us / 2]
         return [list(one) for one in zip(*(event_grams(spikes, windows, tau) for tau in taus), strict=True)]
 
-    def _asked_like_labels(self) -> dict[str, NDArray[np.generic]]:
-        """Return the columns that can be asked for like labels; the others are named in the notes."""
+    def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
+        """Return the columns of parameters that can stand in for the labels; the notes name the others."""
         from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
 
-        found = {}
+        columns = {}
         for name in self.trials[0].parameters:
             column = np.array([one.parameters.get(name, "") for one in self.trials])
             if (column == self.labels).all():
@@ -216,12 +217,12 @@ class Question:
             except ProblemError as error:
                 self.notes.append(f"parameter {name} is left out: {error}")
                 continue
-            found[name] = column
-        return found
+            columns[name] = column
+        return columns
 
 
 def floor_of(trials: Sequence[LabelledTrial]) -> float:
-    """Return the change that counts where nobody says: 3 ticks, a step, else a 40th of the largest value."""
+    """Return the default floor (the largest change without an event): 3 ticks, a step, else a 40th of the maximum."""
     first = trials[0].source
     if not isinstance(first, Frames):
         return 3.0 if first.intensity is not None else 0.5
@@ -236,5 +237,5 @@ def floor_of(trials: Sequence[LabelledTrial]) -> float:
 
 def _series(least: float, most: float) -> list[int]:
     """Return whole us in steps of 1, 2, 5 within limits."""
-    found = [step * 10**power for power in range(10) for step in _STEPS]
-    return [one for one in found if least <= one <= most]
+    steps = [step * 10**power for power in range(10) for step in _STEPS]
+    return [one for one in steps if least <= one <= most]

@@ -70,20 +70,20 @@ def frame_grams(values: NDArray[np.float32], spikes: Spikes, windows_us: Sequenc
 
 def features(spikes: Spikes, window_us: float) -> int:
     """Return how many pairs of taxel and bin hold an event in any trial, one at least."""
-    kept = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
-    return max(1, len(np.unique(spikes.taxel[kept] * (int(spikes.bin.max(initial=0)) + 1) + spikes.bin[kept])))
+    inside = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
+    return max(1, len(np.unique(spikes.taxel[inside] * (int(spikes.bin.max(initial=0)) + 1) + spikes.bin[inside])))
 
 
 class _Sums:
     """Sum up the inner products of all trials, bin by bin, to several windows at once."""
 
     def __init__(self, spikes: Spikes, windows_us: Sequence[float]) -> None:
-        # A silent trial adds nothing wherever it ends, so it ends last.
+        # A silent trial adds nothing, so its end may be the last of all.
         silent = ~np.isfinite(spikes.first_us)
         ends = [spikes.bins_to(window) for window in windows_us]
         self._ends = [np.where(silent, end.max(initial=0), end) for end in ends]
         self._common = np.zeros((spikes.trials, spikes.trials))
-        # A window goes on from the common sum until a trial has left it, then by itself.
+        # Windows share one sum until the first trial ends within one of them; that window then has a sum of its own.
         self._own: list[NDArray[np.float64] | None] = [None] * len(ends)
         self._bin = 0
         #: How many bins there are to the last window.

@@ -1,4 +1,4 @@
-"""What a sensor that samples more slowly would have seen: held values at its own times, and the events among them."""
+"""Slower sampling of recorded trials: held values at other times, and the events between them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from taxel.spikes import to_ms, to_us
 
 __all__ = ["STEP_US", "HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "pictures_of", "spikes_of"]
 
-#: No touch's beginning is looked for more finely on a grid, us.
+#: The finest grid on which a touch's beginning is searched, us.
 STEP_US = 100
 
 
@@ -64,7 +64,7 @@ class HeldValues:
 
 @dataclass(frozen=True, eq=False)
 class Spikes:
-    """Hold the events of all trials as one period and one draw of its phase sees them.
+    """Hold the events of all trials, sampled at one period and one draw of its phases.
 
     Attributes
     ----------
@@ -106,15 +106,15 @@ class Spikes:
 
     def counts(self, window_us: float) -> NDArray[np.int64]:
         """Return each trial's events within a window after the contact."""
-        kept = self.bin < self.bins_to(window_us)[self.trial]
-        return np.bincount(self.trial[kept], minlength=self.trials)
+        inside = self.bin < self.bins_to(window_us)[self.trial]
+        return np.bincount(self.trial[inside], minlength=self.trials)
 
     def of(self, taxels: NDArray[np.int64]) -> Spikes:
         """Return the events of some taxels alone, aligned on the first of theirs."""
         place = np.full(self.taxels, -1)
         place[taxels] = np.arange(len(taxels))
-        kept = np.flatnonzero(place[self.taxel] >= 0)
-        trial, bins = self.trial[kept], self.bin[kept]
+        chosen = np.flatnonzero(place[self.taxel] >= 0)
+        trial, bins = self.trial[chosen], self.bin[chosen]
         begin = np.full(self.trials, np.iinfo(np.int64).max)
         np.minimum.at(begin, trial, bins)
         silent = begin == np.iinfo(np.int64).max
@@ -123,9 +123,9 @@ class Spikes:
             self.period_us,
             len(taxels),
             trial,
-            place[self.taxel[kept]],
+            place[self.taxel[chosen]],
             bins - begin[trial],
-            self.value[kept],
+            self.value[chosen],
             first,
             self.length_us,
         )
@@ -143,9 +143,9 @@ def contacts(
 ) -> NDArray[np.float64]:
     """Return when each touch begins, us: the first event at or after its start at the finest period; NaN without one.
 
-    It is looked for until the trial's end, or for the length of a window; in events at their own times.
+    The search ends at the trial's end, or after the length of a window; events are searched at their own times.
     """
-    found = np.full(len(trials), np.nan)
+    onsets = np.full(len(trials), np.nan)
     for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
         stop = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
         t, step = trial.source.t, max(period_us, STEP_US)
@@ -155,8 +155,8 @@ def contacts(
             grid = np.arange(trial.start_us - step, int(stop), step)
         bins, _, _ = _encoded(encoder, values, grid, step)
         if len(bins):
-            found[k] = grid[bins.min()]
-    return found
+            onsets[k] = grid[bins.min()]
+    return onsets
 
 
 def spikes_of(
@@ -170,7 +170,7 @@ def spikes_of(
     random: np.random.Generator,
     pool: int = 1,
 ) -> Spikes:
-    """Sample all trials at one period, each at a phase that is drawn, and encode what is seen.
+    """Sample all trials at one period, each at a phase that is drawn, and encode the samples.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def spikes_of(
     random : numpy.random.Generator
         Of the phases.
     pool : int
-        Taxels of so many by so many are taken for one, which holds their mean.
+        Squares of so many by so many taxels are averaged into one.
 
     Returns
     -------
@@ -232,7 +232,7 @@ def pictures_of(
     contact_us: NDArray[np.float64],
     bins: int,
 ) -> NDArray[np.float32]:
-    """Return what a sensor of pictures would have seen at the same times: the change since before the touch.
+    """Return pictures at the same times as the events: the change since before the touch.
 
     Parameters
     ----------
@@ -246,13 +246,13 @@ def pictures_of(
     float32, shape (bins, trials, taxels that ever send an event)
     """
     active = np.unique(spikes.taxel)
-    found = np.zeros((bins, len(trials), len(active)), np.float32)
+    changes = np.zeros((bins, len(trials), len(active)), np.float32)
     for k, values in enumerate(held):
         if np.isfinite(spikes.first_us[k]):
             zero = int(contact_us[k] + spikes.first_us[k])
-            seen = values.at(zero + spikes.period_us * np.arange(-1, bins))[:, active]
-            found[:, k] = seen[1:] - seen[0]
-    return found
+            pictures = values.at(zero + spikes.period_us * np.arange(-1, bins))[:, active]
+            changes[:, k] = pictures[1:] - pictures[0]
+    return changes
 
 
 def _encoded(
@@ -262,7 +262,7 @@ def _encoded(
     period_us: int,
     pooled: tuple[NDArray[np.int64], int, NDArray[np.float64]] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
-    """Return bin, taxel and value of what an encoder says of the values held on a grid of times."""
+    """Return bin, taxel and value of the events that an encoder makes of the values held at a grid of times."""
     values = held.at(grid)
     if pooled is not None:
         where, count, share = pooled
@@ -296,11 +296,11 @@ def _pooling(held: HeldValues, pool: int) -> tuple[NDArray[np.int64], int, NDArr
 
 def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:
     """Return the periods, ascending; refuse one that is finer than the recording."""
-    found = sorted(set(periods_us))
-    if not found:
+    periods = sorted(set(periods_us))
+    if not periods:
         raise ProblemError("periods is []: must name one at least")
-    if found[0] < finest:
+    if periods[0] < finest:
         raise ProblemError(
-            f"period {to_ms(found[0]):g} ms is finer than the recordings, which show {to_ms(finest):g} ms at best"
+            f"period {to_ms(periods[0]):g} ms is finer than the recordings, which show {to_ms(finest):g} ms at best"
         )
-    return found
+    return periods

@@ -1,4 +1,4 @@
-"""Spiking neurons as classifiers: one a class, the one that is driven highest names the trial."""
+"""Spiking neurons as classifiers, one a class: the class of the highest potential is predicted."""
 
 from __future__ import annotations
 
@@ -19,7 +19,74 @@ from taxel.spikes import SpikeTrains, to_ms
 __all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
 
 
-class ConeRReadout(Classifier):
+class _NeuronAClass(Classifier):
+    """Classify by a neuron a class: the one whose potential comes highest names the trial."""
+
+    learners_: list[Any]
+
+    def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
+        """Train a neuron a class.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains and window in each.
+        y : labels, shape (patterns,)
+
+        Raises
+        ------
+        ProblemError : patterns or labels that make no sense
+        """
+        trains = _listed(patterns)
+        self.classes_, row = labelled(y, len(trains))
+        self.learners_ = []
+        for k in range(len(self.classes_)):
+            self.learners_.append(self._taught(trains, row == k))
+        return self
+
+    def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
+        """Return the potential of each class' neuron that is compared, mV, shape (patterns, classes).
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that make no sense
+        """
+        learners = self._fitted("learners_")
+        trains = _listed(patterns)
+        return np.array([[self._potential(one, s) for one in learners] for s in trains]).reshape(
+            len(trains), len(learners)
+        )
+
+    def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
+        """Return a label a pattern.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+
+        Returns
+        -------
+        shape (patterns,), of the kind of the labels
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that make no sense
+        """
+        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
+
+    def _taught(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> Any:
+        """Return a learner of one class, which names its own patterns."""
+        raise NotImplementedError
+
+    def _potential(self, learner: Any, trains: SpikeTrains) -> float:
+        raise NotImplementedError
+
+
+class ConeRReadout(_NeuronAClass):
     """Classify by a neuron a class, which `ConeR` teaches to fire at the window's end on its own class and never else.
 
     Parameters
@@ -42,7 +109,7 @@ class ConeRReadout(Classifier):
 
     Notes
     -----
-    Thesis 6.3.3. The class whose neuron's potential comes highest at the window's end is named.
+    Thesis 6.3.3. The class whose neuron's potential is highest at the window's end is predicted.
     """
 
     learners_: list[ConeR]
@@ -58,65 +125,17 @@ class ConeRReadout(Classifier):
             if not 0 < number(name, getattr(self, name)) < np.inf:
                 raise ProblemError(f"{name} is {shown(getattr(self, name))}: must be above 0, and finite")
 
-    def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
-        """Train a neuron a class.
+    def _taught(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> ConeR:
+        targets = [[one.stop] if mine else [] for one, mine in zip(trains, own, strict=True)]
+        neuron = Neuron(tau=self.tau, after_spike="keep", step_ms=1.0)
+        learner = ConeR(neuron=neuron, lb=-self.bound, ub=self.bound, max_seconds=self.max_seconds)
+        return learner.fit(trains, targets)
 
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-            The same trains and window in each.
-        y : labels, shape (patterns,)
-
-        Raises
-        ------
-        ProblemError : patterns or labels that make no sense
-        """
-        trains = _listed(patterns)
-        self.classes_, row = labelled(y, len(trains))
-        self.learners_ = []
-        for k in range(len(self.classes_)):
-            targets = [[one.stop] if mine == k else [] for one, mine in zip(trains, row, strict=True)]
-            neuron = Neuron(tau=self.tau, after_spike="keep", step_ms=1.0)
-            learner = ConeR(neuron=neuron, lb=-self.bound, ub=self.bound, max_seconds=self.max_seconds)
-            self.learners_.append(learner.fit(trains, targets))
-        return self
-
-    def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
-        """Return each class' potential at the window's end, mV, shape (patterns, classes).
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-
-        Raises
-        ------
-        ProblemError : not fitted, or patterns that make no sense
-        """
-        learners = self._fitted("learners_")
-        trains = _listed(patterns)
-        return np.array(
-            [[one.neuron_.potential(one.weights_, s, [s.stop])[0] for one in learners] for s in trains]
-        ).reshape(len(trains), len(learners))
-
-    def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
-        """Return a label a pattern.
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-
-        Returns
-        -------
-        shape (patterns,), of the kind of the labels
-
-        Raises
-        ------
-        ProblemError : not fitted, or patterns that make no sense
-        """
-        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
+    def _potential(self, learner: ConeR, trains: SpikeTrains) -> float:
+        return float(learner.neuron_.potential(learner.weights_, trains, [trains.stop])[0])
 
 
-class TempotronReadout(Classifier):
+class TempotronReadout(_NeuronAClass):
     """Classify by a `Tempotron` a class, taught to fire on its own class and on no other.
 
     Parameters
@@ -138,7 +157,7 @@ class TempotronReadout(Classifier):
 
     Notes
     -----
-    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is named.
+    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is predicted.
     """
 
     learners_: list[Tempotron]
@@ -156,58 +175,11 @@ class TempotronReadout(Classifier):
     def _learner(self) -> Tempotron:
         return Tempotron(tau=self.tau, epochs=self.epochs, max_seconds=self.max_seconds, seed=self.seed)
 
-    def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
-        """Train a neuron a class.
+    def _taught(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> Tempotron:
+        return self._learner().fit(trains, own)
 
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-        y : labels, shape (patterns,)
-
-        Raises
-        ------
-        ProblemError : patterns or labels that make no sense
-        """
-        trains = _listed(patterns)
-        self.classes_, row = labelled(y, len(trains))
-        self.learners_ = []
-        for k in range(len(self.classes_)):
-            self.learners_.append(self._learner().fit(trains, row == k))
-        return self
-
-    def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
-        """Return each class' highest potential, shape (patterns, classes).
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-
-        Raises
-        ------
-        ProblemError : not fitted, or patterns that make no sense
-        """
-        learners = self._fitted("learners_")
-        trains = _listed(patterns)
-        return np.array([[one.peak(one.weights_, s)[0] for one in learners] for s in trains]).reshape(
-            len(trains), len(learners)
-        )
-
-    def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
-        """Return a label a pattern.
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-
-        Returns
-        -------
-        shape (patterns,), of the kind of the labels
-
-        Raises
-        ------
-        ProblemError : not fitted, or patterns that make no sense
-        """
-        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
+    def _potential(self, learner: Tempotron, trains: SpikeTrains) -> float:
+        return learner.peak(learner.weights_, trains)[0]
 
 
 def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
@@ -223,24 +195,24 @@ def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
     list of SpikeTrains
         Time 0 is the trial's first event.
     """
-    kept = np.flatnonzero(spikes.bin < spikes.bins_to(window_us)[spikes.trial])
-    sign = (spikes.value[kept] < 0).astype(np.int64)
-    active, train = np.unique(2 * spikes.taxel[kept] + sign, return_inverse=True)
-    trial, times = spikes.trial[kept], spikes.bin[kept] * (to_ms(spikes.period_us))
+    inside = np.flatnonzero(spikes.bin < spikes.bins_to(window_us)[spikes.trial])
+    sign = (spikes.value[inside] < 0).astype(np.int64)
+    active, train = np.unique(2 * spikes.taxel[inside] + sign, return_inverse=True)
+    trial, times = spikes.trial[inside], spikes.bin[inside] * (to_ms(spikes.period_us))
     order = np.lexsort((times, train, trial))
     key = trial[order] * len(active) + train[order]
     offsets = np.searchsorted(key, np.arange(spikes.trials * len(active) + 1))
-    times, found = times[order], []
+    times, patterns = times[order], []
     for k in range(spikes.trials):
         own = offsets[k * len(active) : (k + 1) * len(active) + 1]
-        found.append(SpikeTrains(times[own[0] : own[-1]], own - own[0], 0.0, to_ms(window_us)))
-    return found
+        patterns.append(SpikeTrains(times[own[0] : own[-1]], own - own[0], 0.0, to_ms(window_us)))
+    return patterns
 
 
 def readout_responses(
     name: str, spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
 ) -> NDArray[np.generic]:
-    """Name each trial by neurons that were trained on the other folds.
+    """Predict each trial's label by neurons that were trained on the other folds.
 
     Parameters
     ----------
@@ -256,15 +228,15 @@ def readout_responses(
     """
     text("name", name, ("cone_r", "tempotron"))
     patterns = patterns_of(spikes, window_us)
-    found = np.empty_like(labels)
-    # Far shorter, and at the window's end nothing would be left of its beginning.
+    responses = np.empty_like(labels)
+    # With a far shorter constant the potential at the window's end would hold nothing of its beginning.
     tau = max(1.0, to_ms(window_us) / 3)
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
         model: Any = ConeRReadout(tau=tau) if name == "cone_r" else TempotronReadout(tau=tau)
         model.fit([patterns[k] for k in train], labels[train])
-        found[test] = model.predict([patterns[k] for k in test])
-    return found
+        responses[test] = model.predict([patterns[k] for k in test])
+    return responses
 
 
 def _listed(patterns: object) -> list[SpikeTrains]:

@@ -1,4 +1,4 @@
-"""Trials: stretches of recordings, each with a label, and what is known of it."""
+"""Trials: labelled stretches of recordings, with their groups and parameters."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _KNOWN = (*_COLUMNS, "stop_us", "group", "host_ns")
 
 @dataclass(frozen=True, eq=False)
 class LabelledTrial:
-    """Hold one trial: where it lies, what it is called, what it belongs to.
+    """Hold one trial: a stretch of a recording, its label and its group.
 
     Its label is that of the whole stretch, which a classifier tells from others; a `taxel.detect.Example` has the times
     of labelled events, at which a neuron learns to fire.
@@ -42,7 +42,7 @@ class LabelledTrial:
     start_us : int, us
         The touch begins at the first event at or after it.
     stop_us : int, us, optional
-        The trial's end (exclusive): nothing after it is looked at, and how long the touch was is known.
+        The trial's end (exclusive): nothing after it is used, and the length of the touch is known.
     group : str
         What must not be split between folds (person, session, pose); every trial by itself where it is empty.
     parameters : mapping of str to str
@@ -118,10 +118,10 @@ def read_trials(
     place = Path(path("table", table))
     opened = _once(recordings)
     window_us = 0 if window_ms is None else _window_us(window_ms)
-    by_name = _named(opened)
+    by_name = _by_unique_name(opened)
     rows = _rows(place, opened)
-    named = {row["recording"] for _, row in rows}
-    strange = sorted(named - set(by_name))
+    names = {row["recording"] for _, row in rows}
+    strange = sorted(names - set(by_name))
     if strange:
         line = next(line for line, row in rows if row["recording"] == strange[0])
         alike = [str(one.path) for one in opened if strange[0] in (one.name, _stem(one))]
@@ -132,21 +132,21 @@ def read_trials(
         there = sorted({one.name for one in opened})
         listed = ", ".join(there[:5]) + (" ..." if len(there) > 5 else "")
         raise ProblemError(f"{place}, line {line}: recording {strange[0]!r} is not among those given: {listed}")
-    unsaid = [one.path for one in opened if not {str(one.path), one.name, _stem(one)} & named]
-    if unsaid:
-        raise ProblemError(f"{place}: says nothing of {unsaid[0]}; name it, or leave the recording out")
+    unnamed = [one.path for one in opened if not {str(one.path), one.name, _stem(one)} & names]
+    if unnamed:
+        raise ProblemError(f"{place}: says nothing of {unnamed[0]}; name it, or leave the recording out")
     sources = {id(one): _source(one) for one in opened}
     spans = {key: _span(source) for key, source in sources.items()}
     clocks = {id(one): one.clock for one in opened} if any(row.get("host_ns") for _, row in rows) else {}
-    found = []
+    trials = []
     for line, row in rows:
         one = by_name[row["recording"]]
         source = sources[id(one)]
         where = f"{place}, line {line}"
-        told, host_ns = (_whole(where, name, row[name]) if row.get(name) else None for name in ("stop_us", "host_ns"))
+        end, host_ns = (_whole(where, name, row[name]) if row.get(name) else None for name in ("stop_us", "host_ns"))
         start = _whole(where, "t_us", row["t_us"])
         ahead = ahead_us(Note(row["label"], start, host_ns or 0), one.path, clocks.get(id(one)), place)
-        start, stop = start - ahead, None if told is None else told - ahead
+        start, stop = start - ahead, None if end is None else end - ahead
         if stop is None and window_ms is None:
             raise ProblemError(f"{where}: has no stop_us; give it, or the trials' length by --window-ms")
         if not row["label"]:
@@ -154,13 +154,13 @@ def read_trials(
         if row["label"].lower() == "nan":
             raise FormatError(f"{where}: label is {row['label']!r}, as tables write what is missing; name it otherwise")
         more = {name: cell for name, cell in row.items() if name not in _KNOWN}
-        found.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
-        _inside(found[-1], one.name, spans[id(one)], window_us)
-    if any(trial.group for trial in found) and not all(trial.group for trial in found):
-        nameless = next(trial for trial in found if not trial.group)
+        trials.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
+        _inside(trials[-1], one.name, spans[id(one)], window_us)
+    if any(trial.group for trial in trials) and not all(trial.group for trial in trials):
+        nameless = next(trial for trial in trials if not trial.group)
         raise ProblemError(f"{nameless.name}: group is empty; give every trial one, or none")
-    _apart(found, window_us)
-    return found
+    _apart(trials, window_us)
+    return trials
 
 
 def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> list[LabelledTrial]:
@@ -183,7 +183,7 @@ def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> lis
         one inside another's window
     """
     window_us = _window_us(window_ms)
-    found = []
+    trials = []
     for one in _once(recordings):
         source = _source(one)
         span = _span(source)
@@ -191,10 +191,10 @@ def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> lis
         if not notes:
             raise ProblemError(f"{one.path}: has no notes; leave it out, or give a table of trials")
         for start, label in notes:
-            found.append(LabelledTrial(source, label, start, name=f"{one.path}, note at {start} us"))
-            _inside(found[-1], one.name, span, window_us)
-    _apart(found, window_us)
-    return found
+            trials.append(LabelledTrial(source, label, start, name=f"{one.path}, note at {start} us"))
+            _inside(trials[-1], one.name, span, window_us)
+    _apart(trials, window_us)
+    return trials
 
 
 def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | None = None) -> list[LabelledTrial]:
@@ -214,7 +214,7 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
     ------
     ProblemError : a recording without anything in it, or one that is there twice
     """
-    found = []
+    trials = []
     for one in _once(recordings):
         source = _source(one)
         span = _span(source)
@@ -222,8 +222,8 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
             raise ProblemError(f"{one.path}: holds nothing; leave it out")
         start, stop = span[0], span[1] + 1
         label = one.path.resolve().parent.name
-        found.append(LabelledTrial(source, label, start, None if window_ms is not None else stop, name=str(one.path)))
-    return found
+        trials.append(LabelledTrial(source, label, start, None if window_ms is not None else stop, name=str(one.path)))
+    return trials
 
 
 def _once(recordings: Sequence[Recording]) -> list[Recording]:
@@ -281,13 +281,13 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
                 )
 
 
-def _named(recordings: Sequence[Recording]) -> dict[str, Recording]:
+def _by_unique_name(recordings: Sequence[Recording]) -> dict[str, Recording]:
     """Return recordings by path, and by name and stem where only one has it."""
-    found: dict[str, Recording] = {}
+    by_name: dict[str, Recording] = {}
     for names in ([_stem(one) for one in recordings], [one.name for one in recordings]):
         count = Counter(names)
-        found |= {name: one for name, one in zip(names, recordings, strict=True) if count[name] == 1}
-    return found | {str(one.path): one for one in recordings}
+        by_name |= {name: one for name, one in zip(names, recordings, strict=True) if count[name] == 1}
+    return by_name | {str(one.path): one for one in recordings}
 
 
 def _stem(recording: Recording) -> str:

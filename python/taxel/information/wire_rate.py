@@ -9,7 +9,7 @@ from taxel.information.sampling import Spikes
 
 __all__ = ["WIRE", "kilobits_per_second"]
 
-#: What the rates are of, to stand beside them.
+#: What the rates refer to, printed beside them.
 WIRE = (
     "wire version 2: 2 bytes an event (kind 0), 4 with a value (kind 2); a datagram for each time at which something "
     "changed, 24 bytes of its own, nothing held back; UDP and IP would add 28 a datagram; promises, states and totals "
@@ -37,10 +37,10 @@ def kilobits_per_second(spikes: Spikes, window_us: float, *, values: bool) -> fl
     -----
     Up to 32 767 places an event is one word, so its size does not depend on where it lies.
     """
-    kept = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
+    inside = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
     word = 4 if values else 2
     at_once: NDArray[np.int64] = np.unique(
-        np.stack([spikes.trial[kept], spikes.bin[kept]]), axis=1, return_counts=True
+        np.stack([spikes.trial[inside], spikes.bin[inside]]), axis=1, return_counts=True
     )[1]
     datagrams = np.ceil(at_once * word / (_MOST_BYTES - _OWN_BYTES)).sum()
     touched = np.minimum(window_us, spikes.length_us).sum()

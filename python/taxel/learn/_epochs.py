@@ -118,8 +118,8 @@ class EpochLearner(SpikeLearner):
         NotFittedError : before `fit`
         """
         rule, weights = self._json(), self._fitted()
-        given = enumerate(several("patterns", patterns))
-        return [_core.run_rival(rule, weights, instance(f"pattern {p}", s, SpikeTrains)._parts()) for p, s in given]
+        numbered = enumerate(several("patterns", patterns))
+        return [_core.run_rival(rule, weights, instance(f"pattern {p}", s, SpikeTrains)._parts()) for p, s in numbered]
 
     def change(
         self, weights: ArrayLike, pattern: SpikeTrains, targets: ArrayLike

@@ -63,8 +63,8 @@ class SpikeLearner(Learner, ABC):
         ProblemError : patterns or targets that make no sense
         NotFittedError : before `fit`
         """
-        _, wanted = examples(patterns, targets)
-        return f1(self.predict(patterns), wanted, window_ms=window_ms)
+        _, target_times = examples(patterns, targets)
+        return f1(self.predict(patterns), target_times, window_ms=window_ms)
 
 
 def predicted(learner: Any, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
@@ -74,5 +74,5 @@ def predicted(learner: Any, patterns: Sequence[SpikeTrains]) -> list[NDArray[flo
         raise ProblemError(
             "the fit is infeasible: no weights meet its targets (status_, certificate_), so none can be run"
         )
-    given = enumerate(several("patterns", patterns))
-    return [learner.neuron_.run(weights, instance(f"pattern {p}", one, SpikeTrains)) for p, one in given]
+    numbered = enumerate(several("patterns", patterns))
+    return [learner.neuron_.run(weights, instance(f"pattern {p}", one, SpikeTrains)) for p, one in numbered]

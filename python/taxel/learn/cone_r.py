@@ -369,17 +369,17 @@ def _counted(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64
         return None
     cone._check()
     plain = cone._plain()
-    wanted = np.logical_or.reduce([np.diff(parts[1]) > 0 for parts in trains])
+    counted = np.logical_or.reduce([np.diff(parts[1]) > 0 for parts in trains])
     low, high = (np.asarray(plain[name], np.float64) for name in ("lb", "ub"))
-    if any(bound.ndim and len(bound) != len(wanted) for bound in (low, high)):
+    if any(bound.ndim and len(bound) != len(counted) for bound in (low, high)):
         return None
-    wanted |= (low > 0) | (high < 0)
-    return None if wanted.all() or not wanted.any() else np.flatnonzero(wanted)
+    counted |= (low > 0) | (high < 0)
+    return None if counted.all() or not counted.any() else np.flatnonzero(counted)
 
 
-def _keep(cone: ConeR, found: Any, silent_rows: int, all_rows: int) -> None:
+def _keep(cone: ConeR, result: Any, silent_rows: int, all_rows: int) -> None:
     """Set the results of a fit on the learner."""
-    weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable, refires), multipliers = found
+    weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable, refires), multipliers = result
     cone.weights_ = weights
     cone.objective_ = objective
     cone.parts_ = dict(zip(("l1", "l2", "B", "C", "D"), parts, strict=True))
@@ -399,11 +399,11 @@ def _shown(bound: float | Sequence[float]) -> str:
 
 def _warn(cone: ConeR) -> None:
     if cone.unreachable_:
-        named = ", ".join(f"pattern {p} target {k}" for p, k in cone.unreachable_[:5])
+        listed = ", ".join(f"pattern {p} target {k}" for p, k in cone.unreachable_[:5])
         more = f" and {len(cone.unreachable_) - 5} more" if len(cone.unreachable_) > 5 else ""
         within = f"within {_shown(cone.lb)} to {_shown(cone.ub)} mV"
         warnings.warn(
-            f"no weights {within} bring {named}{more} to the threshold; the rest was fitted",
+            f"no weights {within} bring {listed}{more} to the threshold; the rest was fitted",
             stacklevel=4,
         )
     if cone.refires_:

@@ -268,9 +268,9 @@ class ConeX(SpikeLearner):
         problem = ConeXProblem(self, patterns, targets)
         multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
         first = [tuple(row) for row, _ in held]
-        found = problem._problem.fit(first, multipliers, progress)
-        (status, weights, objective, parts, gap, violation), rest, signal = found
-        (margin, asked), engine, rounds, (rows, multipliers), certificate, reason = rest
+        result = problem._problem.fit(first, multipliers, progress)
+        (status, weights, objective, parts, gap, violation), rest, signal = result
+        (margin, requested), engine, rounds, (rows, multipliers), certificate, reason = rest
         self.status_ = status
         self.weights_ = weights
         self.objective_ = objective
@@ -286,7 +286,7 @@ class ConeX(SpikeLearner):
         if certificate is not None:
             (rows, multipliers), proven, at_all, text = certificate
             self.certificate_ = Certificate([_row(row) for row in rows], multipliers, proven, at_all, text)
-        self.problem_ = problem._with_margin(asked)
+        self.problem_ = problem._with_margin(requested)
         self.neuron_ = neuron
         if signal is not None:
             raise signal

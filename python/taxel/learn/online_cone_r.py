@@ -157,8 +157,8 @@ class OnlineConeR(ConeR):
             raise ProblemError(f"targets: {len(times)} lists for {len(trains)} patterns, must be one a pattern")
         with self._locked():
             self._begin()
-            for p, (pattern, wanted) in enumerate(zip(trains, times, strict=True)):
-                self._add(pattern, wanted, f"pattern {p}", f"targets of pattern {p}")
+            for p, (pattern, target) in enumerate(zip(trains, times, strict=True)):
+                self._add(pattern, target, f"pattern {p}", f"targets of pattern {p}")
             return self._fit()
 
     def _locked(self) -> Lock:
@@ -166,12 +166,12 @@ class OnlineConeR(ConeR):
         lock: Lock = vars(self).setdefault("_lock", Lock())
         return lock
 
-    def _add(self, pattern: SpikeTrains, targets: ArrayLike, name: str, wanted: str) -> None:
-        given = instance(name, pattern, SpikeTrains)._parts(), floats(wanted, targets, "ms")
+    def _add(self, pattern: SpikeTrains, targets: ArrayLike, name: str, targets_name: str) -> None:
+        example = instance(name, pattern, SpikeTrains)._parts(), floats(targets_name, targets, "ms")
         # A train that is silent in this window may have spikes in the next.
         _weighed(name, len(pattern), "trains")
-        self._stream.add(*given)
-        self._held.append(given)
+        self._stream.add(*example)
+        self._held.append(example)
 
     def _begin(self) -> None:
         self._begun = self._json()
@@ -185,12 +185,12 @@ class OnlineConeR(ConeR):
         vars(self).update(state)
         if "_begun" in state:
             self._stream = _core.OnlineConeR(self._begun)
-            for given in self._held:
-                self._stream.add(*given)
+            for example in self._held:
+                self._stream.add(*example)
 
     def _fit(self) -> Self:
-        found, signal = self._stream.fit()
-        _keep(self, found, self._stream.silent_rows, 0)
+        result, signal = self._stream.fit()
+        _keep(self, result, self._stream.silent_rows, 0)
         self.patterns_ = self._stream.patterns
         if signal is not None:
             raise signal

@@ -113,11 +113,11 @@ class STDP(SpikeLearner):
         ProblemError : no patterns, or one that makes no sense (names it)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; what was learnt until then stays
         """
-        given = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
-        if not given:
+        trains = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
+        if not trains:
             raise ProblemError("patterns: none, must be one or more")
-        self._neuron = _core.STDP(self._json(), len(given[0]))
-        for one in given:
+        self._neuron = _core.STDP(self._json(), len(trains[0]))
+        for one in trains:
             self._neuron.rest()
             self._learn(one)
         return self
@@ -174,9 +174,9 @@ class STDP(SpikeLearner):
         NotFittedError : before `fit` and `partial_fit`
         """
         weights = self._fitted()
-        given = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
+        trains = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
         fired = []
-        for one in given:
+        for one in trains:
             neuron = _core.STDP(self._json(), len(weights))
             neuron.set_weights(weights)
             fired.append(neuron.push(one._parts(), False))

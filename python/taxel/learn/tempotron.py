@@ -129,13 +129,13 @@ class Tempotron(Learner):
         ProblemError : patterns, labels or first weights that make no sense
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
-        given = enumerate(several("patterns", patterns))
-        trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in given]
-        wanted = _labels(labels)
+        numbered = enumerate(several("patterns", patterns))
+        trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in numbered]
+        truth = _labels(labels)
         first = None if start is None else floats("start", start)
         if progress is not None:
             callback("progress", progress)
-        keep(self, _core.fit_tempotron(self._json(), trains, wanted, first, progress))
+        keep(self, _core.fit_tempotron(self._json(), trains, truth, first, progress))
         return self
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.bool_]:
@@ -177,10 +177,10 @@ class Tempotron(Learner):
         ProblemError : patterns or labels that make no sense
         NotFittedError : before `fit`
         """
-        fired, wanted = self.predict(patterns), _labels(labels)
-        if len(wanted) != len(fired) or not wanted:
-            raise ProblemError(f"labels: {len(wanted)} for {len(fired)} patterns, must be one a pattern")
-        return float(np.mean(fired == np.array(wanted)))
+        fired, truth = self.predict(patterns), _labels(labels)
+        if len(truth) != len(fired) or not truth:
+            raise ProblemError(f"labels: {len(truth)} for {len(fired)} patterns, must be one a pattern")
+        return float(np.mean(fired == np.array(truth)))
 
     def peak(self, weights: ArrayLike, pattern: SpikeTrains) -> tuple[float, float, float]:
         """Return the largest potential, its time, and the time of the output spike.

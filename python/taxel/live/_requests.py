@@ -24,7 +24,7 @@ from taxel.labels import Labels, write_labels
 from taxel.recording import open_recording
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.health import Told, judged
+from taxel.recording.health import TaxelStatistics, judged
 from taxel.wire import Command
 
 __all__ = ["RequestHandler", "own_addresses", "presets_path"]
@@ -157,7 +157,7 @@ class RequestHandler:
         """
         sensor = Array._from_parts(array)
         counts = [np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))]
-        named = judged(sensor, Told(*counts)).named()
+        named = judged(sensor, TaxelStatistics(*counts)).named()
         return named["dead"], named["stuck"], named["noisy"]
 
     def cut(self, path: Path, out: Path, start_us: int, stop_us: int) -> list[str]:

@@ -21,10 +21,10 @@ __all__ = ["Pattern", "distance", "listed", "stated"]
 Pattern = ArrayLike | SpikeTrains
 
 
-def stated(metric: str, given: Mapping[str, Any]) -> str:
+def stated(metric: str, options: Mapping[str, Any]) -> str:
     """Return a metric as JSON for the compiled part, which checks it."""
     name = text("metric", metric)
-    return parameters({"name": name, **{key: _plain(name, key, value) for key, value in given.items()}})
+    return parameters({"name": name, **{key: _plain(name, key, value) for key, value in options.items()}})
 
 
 def _plain(metric: str, name: str, value: Any) -> Any:
@@ -44,12 +44,12 @@ def _plain(metric: str, name: str, value: Any) -> Any:
     return float(plain) if isinstance(plain, np.ndarray) and plain.ndim == 0 else plain
 
 
-def distance(metric: str, a: Pattern, b: Pattern, given: Mapping[str, Any]) -> float:
+def distance(metric: str, a: Pattern, b: Pattern, options: Mapping[str, Any]) -> float:
     """Return the distance of two trains or two patterns."""
     if isinstance(a, SpikeTrains) != isinstance(b, SpikeTrains):
         name, value, other = ("b", b, "a") if isinstance(a, SpikeTrains) else ("a", a, "b")
         raise ProblemError(f"{name} is {shown(value)}: must be a taxel.SpikeTrains, as {other} is")
-    return _core.distance(stated(metric, given), _one("a", a), _one("b", b))
+    return _core.distance(stated(metric, options), _one("a", a), _one("b", b))
 
 
 def _one(name: str, x: Pattern) -> tuple[Any, ...]:

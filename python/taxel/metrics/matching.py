@@ -81,13 +81,15 @@ def matching(
     (1, 1, 1, array([-2.]), 0.5)
     """
     fired = [floats(f"spikes[{p}]", times, "ms") for p, times in enumerate(several("spikes", spikes))]
-    wanted = [floats(f"targets[{p}]", times, "ms") for p, times in enumerate(several("targets", targets))]
-    if len(fired) != len(wanted):
-        raise ProblemError(f"targets: {len(wanted)} lists for {len(fired)} patterns, must be one a pattern")
-    pairs = _core.match_spikes(fired, wanted, number("window_ms", window_ms, "ms"))
-    errors = [fired[p][j] - wanted[p][i] for p, own in enumerate(pairs) for j, i in own]
-    found = len(errors)
-    return Matching(found, sum(map(len, wanted)) - found, sum(map(len, fired)) - found, np.array(errors, np.float64))
+    target_times = [floats(f"targets[{p}]", times, "ms") for p, times in enumerate(several("targets", targets))]
+    if len(fired) != len(target_times):
+        raise ProblemError(f"targets: {len(target_times)} lists for {len(fired)} patterns, must be one a pattern")
+    pairs = _core.match_spikes(fired, target_times, number("window_ms", window_ms, "ms"))
+    errors = [fired[p][j] - target_times[p][i] for p, own in enumerate(pairs) for j, i in own]
+    matched = len(errors)
+    return Matching(
+        matched, sum(map(len, target_times)) - matched, sum(map(len, fired)) - matched, np.array(errors, np.float64)
+    )
 
 
 def f1(spikes: Sequence[ArrayLike], targets: Sequence[ArrayLike], *, window_ms: float = _DEFAULT.window_ms) -> float:

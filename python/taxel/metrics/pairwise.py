@@ -62,5 +62,5 @@ def pairwise(
     count = None if threads is None else whole("threads", threads, 1, 4096)
     if progress is not None:
         callback("progress", progress)
-    found = _core.pairwise(stating, rows, columns, count, None, progress)
-    return found.reshape(rows[1], (rows if columns is None else columns)[1])
+    distances = _core.pairwise(stating, rows, columns, count, None, progress)
+    return distances.reshape(rows[1], (rows if columns is None else columns)[1])

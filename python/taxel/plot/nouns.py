@@ -9,6 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from taxel._base.arguments import instance, number, shown
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.events import Events
@@ -149,7 +150,11 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
         scale = ScalarMappable(Normalize(0, most), shades)
         ax.figure.colorbar(scale, ax=ax, label=name, fraction=0.05)
     ax.imshow(picture, origin="upper", interpolation="nearest")
-    ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{len(events)} events, {to_ms(events.duration_us):.1f} ms")
+    ax.set(
+        xlabel="x (column)",
+        ylabel="y (row)",
+        title=f"{counted(len(events), 'event')}, {to_ms(events.duration_us):.1f} ms",
+    )
     return ax
 
 

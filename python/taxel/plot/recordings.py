@@ -72,17 +72,17 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         over.set_yscale("symlog", linthresh=1 / width)
         over.set_ylabel("events/s")
         over.legend(loc="upper right")
-        found = health(events)
+        taxel_health = health(events)
     else:
         frames = recording.frames()
         over.plot(frames.t / 1e6, frames.total(), color="black", linewidth=0.8)
         over.set_ylabel(f"sum of taxels ({frames.unit})")
-        found = health(frames)
+        taxel_health = health(frames)
     for note in recording.notes:
         if note.t is not None:
             over.axvline(note.t / 1e6, color="grey", linestyle=":", linewidth=0.8)
     over.set(xlabel="board time (s)", title=recording.path.name)
-    health_map(found, where)
+    health_map(taxel_health, where)
     return figure
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
@@ -41,7 +42,7 @@ def between(of: Contents, start: float, stop: float) -> Contents:
 
 def _without_a_time(of: Contents) -> list[str]:
     count = sum(note.t is None for note in of.notes)
-    return [f"{count} notes without a time"] * bool(count)
+    return [f"{counted(count, 'note')} without a time"] * bool(count)
 
 
 class Apart(Mapping[str, Contents]):

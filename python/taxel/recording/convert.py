@@ -13,6 +13,7 @@ import numpy as np
 from taxel import _core
 from taxel._base.arguments import flag, path, shown, text
 from taxel._base.files import whole_file, write_whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames
@@ -92,22 +93,22 @@ def convert(
         if isinstance(source, Frames):
             raise ProblemError("frames_hz: pictures keep their own times; open the file and ask it for frames(rate_hz)")
         whole = pictures(whole, frames_hz, name="frames_hz")
-    kept = stored(whole, place)
-    lost = list(kept.lost)
+    written = stored(whole, place)
+    lost = list(written.lost)
     match kind:
         case ".lsa":
-            assert kept.payload is not None  # `stored` gives it
-            _core.write_lsa(place, kept.payload.tobytes(), overwrite)
+            assert written.payload is not None  # `stored` gives it
+            _core.write_lsa(place, written.payload.tobytes(), overwrite)
         case ".npz":
-            write_whole(place, lambda file: write_npz(file, kept), overwrite=overwrite)
+            write_whole(place, lambda file: write_npz(file, written), overwrite=overwrite)
         case ".csv":
-            write_whole(place, lambda file: write_csv(file, kept), overwrite=overwrite)
+            write_whole(place, lambda file: write_csv(file, written), overwrite=overwrite)
         case ".h5":
             with whole_file(place, overwrite=overwrite) as part:
-                write_h5(part, kept)
+                write_h5(part, written)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                write_mcap(part, kept, compression, _counts(whole, kept))
+                write_mcap(part, written, compression, _counts(whole, written))
                 lost += _read_otherwise(part, whole)
     return lost
 
@@ -123,18 +124,18 @@ def _contents(source: object) -> Contents:
     return Contents(Path(), "", "events", source.array, events=events, frames=frames)
 
 
-def _counts(of: Contents, kept: Contents) -> dict[str, Any]:
+def _counts(of: Contents, written: Contents) -> dict[str, Any]:
     """Return the counts of a recording in the words of the live format."""
     if of.samples is not None:
-        return {"received": len(of.samples), "converted": str(kept.verdict).partition(": ")[2]}
+        return {"received": len(of.samples), "converted": str(written.verdict).partition(": ")[2]}
     if of.kind == "events":
         # Made of events, of which none is missing.
-        return {"received": len(kept.datagrams or ()), "missing": 0}
+        return {"received": len(written.datagrams or ()), "missing": 0}
     counts = of.counts
     known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
     decoder = counts.get("decoder")
     damage = json.loads(_core.recording_damage(json.dumps(decoder))) if decoder else {}
-    return {**known, "decoder": damage, "converted": str(kept.verdict).partition(": ")[2]}
+    return {**known, "decoder": damage, "converted": str(written.verdict).partition(": ")[2]}
 
 
 def _read_otherwise(part: Path, of: Contents) -> list[str]:
@@ -144,5 +145,5 @@ def _read_otherwise(part: Path, of: Contents) -> list[str]:
         return []
     again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
-        return [f"the pairing of intensities ({len(again)} events when paired directly)"]
+        return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]
     return ["the order of times that step back by more than 0.1 s"] * (not np.array_equal(again.t, events.t))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
 from taxel._base.limits import COLUMNS, TAXELS, VALUE, unpacked
+from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -93,9 +94,9 @@ def _table(path: Path, array: Array | None) -> Events | Frames:
     except UnicodeDecodeError:
         names = []
     if not names or names[0] != "t_us" or len(names) < 2:
-        said = repr(head[:40].decode("utf-8", "replace"))
+        begin = repr(head[:40].decode("utf-8", "replace"))
         raise FormatError(
-            f"{path}, line 1: {said}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel"
+            f"{path}, line 1: {begin}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel"
         )
     if tuple(names[:4]) == _EVENTS:
         if names[4:] != [name for name in _MORE if name in names[4:]]:
@@ -135,11 +136,11 @@ def _csv_events(path: Path, names: list[str], body: bytes, array: Array | None) 
 
 def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) -> Frames:
     table = _numbers(path, names, body, np.float64)
-    found = [_TAXEL.fullmatch(name) for name in names[1:]]
-    if all(found):
-        places = [(int(m[1]), int(m[2])) for m in found if m is not None]
-    elif any(found):
-        odd = next(name for name, m in zip(names[1:], found, strict=True) if m is None)
+    matches = [_TAXEL.fullmatch(name) for name in names[1:]]
+    if all(matches):
+        places = [(int(m[1]), int(m[2])) for m in matches if m is not None]
+    elif any(matches):
+        odd = next(name for name, m in zip(names[1:], matches, strict=True) if m is None)
         raise FormatError(f"{path}, line 1: column {shown(odd)} among taxels: must be named like x3y5")
     else:
         shape = (1, len(names) - 1) if array is None else array.shape
@@ -185,8 +186,8 @@ def _numbers(path: Path, names: list[str], body: bytes, dtype: type[Any]) -> NDA
         where = "" if place is None else f", line {_line_number(body, row)}"
         if place is not None and place[2] is not None and int(place[2]) <= len(names):
             where += f", column {names[int(place[2]) - 1]}"
-        said = re.sub(r" at row .*|; use `usecols`.*", "", _line(error))
-        raise FormatError(f"{path}{where}: {said}; must be {len(names)} numbers a line") from None
+        reason = re.sub(r" at row .*|; use `usecols`.*", "", first_line(error))
+        raise FormatError(f"{path}{where}: {reason}; must be {len(names)} numbers a line") from None
     if table.shape[1] != len(names):
         raise FormatError(f"{path}, line 2: {table.shape[1]} numbers; must be {len(names)} numbers a line")
     return table
@@ -218,8 +219,3 @@ def _places(array: Array) -> list[tuple[int, int]]:
 def _shortest(value: np.float32) -> str:
     text = str(value)
     return text.removesuffix(".0")
-
-
-def _line(error: BaseException) -> str:
-    said = str(error).split("\n", maxsplit=1)[0]
-    return said if len(said) <= 200 else f"{said[:197]}..."

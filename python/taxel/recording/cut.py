@@ -59,21 +59,21 @@ def cut(
     >>> events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
     >>> _ = taxel.convert(events, place)
     >>> taxel.cut(taxel.open(place), start_us=100, columns=slice(4, 8))
-    [Recording(two.npz: 1 events, 200 to 200 us, 8 x 4 taxels)]
+    [Recording(two.npz: 1 event, 200 to 200 us, 8 x 4 taxels)]
     """
     instance("recording", recording, Recording)
     start_us, stop_us = window("us", start_us, stop_us)
     around = [
-        finite(name, given, "us", least=0.0) for name, given in (("before_us", before_us), ("after_us", after_us))
+        finite(name, value, "us", least=0.0) for name, value in (("before_us", before_us), ("after_us", after_us))
     ]
     whole = (start_us, stop_us) == (-np.inf, np.inf)
-    kept = recording if whole else recording.between(start_us, stop_us)
+    stretch = recording if whole else recording.between(start_us, stop_us)
     if label is None:
-        parts = [kept]
+        parts = [stretch]
     else:
         text("label", label)
-        times = [note.t for note in kept.notes if note.text == label and note.t is not None]
-        parts = [kept.between(t - around[0], t + around[1]) for t in times]
+        times = [note.t for note in stretch.notes if note.text == label and note.t is not None]
+        parts = [stretch.between(t - around[0], t + around[1]) for t in times]
     if columns is None and rows is None:
         return parts
     across, down = (slice(None) if chosen is None else chosen for chosen in (columns, rows))

@@ -10,6 +10,7 @@ import numpy as np
 
 from taxel._base import limits
 from taxel._base.arguments import flag, number, text, whole
+from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.detections import Detections
@@ -27,7 +28,7 @@ def json_of(contents: Contents) -> str:
     registers = contents.registers
     changes = contents.register_changes
     driven = registers.array if registers is not None else changes[0][1].array if changes else contents.array
-    said: dict[str, Any] = {
+    document: dict[str, Any] = {
         "array": contents.array._geometry(),
         "source": contents.source,
         "registers": None if registers is None else json.loads(registers._json()),
@@ -46,21 +47,21 @@ def json_of(contents: Contents) -> str:
         "rebuilt": dict(contents.rebuilt),
         "lost": contents.lost,
     }
-    return json.dumps({name: value for name, value in said.items() if value})
+    return json.dumps({name: value for name, value in document.items() if value})
 
 
-def about_of(place: str, said: str) -> dict[str, Any]:
+def about_of(place: str, document: str) -> dict[str, Any]:
     """Return the fields of `Contents` that a file's ``about`` holds, checked.
 
     Raises
     ------
     FormatError : no JSON as taxel writes it (names the entry)
     """
-    limits.unpacked(place, len(said), limits.DESCRIPTION)
+    limits.unpacked(place, len(document), limits.DESCRIPTION)
     entry = "the whole"
     fields: dict[str, Any] = {}
     try:
-        about = json.loads(said)
+        about = json.loads(document)
         if not isinstance(about, dict):
             raise ProblemError("no object")
         for entry, read in _ENTRIES.items():
@@ -75,33 +76,32 @@ def about_of(place: str, said: str) -> dict[str, Any]:
     except RecursionError:
         raise FormatError(f"{place}: nested too deeply; must be JSON as taxel writes it") from None
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, ProblemError) as error:
-        line = str(error).split("\n", maxsplit=1)[0][:200]
-        raise FormatError(f"{place}, {entry}: {line}; must be JSON as taxel writes it") from None
+        raise FormatError(f"{place}, {entry}: {first_line(error)}; must be JSON as taxel writes it") from None
     return fields
 
 
-def array_of(said: Mapping[str, Any]) -> Array:
+def array_of(geometry: Mapping[str, Any]) -> Array:
     """Return the sensor that a file describes."""
-    if not isinstance(said, Mapping):
+    if not isinstance(geometry, Mapping):
         raise ProblemError("no object")
-    return Array._from_geometry(dict(said))
+    return Array._from_geometry(dict(geometry))
 
 
-def notes_of(said: Any) -> tuple[Note, ...]:
+def notes_of(records: Any) -> tuple[Note, ...]:
     """Return notes from records of text, t_us and at_ns."""
-    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), whole("at_ns", n["at_ns"])) for n in said)
+    return tuple(Note(text("text", n["text"]), _time("t_us", n["t_us"]), whole("at_ns", n["at_ns"])) for n in records)
 
 
-def detections_of(said: Any) -> Detections:
+def detections_of(records: Any) -> Detections:
     """Return detections from records of (host ns, label, t, known, slope[, repaired]); JSON has no NaN."""
-    rows = list(said)
+    rows = list(records)
     slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
     repaired = [row[5] if len(row) > 5 else False for row in rows]
     label, t, known = ([row[k] for row in rows] for k in (1, 2, 3))
     return Detections._of(label, t, known, slopes, repaired=repaired)
 
 
-def zeroings_of(said: Any) -> tuple[Zeroing, ...]:
+def zeroings_of(records: Any) -> tuple[Zeroing, ...]:
     """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
     zeroings = (
         Zeroing(
@@ -111,12 +111,12 @@ def zeroings_of(said: Any) -> tuple[Zeroing, ...]:
             number("rest", one["rest"]),
             None if one["before"] is None else number("before", one["before"]),
         )
-        for one in said
+        for one in records
     )
     return tuple(sorted(zeroings, key=lambda one: one.t))
 
 
-def board_changes_of(said: Any) -> tuple[BoardChange, ...]:
+def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
     """Return changes of the board from pairs of the host's time (ns) and a record of t_us, change, version, asked."""
     return tuple(
         BoardChange(
@@ -126,52 +126,52 @@ def board_changes_of(said: Any) -> tuple[BoardChange, ...]:
             None if one.get("version") is None else whole("version", one["version"], 0, 255),
             flag("asked", one.get("asked", False)),
         )
-        for at, one in said
+        for at, one in records
     )
 
 
-def _time(name: str, said: Any) -> int | None:
-    return None if said is None else whole(name, said, -limits.TIME_US, limits.TIME_US)
+def _time(name: str, value: Any) -> int | None:
+    return None if value is None else whole(name, value, -limits.TIME_US, limits.TIME_US)
 
 
-def _registers(said: Any, driven: Array) -> Any:
+def _registers(values: Any, driven: Array) -> Any:
     """Return a set of registers, or a list of times and sets, checked against the array that they drive."""
-    if isinstance(said, list):
-        return tuple((whole("at_ns", at), Registers._of(held, driven)) for at, held in said)
-    return Registers._of(said, driven)
+    if isinstance(values, list):
+        return tuple((whole("at_ns", at), Registers._of(held, driven)) for at, held in values)
+    return Registers._of(values, driven)
 
 
-def _counts(said: Any, depth: int = 0) -> dict[str, Any]:
+def _counts(counts: Any, depth: int = 0) -> dict[str, Any]:
     """Return counts by cause, whole numbers of 0 or more; those of the decoder stand in one of their own."""
-    if not isinstance(said, dict):
+    if not isinstance(counts, dict):
         raise ProblemError("no object")
     return {
         name: n if n is None else _counts(n, 1) if isinstance(n, dict) and depth == 0 else whole(name, n, 0)
-        for name, n in said.items()
+        for name, n in counts.items()
     }
 
 
-def _texts(said: Any) -> tuple[str, ...]:
-    if not isinstance(said, list):
+def _texts(texts: Any) -> tuple[str, ...]:
+    if not isinstance(texts, list):
         raise ProblemError("no list")
-    return tuple(text("entry", one) for one in said)
+    return tuple(text("entry", one) for one in texts)
 
 
 #: How each entry is read, by its name; registers are checked later, as the array that they drive is another entry.
 _ENTRIES: dict[str, Any] = {
-    "array": lambda said, place: sensor(place, array_of(said)),
-    "source": lambda said, _: text("source", said),
-    "registers": lambda said, _: said,
-    "registers_array": lambda said, place: sensor(place, array_of(said)),
-    "register_changes": lambda said, _: said,
-    "board_changes": lambda said, _: board_changes_of(said),
-    "notes": lambda said, _: notes_of(said),
-    "detections": lambda said, _: detections_of(said),
-    "counts": lambda said, _: _counts(said),
-    "verdict": lambda said, _: text("verdict", said),
-    "zeroings": lambda said, _: zeroings_of(said),
-    "columns": lambda said, _: _texts(said),
-    "truncated": lambda said, _: flag("truncated", said),
-    "rebuilt": lambda said, _: _counts(said),
-    "lost": lambda said, _: _texts(said),
+    "array": lambda value, place: sensor(place, array_of(value)),
+    "source": lambda value, _: text("source", value),
+    "registers": lambda value, _: value,
+    "registers_array": lambda value, place: sensor(place, array_of(value)),
+    "register_changes": lambda value, _: value,
+    "board_changes": lambda value, _: board_changes_of(value),
+    "notes": lambda value, _: notes_of(value),
+    "detections": lambda value, _: detections_of(value),
+    "counts": lambda value, _: _counts(value),
+    "verdict": lambda value, _: text("verdict", value),
+    "zeroings": lambda value, _: zeroings_of(value),
+    "columns": lambda value, _: _texts(value),
+    "truncated": lambda value, _: flag("truncated", value),
+    "rebuilt": lambda value, _: _counts(value),
+    "lost": lambda value, _: _texts(value),
 }

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from taxel._base.messages import counted
 from taxel.array import Array
 from taxel.recording.contents import UNKNOWN, Contents, once
 
@@ -100,13 +101,13 @@ LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "source": lambda of, _: f"where it came from ({of.source})",
     # A part that was written is a recording of its own.
     "stretch": None,
-    "held": lambda of, _: f"what {np.count_nonzero(of.held != UNKNOWN)} taxels held at the beginning",
+    "held": lambda of, _: f"what {counted(int(np.sum(of.held != UNKNOWN)), 'taxel')} held at the beginning",
     "registers": lambda _, __: "the board's registers",
-    "register_changes": lambda of, _: f"{len(of.register_changes)} settings of the registers",
-    "board_changes": lambda of, _: f"{len(of.board_changes)} changes of the board",
-    "notes": lambda of, _: f"{len(of.notes)} notes",
-    "detections": lambda of, _: f"{len(of.detections)} detections",
-    "zeroings": lambda of, _: f"{len(of.zeroings)} zeroed taxels",
+    "register_changes": lambda of, _: f"{counted(len(of.register_changes), 'setting')} of the registers",
+    "board_changes": lambda of, _: f"{counted(len(of.board_changes), 'change')} of the board",
+    "notes": lambda of, _: counted(len(of.notes), "note"),
+    "detections": lambda of, _: counted(len(of.detections), "detection"),
+    "zeroings": lambda of, _: counted(len(of.zeroings), "zeroed taxel"),
     "clock": lambda of, _: [] if of.holds("datagrams") else "arrival times",
     "clock_of": lambda of, _: f"by whose clock times are ({of.clock_of})",
     "counts": lambda _, __: "what was received and lost, by cause",
@@ -141,24 +142,26 @@ def after(step: str, of: Contents, lines: Callable[[], Iterable[str]] | None = N
         A value (or `once`) for each field that the table calls changed, and for no other.
     """
     fates = FATES[step]
-    wanted = {name for name, fate in fates.items() if fate == CHANGED} - {"lost"}
-    if changed.keys() != wanted:
-        raise TypeError(f"{step}: changes {sorted(changed)}; the table of fates says {sorted(wanted)}")
+    expected = {name for name, fate in fates.items() if fate == CHANGED} - {"lost"}
+    if changed.keys() != expected:
+        raise TypeError(f"{step}: changes {sorted(changed)}; the table of fates says {sorted(expected)}")
     gone = [name for name, fate in fates.items() if fate == LOST]
     changed |= {name: _DEFAULTS[name]() for name in gone}
     if fates["lost"] == CHANGED:
-        changed["lost"] = once(lambda: _together(of.lost, _said(step, of, gone), () if lines is None else lines()))
+        changed["lost"] = once(
+            lambda: _together(of.lost, _lost_lines(step, of, gone), () if lines is None else lines())
+        )
     return of.but(**changed)
 
 
-def _said(step: str, of: Contents, gone: Iterable[str]) -> list[str]:
-    said = []
+def _lost_lines(step: str, of: Contents, gone: Iterable[str]) -> list[str]:
+    lines = []
     for name in gone:
         line = LINES[name]
         if line is not None and of.holds(name):
             lost = line(of, step)
-            said += [lost] if isinstance(lost, str) else lost
-    return said
+            lines += [lost] if isinstance(lost, str) else lost
+    return lines
 
 
 def _together(*every: Iterable[str]) -> tuple[str, ...]:

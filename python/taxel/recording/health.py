@@ -20,7 +20,7 @@ from taxel.recorded import recorded as held_by
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Health", "Told", "health", "judged"]
+__all__ = ["Health", "TaxelStatistics", "health", "judged"]
 
 #: Reading: a taxel is called dead where it was silent while its neighbours spoke so often (median of them), and went on
 #: the way that they went before so often: a touch does that, but noise at a floor goes up and down in turn ...
@@ -71,7 +71,7 @@ class Health:
         return draw("html", self)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{len(found)} {name}" for name, found in self.named().items())
+        counts = ", ".join(f"{len(places)} {name}" for name, places in self.named().items())
         return f"Health({self.array.taxels} taxels: {counts})"
 
 
@@ -119,7 +119,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     """
     held = held_by(recorded)
     if isinstance(held, Events):
-        return judged(held.array, _told_of_events(held))
+        return judged(held.array, _statistics_of_events(held))
     if not isinstance(held, Frames):
         raise ProblemError(f"recorded is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     flat = held.values.reshape(len(held), held.array.rows * held.array.columns)
@@ -128,14 +128,14 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     turn, taxel = np.nonzero(ways)
     activity, moved = _ways(taxel, ways[turn, taxel], held.array)
     # A taxel of pictures that never changes is dead or stuck: its value tells which.
-    found = judged(held.array, Told(activity, moved, activity + 1))
+    result = judged(held.array, TaxelStatistics(activity, moved, activity + 1))
     if not len(held):
-        return found
+        return result
     loaded = held.values[0] > held.values.min()
-    return Health(held.array, activity, found.dead & ~loaded, found.dead & loaded, found.noisy)
+    return Health(held.array, activity, result.dead & ~loaded, result.dead & loaded, result.noisy)
 
 
-class Told(NamedTuple):
+class TaxelStatistics(NamedTuple):
     """What each taxel did, and what is known to be held; whole numbers, shape (rows, columns)."""
 
     activity: NDArray[np.int64]
@@ -150,28 +150,28 @@ class Told(NamedTuple):
     """The greatest, likewise."""
 
 
-def judged(array: Array, told: Told) -> Health:
+def judged(array: Array, statistics: TaxelStatistics) -> Health:
     """Tell it from what each taxel did, by the rules of `health`."""
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
-    activity = told.activity
+    activity = statistics.activity
     silent = exists & (activity == 0)
     # A median reaches a bound only beside a taxel that does: all others need not be looked at.
     among = _reaches(activity, exists, _beside(exists & (activity >= DEAD_BELOW)) & exists, DEAD_BELOW)
-    moved = _reaches(told.moved, exists, silent & among, MOVED_FROM)
+    moved = _reaches(statistics.moved, exists, silent & among, MOVED_FROM)
     quiet = np.count_nonzero(among & (activity > 0) & (activity < DEAD_BELOW))
     alone = quiet <= QUIET_SHARE * np.count_nonzero(among & silent)
     loud = alone and 2 * np.count_nonzero(among) > np.count_nonzero(exists)
     dead = silent & among & (moved | loud)
     stuck = np.zeros(array.shape, bool)
-    if told.least is not None and told.greatest is not None:
-        least = max(REST_FROM, REST_SHARE * int(told.greatest.max(initial=0)))
-        known = exists & (told.least >= 0)
-        at_zero = silent & (told.greatest == 0) & _beside(known & (told.least >= least))
-        dead |= _reaches(told.least, known, at_zero, least)
-        stuck = dead & (told.greatest > 0)
-    if told.values is not None:
-        still = exists & (activity >= STUCK_FROM) & (told.values == 1)
-        stuck |= _reaches(told.values, exists & (activity > 0), still, 1, above=True)
+    if statistics.least is not None and statistics.greatest is not None:
+        least = max(REST_FROM, REST_SHARE * int(statistics.greatest.max(initial=0)))
+        known = exists & (statistics.least >= 0)
+        at_zero = silent & (statistics.greatest == 0) & _beside(known & (statistics.least >= least))
+        dead |= _reaches(statistics.least, known, at_zero, least)
+        stuck = dead & (statistics.greatest > 0)
+    if statistics.values is not None:
+        still = exists & (activity >= STUCK_FROM) & (statistics.values == 1)
+        stuck |= _reaches(statistics.values, exists & (activity > 0), still, 1, above=True)
     noisy = exists & (activity >= NOISY_FROM)
     places = np.flatnonzero(noisy)
     often = NOISY_TIMES * _around(activity, exists, places, 2, NOISY_SHARE)
@@ -179,13 +179,13 @@ def judged(array: Array, told: Told) -> Health:
     return Health(array, activity, dead & ~stuck, stuck, noisy)
 
 
-def _told_of_events(events: Events) -> Told:
+def _statistics_of_events(events: Events) -> TaxelStatistics:
     """Return the statistics of each taxel; an event that a state repaired counts for the held value only."""
     own = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
     index = events.array.index(events.x, events.y).astype(np.int64)
     activity, moved = _ways(index[own], np.where(events.p[own], 1, -1), events.array)
     if events.intensity is None or events.present is None:
-        return Told(activity, moved)
+        return TaxelStatistics(activity, moved)
     shape, size = events.array.shape, events.array.rows * events.array.columns
     pairs = np.unique(index[events.present & own] * 65_536 + events.intensity[events.present & own].astype(np.int64))
     values = np.bincount(pairs // 65_536, minlength=size).astype(np.int32)
@@ -194,7 +194,7 @@ def _told_of_events(events: Events) -> Told:
     np.minimum.at(least, index[events.present], ticks)
     np.maximum.at(greatest, index[events.present], ticks)
     least[greatest < 0] = -1
-    return Told(activity, moved, values.reshape(shape), least.reshape(shape), greatest.reshape(shape))
+    return TaxelStatistics(activity, moved, values.reshape(shape), least.reshape(shape), greatest.reshape(shape))
 
 
 def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -212,21 +212,21 @@ def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Tell which taxels have one of a mask among their up to 8 neighbours."""
     rows, columns = mask.shape
     padded = np.pad(mask, 1)
-    found = np.zeros(mask.shape, bool)
+    reached = np.zeros(mask.shape, bool)
     for i, j in _offsets(1):
-        found |= padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
-    return found
+        reached |= padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
+    return reached
 
 
 def _reaches(
     grid: NDArray[Any], counts: NDArray[np.bool_], where: NDArray[np.bool_], bound: float, *, above: bool = False
 ) -> NDArray[np.bool_]:
     """Tell at which of some taxels the median of the neighbours that count is at least a bound, or above it."""
-    found = np.zeros(grid.shape, bool)
+    reached = np.zeros(grid.shape, bool)
     places = np.flatnonzero(where)
     medians = _around(grid, counts, places)
-    found.reshape(-1)[places] = medians > bound if above else medians >= bound
-    return found
+    reached.reshape(-1)[places] = medians > bound if above else medians >= bound
+    return reached
 
 
 def _around(
@@ -237,7 +237,7 @@ def _around(
     numpy.nanquantile does the same a hundred times slower, a taxel at a time.
     """
     rows, columns = grid.shape
-    found = np.empty(len(places))
+    quantiles = np.empty(len(places))
     for first in range(0, len(places), _AT_ONCE):
         y, x = np.divmod(places[first : first + _AT_ONCE], columns)
         stack = np.full((len(_offsets(reach)), len(y)), np.nan)
@@ -253,8 +253,8 @@ def _around(
         below = np.floor(place).astype(np.intp)
         over = np.minimum(below + 1, np.maximum(last, 0))
         low, high = (np.take_along_axis(stack, at[np.newaxis], axis=0)[0] for at in (below, over))
-        found[first : first + _AT_ONCE] = np.where(last < 0, 0.0, low + (place - below) * (high - low))
-    return found
+        quantiles[first : first + _AT_ONCE] = np.where(last < 0, 0.0, low + (place - below) * (high - low))
+    return quantiles
 
 
 def _offsets(reach: int) -> list[tuple[int, int]]:

@@ -47,8 +47,8 @@ def kind_of_file(kind: str) -> str:
 
 def verdict_of(contents: Contents) -> str:
     """Return in one line what was lost of a recording, or that its file does not record it."""
-    said = contents.verdict
-    return f"the {kind_of_file(contents.kind)} does not say what was lost" if said is None else said
+    verdict = contents.verdict
+    return f"the {kind_of_file(contents.kind)} does not say what was lost" if verdict is None else verdict
 
 
 def kind_of(path: Path) -> str:
@@ -62,20 +62,20 @@ def kind_of(path: Path) -> str:
     with path.open("rb") as file:
         head = file.read(16)
     ending = ENDINGS.get(path.suffix.lower())
-    found = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
+    by_magic = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
     begins = " ".join(f"{byte:02X}" for byte in head[:4]) or "nothing"
-    if found is not None and ending in (None, found):
-        return found
+    if by_magic is not None and ending in (None, by_magic):
+        return by_magic
     if ending == "lsa":
         # Raw bytes may begin with anything.
         return ending
     stranger = next((what for magic, what in _STRANGERS.items() if head.startswith(magic)), None)
-    wanted = {"mcap": "the MCAP magic", "npz": "the magic of a .npz", "csv": "the names of columns"}
-    wanted["h5"] = "the magic of HDF5"
-    if found is not None:
-        stranger = f"a .{found} file; rename it"
+    expected = {"mcap": "the MCAP magic", "npz": "the magic of a .npz", "csv": "the names of columns"}
+    expected["h5"] = "the magic of HDF5"
+    if by_magic is not None:
+        stranger = f"a .{by_magic} file; rename it"
     if stranger is not None:
-        right = wanted[ending] if ending else "a recording"
+        right = expected[ending] if ending else "a recording"
         what, _, advice = stranger.partition("; ")
         raise FormatError(
             f"{path}, byte 0: starts with {begins} ({what}), not with {right}" + f"; {advice}" * bool(advice)
@@ -84,6 +84,6 @@ def kind_of(path: Path) -> str:
         raise FormatError(f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}")
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
-        raise FormatError(f"{path}, byte 0: starts with {begins}, not with {wanted[ending]} ({magic})")
+        raise FormatError(f"{path}, byte 0: starts with {begins}, not with {expected[ending]} ({magic})")
     # Errors of a .mcap come from the compiled reader, those of a .csv from the reader of tables.
     return ending

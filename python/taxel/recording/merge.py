@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import flag, instance, number, several, shown
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -109,7 +110,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
     fields["held"] = _beside_held(parts, array, lefts) if beside else _held(parts, tables, shifts, lost)
     verdicts = [verdict_of(part) for part in parts]
     alike = len(set(verdicts)) == 1
-    said = verdicts[0] if alike else "; ".join(f"{p.name}: {v}" for p, v in zip(parts, verdicts, strict=True))
+    verdict = verdicts[0] if alike else "; ".join(f"{p.name}: {v}" for p, v in zip(parts, verdicts, strict=True))
     together = after(
         "merge",
         parts[0].but(lost=tuple(dict.fromkeys(line for part in parts for line in part.lost))),
@@ -124,7 +125,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         frames=frames,
         notes=_notes(parts, tables, shifts),
         detections=_detections(parts, shifts),
-        verdict=None if all(part.verdict is None for part in parts) else said,
+        verdict=None if all(part.verdict is None for part in parts) else verdict,
         truncated=any(part.truncated for part in parts),
         **fields,
     )
@@ -200,12 +201,12 @@ def _notes(parts: Sequence[Contents], tables: Sequence[Events | Frames], shifts:
 
 def _detections(parts: Sequence[Contents], shifts: Sequence[int]) -> Detections:
     """Return all detections by the time at which they were known."""
-    found: list[Any] = []
+    rows: list[Any] = []
     for part, shift in zip(parts, shifts, strict=True):
         d = part.detections
-        found += list(zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True))
-    found.sort(key=lambda row: int(row[2]))
-    label, t, known, slope, repaired = ([row[k] for row in found] for k in range(5))
+        rows += list(zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True))
+    rows.sort(key=lambda row: int(row[2]))
+    label, t, known, slope, repaired = ([row[k] for row in rows] for k in range(5))
     return Detections._of(label, t, known, slope, repaired=repaired)
 
 
@@ -269,7 +270,7 @@ def _held(
         done = upto
         known = held != UNKNOWN
         if (now[known] != held[known]).any():
-            lost.append(f"what {np.count_nonzero(known)} taxels held where {part.name} begins")
+            lost.append(f"what {counted(int(known.sum()), 'taxel')} held where {part.name} begins")
     return first
 
 

@@ -67,10 +67,10 @@ class BoardChange:
 
     def _described(self) -> dict[str, Any]:
         """Return the change as files hold it, without the host's time."""
-        said: dict[str, Any] = {"t_us": self.t, "change": self.change}
+        record: dict[str, Any] = {"t_us": self.t, "change": self.change}
         if self.version is not None:
-            said |= {"version": self.version, "asked": self.asked}
-        return said
+            record |= {"version": self.version, "asked": self.asked}
+        return record
 
 
 @dataclass(frozen=True, eq=False)

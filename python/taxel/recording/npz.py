@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from taxel._base.archive import read_arrays, stored_names
 from taxel._base.columns import frozen
+from taxel._base.messages import first_line
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -65,8 +66,8 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
     """
     columns = {name: frozen(values) for name, values in columns.items()}
     about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
-    said = about.pop("array", None)
-    sensor = array or said
+    described = about.pop("array", None)
+    sensor = array or described
     try:
         if "values" in columns and "t" in columns:
             unit = str(columns.get("unit", "counts"))
@@ -86,8 +87,7 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
         limited(path, table)
         held = _held(columns["held"], table.array) if "held" in columns else None
     except (ProblemError, ValueError, TypeError, OverflowError) as error:
-        said = str(error).split("\n", maxsplit=1)[0]
-        raise FormatError(f"{path}: {said if len(said) <= 200 else said[:197] + '...'}") from None
+        raise FormatError(f"{path}: {first_line(error)}") from None
     events, frames = (table, None) if isinstance(table, Events) else (None, table)
     return Contents(path, path.name, kind, table.array, events=events, frames=frames, held=held, **about)
 

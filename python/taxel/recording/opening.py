@@ -77,7 +77,7 @@ def open_any(
     ...     _ = taxel.convert(events, folder / name)
     >>> _ = (folder / "labels.csv").write_text("recording,label,t_us\nstep2,contact,200\n")
     >>> taxel.open(folder)
-    [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 notes),
+    [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 note),
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
     place = Path(arguments.path("path", path))
@@ -144,34 +144,34 @@ def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
     """Open all recordings of a folder, with the labels that lie beside them."""
     own = sorted((f for f in folder.iterdir() if f.is_file() and f.name != LABELS and _is_own(f)), key=_order)
     if own:
-        found = [open_recording(file, **how) for file in own]
-        named = [(recording.path.relative_to(folder), recording) for recording in found]
+        opened = [open_recording(file, **how) for file in own]
+        pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
     else:
         names = _formats(folder)
         if len(names) != 1:
-            said = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
+            problem = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
             deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
             hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
             there = f"there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}"
-            raise FormatError(f"{folder}: holds {said}; {hint or there}")
+            raise FormatError(f"{folder}: holds {problem}; {hint or there}")
         trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
-        named = [(Path(trial.name), _of(trial, folder, names[0])) for trial in trials]
-    return _labelled(folder / LABELS, named)
+        pairs = [(Path(trial.name), _of(trial, folder, names[0])) for trial in trials]
+    return _labelled(folder / LABELS, pairs)
 
 
-def _labelled(table: Path, named: list[tuple[Path, Recording]]) -> list[Recording]:
+def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recording]:
     """Put the reference events of a folder among the notes of its recordings."""
     if not table.exists():
-        return [recording for _, recording in named]
+        return [recording for _, recording in pairs]
     labels = Labels(table)
-    known = {labels.named(name) for name, _ in named}
+    known = {labels.named(name) for name, _ in pairs}
     unknown = [name for name in labels.recordings if name not in known]
     if unknown:
-        there = ", ".join(str(name) for name, _ in named[:8])
+        there = ", ".join(str(name) for name, _ in pairs[:8])
         raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {there}")
-    if None in known and any(not row.recording for row in labels.rows) and len(named) > 1:
-        raise FormatError(f"{table}: without a column recording, but the folder holds {len(named)}")
-    return [recording.with_notes(_notes(labels, name, recording)) for name, recording in named]
+    if None in known and any(not row.recording for row in labels.rows) and len(pairs) > 1:
+        raise FormatError(f"{table}: without a column recording, but the folder holds {len(pairs)}")
+    return [recording.with_notes(_notes(labels, name, recording)) for name, recording in pairs]
 
 
 def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:

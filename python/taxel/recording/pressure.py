@@ -65,8 +65,8 @@ def series(recording: Recording) -> Series | None:
     there is never a whole picture in memory.
     """
     if not recording.has_events or recording.calibration is not None:
-        found = above_rest(recording)
-        return None if found is None else Series.of(*found)
+        result = above_rest(recording)
+        return None if result is None else Series.of(*result)
     events = recording.events
     if events.present is None or events.intensity is None or not events.present.any():
         return None
@@ -167,12 +167,12 @@ def readings(recording: Recording) -> tuple[Frames, NDArray[np.float64], float] 
     if events.present is None or not events.present.any():
         return None
     frames = recording.frames(_rate_hz(recording))
-    heard = frames.t[:, None, None] >= _first_heard(events)
-    rest = np.min(frames.values, axis=0, where=heard, initial=np.inf).astype(np.float64)
+    known = frames.t[:, None, None] >= _first_event_us(events)
+    rest = np.min(frames.values, axis=0, where=known, initial=np.inf).astype(np.float64)
     return frames, rest, ContactArea().above
 
 
-def _first_heard(events: Events) -> NDArray[np.int64]:
+def _first_event_us(events: Events) -> NDArray[np.int64]:
     """Return the time of each taxel's first event, us; far ahead where there is none."""
     first = np.full(events.array.shape, np.iinfo(np.int64).max)
     there = events.present

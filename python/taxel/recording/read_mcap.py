@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.messages import counted
 from taxel.array import Array
 from taxel.clock import Clock
 from taxel.events import Events
@@ -114,8 +115,8 @@ class _Source:
 
     def driven(self) -> Array:
         """Return the array that the registers drive."""
-        said = self.header.get("driven")
-        return self.array if said is None else array_of(said)
+        geometry = self.header.get("driven")
+        return self.array if geometry is None else array_of(geometry)
 
     def registers(self) -> Registers | None:
         """Return the registers at the beginning, or the first that were set."""
@@ -143,14 +144,14 @@ class _Source:
 
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
         """Return what came and was lost of a board, by cause."""
-        said = self.ending.get("finished", {}).get("counts") or self.remarks()["counts"] or {}
+        counts = self.ending.get("finished", {}).get("counts") or self.remarks()["counts"] or {}
         _, decoder, _, _, number, *_ = decoded
         missing = int(number[-1]) - int(number[0]) + 1 - len(number) if len(number) else 0
         return {
             "datagrams": self.remarks()["datagrams"],
             "bytes": self.remarks()["datagram_bytes"],
             "missing_numbers": max(0, missing),
-            **{name: said.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
+            **{name: counts.get(name) for name in ("received", "dropped_by_kernel", "dropped_by_queue")},
             "decoder": json.loads(decoder),
             **self.rebuilt(),
         }
@@ -158,30 +159,31 @@ class _Source:
     def counts_of_stream(self, read: tuple[Any, ...]) -> dict[str, Any]:
         """Return what came and was lost of a stream, by cause."""
         _, _, t, _, bad, resets = read
-        said = self.ending.get("finished", {}).get("counts") or {}
-        seen = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
-        return {**seen, "received": said.get("received"), **self.rebuilt()}
+        counts = self.ending.get("finished", {}).get("counts") or {}
+        damage = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
+        return {**damage, "received": counts.get("received"), **self.rebuilt()}
 
     def verdict(self) -> str:
         """Return in one line what was lost where."""
         rebuilt = self.rebuilt()
         bad = []
         if rebuilt["large_chunks"]:
-            bad.append(f"{rebuilt['large_chunks']} chunks skipped that say they unpack to more than 64 MiB")
+            bad.append(f"{counted(rebuilt['large_chunks'], 'chunk')} skipped, stated to unpack to more than 64 MiB")
         if rebuilt["bad_chunks"]:
-            bad.append(f"{rebuilt['bad_chunks']} bad chunks skipped")
+            bad.append(f"{counted(rebuilt['bad_chunks'], 'bad chunk')} skipped")
         if rebuilt["gaps"]:
-            bad.append(f"{rebuilt['skipped_bytes']} bytes of the file skipped in {rebuilt['gaps']} places")
+            skipped = counted(rebuilt["skipped_bytes"], "byte")
+            bad.append(f"{skipped} of the file skipped in {counted(rebuilt['gaps'], 'place')}")
         if rebuilt["torn_bytes"]:
-            bad.append(f"{rebuilt['torn_bytes']} torn bytes at the end")
+            bad.append(f"{counted(rebuilt['torn_bytes'], 'torn byte')} at the end")
         if "finished" in self.ending:
-            said = str(self.ending["finished"]["verdict"])
-            return f"LOST in the file: {', '.join(bad)}; while recording: {said}" if bad else said
+            recorded = str(self.ending["finished"]["verdict"])
+            return f"LOST in the file: {', '.join(bad)}; while recording: {recorded}" if bad else recorded
         why = "not finished: what came last is missing"
         if "stopped" in self.ending:
             why = f"stopped by an error ({self.ending['stopped']}): what came last is missing"
         so_far = self.remarks()["counts"]
-        known = "no counts were kept yet"
+        known = "no counts were saved yet"
         if so_far is not None:
             # What was received then is more than what the file holds now: the rest is the unfinished end.
             known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, text, window
 from taxel._base.drawing import draw
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -358,7 +359,7 @@ class Recording:
         >>> events = taxel.Events([0, 192], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
         >>> _ = taxel.convert(events, place)
         >>> taxel.open(place).between(100, 200)
-        Recording(two.npz: 1 events, 192 to 192 us, 8 x 8 taxels)
+        Recording(two.npz: 1 event, 192 to 192 us, 8 x 8 taxels)
         """
         return Recording(between(self._contents, *window("us", start, stop)))
 
@@ -388,16 +389,16 @@ class Recording:
         if own.is_several:
             return f"Recording({self.name}: {len(own.sources)} sources: {', '.join(own.sources)})"
         what = own.table if own.has_events else self.frames()
-        noun = "events" if self.has_events else "pictures"
+        noun = "event" if self.has_events else "picture"
         time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) else "no time"
-        more = [f"{len(self.notes)} notes"] * bool(self.notes)
-        more += [f"{len(self.detections)} detections"] * bool(len(self.detections))
-        more += [f"{len(self.zeroings)} zeroed taxels"] * bool(self.zeroings)
+        more = [counted(len(self.notes), "note")] * bool(self.notes)
+        more += [counted(len(self.detections), "detection")] * bool(len(self.detections))
+        more += [counted(len(self.zeroings), "zeroed taxel")] * bool(self.zeroings)
         more += ["truncated"] * self.truncated
         others = [] if own.is_slice and own.clock_of is None else [name for name in own.sources if name != own.label]
         more += [f"beside {', '.join(others)}"] * bool(others)
         size = f"{self.array.rows} x {self.array.columns} taxels"
-        return f"Recording({self.name}: {', '.join([f'{len(what)} {noun}', time, size, *more])})"
+        return f"Recording({self.name}: {', '.join([counted(len(what), noun), time, size, *more])})"
 
 
 def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:

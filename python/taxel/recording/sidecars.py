@@ -58,11 +58,11 @@ def calibration_beside(path: Path, of: Contents) -> Calibration | None:
     place = Calibration.beside(path)
     if place is None:
         return None
-    found = Calibration.load(place)
+    calibration = Calibration.load(place)
     read = "ticks" if of.frames is None else of.frames.unit
-    if found.array != of.array or found.of != read:
+    if calibration.array != of.array or calibration.of != read:
         raise ProblemError(
-            f"{place}: turns {found.of} of {found.array!r} into {found.unit}; {of.name} holds {read} of "
-            f"{of.array!r}, another array"
+            f"{place}: turns {calibration.of} of {calibration.array!r} into {calibration.unit}; {of.name} holds {read} "
+            f"of {of.array!r}, another array"
         )
-    return found
+    return calibration

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from taxel import _core, wire
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -73,7 +74,7 @@ def _csv(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
     table, events, frames = of.table, None, None
     lost = [sensor(of.array)]
     if isinstance(table, Events):
-        lost += [f"{len(table.markers)} markers of start and stop"] * bool(table.markers)
+        lost += [f"{counted(len(table.markers), 'marker')} of start and stop"] * bool(table.markers)
         events = table[:]
         events.markers = ()
         events.array = array_in_csv(table)
@@ -98,7 +99,7 @@ def _lsa(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
         payload = np.frombuffer(_core.wire_encode(events._parts()), np.uint8)
     again = wire.decode(payload, array=of.array, differences=of.differences and not is_made(of))
     if len(again) != len(events):
-        lost.append(f"the pairing of intensities ({len(again)} events when paired directly)")
+        lost.append(f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)")
     elif (again.t != events.t // STAMP_US * STAMP_US).any():
         lost.append("whole turns of 6.5536 s in times")
     changed: dict[str, Any] = {"array": Array.thesis(), "events": once(lambda: events), "frames": None}

@@ -31,8 +31,8 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     table = recording.events if recording.has_events else recording.frames()
     span = (int(table.t.min()), int(table.t.max())) if len(table) else None
     seconds = (span[1] - span[0]) / 1e6 if span else 0.0
-    said: dict[str, Any] = {
-        "file": _named(recording),
+    facts: dict[str, Any] = {
+        "file": _file_name(recording),
         "kind": recording.kind,
         "source": recording.source,
         "array": {name: value for name, value in array._geometry().items() if name != "exists"},
@@ -43,29 +43,29 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     }
     if recording.has_events:
         events = recording.events
-        said["events"] = len(events)
-        said["intensities"] = 0 if events.present is None else int(events.present.sum())
-        said["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
-        said["events_per_s_board"] = len(events) / seconds if seconds else None
-        said["peak_events_per_s_board"] = _peak(events.t)
+        facts["events"] = len(events)
+        facts["intensities"] = 0 if events.present is None else int(events.present.sum())
+        facts["markers"] = [{"t_us": t, "start": start} for t, start in events.markers]
+        facts["events_per_s_board"] = len(events) / seconds if seconds else None
+        facts["peak_events_per_s_board"] = _peak(events.t)
     else:
-        said["pictures"], said["unit"] = len(table), recording.frames().unit
-        said["pictures_per_s"] = (len(table) - 1) / seconds if seconds else None
+        facts["pictures"], facts["unit"] = len(table), recording.frames().unit
+        facts["pictures_per_s"] = (len(table) - 1) / seconds if seconds else None
     clock = recording.clock
     if clock is not None and len(clock.board_us) > 1:
         host = (int(clock.arrived_ns.max()) - int(clock.arrived_ns.min())) / 1e9
         late = np.percentile(clock.delay_us, [50, 99])
-        said |= {
+        facts |= {
             "seconds_host": host,
-            "events_per_s_host": said["events"] / host if host and "events" in said else None,
+            "events_per_s_host": facts["events"] / host if host and "events" in facts else None,
             "datagrams_per_s_host": len(clock.arrived_ns) / host if host else None,
             "drift_ppm": clock.drift_ppm,
             "delay_us": {"median": float(late[0]), "p99": float(late[1])},
         }
     calibration = recording.calibration
-    said["calibration"] = None if calibration is None else calibration.described()
-    said["pressure"] = None if pressed is None else _pressure(pressed)
-    return said | {
+    facts["calibration"] = None if calibration is None else calibration.described()
+    facts["pressure"] = None if pressed is None else _pressure(pressed)
+    return facts | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
         "registers": None if recording.registers is None else json.loads(recording.registers._json()),
@@ -78,7 +78,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     }
 
 
-def _named(recording: Recording) -> str:
+def _file_name(recording: Recording) -> str:
     """Return the file, and which trial of it this is where other people's holds several."""
     place = str(recording.path)
     return place if place.endswith(recording.name) else f"{place}, {recording.name}"
@@ -88,15 +88,15 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
     """Return the largest contact area, peak and sum with their times, and where the centre went."""
     if not len(pressed.t):
         return None
-    said: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
+    facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
     for name, values in {"area_mm2": pressed.area, "peak": pressed.peak, "sum": pressed.total}.items():
         k = int(values.argmax())
-        said[name] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
+        facts[name] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
     centre = pressed.centre[~np.isnan(pressed.centre).any(axis=1)]
     limits = {"x": [float(v) for v in (centre[:, 0].min(), centre[:, 0].max())]} if len(centre) else None
     if limits is not None:
         limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
-    return said | {"centre_mm": limits}
+    return facts | {"centre_mm": limits}
 
 
 def _peak(t: NDArray[np.int64]) -> float | None:

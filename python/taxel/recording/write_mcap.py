@@ -122,9 +122,11 @@ def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
     def at_ns(t: int) -> int:
         return max(0, t * 1000 if clock is None else int(clock.host_ns(t)))
 
-    found = contents.detections
+    detections = contents.detections
     noted = [note.t for note in contents.notes if note.t is not None]
-    around = np.concatenate([found.t, found.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)])
+    around = np.concatenate(
+        [detections.t, detections.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)]
+    )
     for t, start in events.markers:
         writer.marker(at_ns(t), t, start)
     for t, ticks in _core.RecordingPictures(events._parts(), around):
@@ -135,7 +137,7 @@ def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
         writer.zeroing(at_ns(zeroing.t), zeroing.t, zeroing.x, zeroing.y, zeroing.rest, zeroing.before)
     for at, values in contents.register_changes:
         writer.registers(at, values._json())
-    for d in found:
+    for d in detections:
         writer.detection(at_ns(d.known), d.label, d.t, d.known, d.slope, d.repaired)
 
 

@@ -66,7 +66,7 @@ def _one(figure: Figure) -> Markup:
         data = chart_data(figure)
     except _NotKnownError:
         return Markup('<div class="picture">') + Markup(_svg(figure)) + Markup("</div>")
-    # Within a page nothing may look like the end of the script.
+    # The data must not contain the end tag of the script element that holds it.
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     return Markup('<div class="charts"><script type="application/json">') + Markup(text) + Markup("</script></div>")
 
@@ -129,8 +129,8 @@ def _place(axes: Axes) -> list[int] | None:
 
 
 def _axes(axes: Axes, figure: Figure, groups: dict[Any, int]) -> dict[str, Any]:
-    named = {id(child): holder.get_label() for holder in axes.containers for child in _children(holder)}
-    drawn = _Drawn(axes, named)
+    names = {id(child): holder.get_label() for holder in axes.containers for child in _children(holder)}
+    drawn = _Drawn(axes, names)
     for artist in _artists(axes):
         drawn.add(artist)
     shared = axes.get_shared_x_axes().get_siblings(axes)
@@ -179,7 +179,7 @@ def _axis(axis: Axis, limits: tuple[float, float]) -> dict[str, Any]:
         # uPlot's own: straight around 0, logarithmic far from it.
         data |= {"scale": "asinh", "around": float(axis.get_transform().linthresh)}  # type: ignore[attr-defined]
     elif scale == "function":
-        # The one function that reports use is a root; which, two values tell.
+        # The only function scales of reports are roots; two values determine which root.
         there = np.asarray(axis.get_transform().transform(np.array([4.0, 9.0])))
         if not np.allclose(there, [2.0, 3.0]):
             raise _NotKnownError
@@ -201,9 +201,9 @@ def _axis(axis: Axis, limits: tuple[float, float]) -> dict[str, Any]:
     return data
 
 
-def _colour(given: Any, alpha: float | None = None) -> str | None:
+def _colour(value: Any, alpha: float | None = None) -> str | None:
     """Return a colour as CSS holds it; None where it is none."""
-    red, green, blue, own = colors.to_rgba(given, alpha)
+    red, green, blue, own = colors.to_rgba(value, alpha)
     if own == 0:
         return None
     text = colors.to_hex((red, green, blue))
@@ -224,12 +224,12 @@ def _label(label: object) -> str:
 class _Drawn:
     """What stands in one pair of axes, by kind, in the order in which it is painted."""
 
-    def __init__(self, axes: Axes, named: Mapping[int, object]) -> None:
-        self.axes, self.named = axes, named
+    def __init__(self, axes: Axes, names: Mapping[int, object]) -> None:
+        self.axes, self.names = axes, names
         self.held: dict[str, list[dict[str, Any]]] = {}
 
     def add(self, artist: Any) -> None:
-        """Take one artist."""
+        """Add what one artist draws."""
         in_x, in_y = artist.get_transform().contains_branch_seperately(self.axes.transData)
         if isinstance(artist, AxesImage):
             self._image(artist)
@@ -257,7 +257,7 @@ class _Drawn:
         self.held.setdefault(kind, []).append({name: value for name, value in what.items() if value not in (None, "")})
 
     def _name(self, artist: Any) -> str:
-        return _label(self.named.get(id(artist), "")) or _label(artist.get_label())
+        return _label(self.names.get(id(artist), "")) or _label(artist.get_label())
 
     def _line(self, line: lines.Line2D, in_x: bool, in_y: bool) -> None:
         colour, style, name = _colour(line.get_color(), line.get_alpha()), line.get_linestyle(), self._name(line)
@@ -337,9 +337,9 @@ class _Drawn:
         size = float(np.sqrt(np.atleast_1d(artist.get_sizes())[0]))
         every = {_colour(face): np.flatnonzero((faces == face).all(axis=1)) for face in np.unique(faces, axis=0)}
         for colour, chosen in every.items():
-            taken = offsets if len(faces) == 1 else offsets[chosen]
+            points = offsets if len(faces) == 1 else offsets[chosen]
             self._put(
-                "lines", x=_numbers(taken[:, 0]), y=_numbers(taken[:, 1]), color=colour, face=colour, width=0.0,
+                "lines", x=_numbers(points[:, 0]), y=_numbers(points[:, 1]), color=colour, face=colour, width=0.0,
                 size=size, marker="o", name=self._name(artist),
             )  # fmt: skip
 
@@ -421,7 +421,7 @@ def _first(*every: Iterable[Any]) -> Any:
 
 
 def _colour_scale(axes: Any) -> dict[str, Any] | None:
-    # Its only way to the scale that axes show.
+    # matplotlib has no public way from axes to the colour bar that they show.
     bar = axes._colorbar
     if not isinstance(bar.norm, colors.Normalize) or bar.vmin is None:
         return None

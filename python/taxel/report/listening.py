@@ -33,15 +33,15 @@ __all__ = ["write_listening"]
 
 #: How many moments are drawn a label, and how much around each in time constants of the neuron.
 _MOMENTS, _AROUND = 4, 6.0
-#: What `taxel view` shows, and how many recordings are named for it.
+#: Files that `taxel view` shows, and the largest number of them that the page lists.
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
-_FOUND, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
+_DETECTED, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
 
 
 class _Moment(NamedTuple):
-    """Something worth a look: a label's event, when (us), and what became of it."""
+    """A moment to draw: an event or detection of a label, its time (us), and its outcome."""
 
     recording: int
     label: str
@@ -162,16 +162,16 @@ def _potential(readout: Readout, listened: Sequence[Outcome], label: str, moment
     for axis, moment in zip(axes[0], moments, strict=True):
         outcome = listened[moment.recording]
         trains = _trains(readout, outcome)
-        found = to_ms(outcome.found[label].t)
+        detected_ms = to_ms(outcome.found[label].t)
         at = to_ms(moment.t)
         times = np.linspace(at - reach, at + reach, 600)
-        crossings = found + readout.encoder.latency_ms + one.delay_ms
+        crossings = detected_ms + readout.encoder.latency_ms + one.delay_ms
         potential = one.neuron.potential(one.weights, trains, times, spikes=crossings)
         axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1, label="potential")
         threshold = readout.run_threshold * one.neuron.theta_0
         axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
-        for k, t in enumerate(found[np.abs(found - at) < reach]):
-            axis.axvline(t - at, color=_FOUND, linewidth=1.2, label="detected" * (k == 0))
+        for k, t in enumerate(detected_ms[np.abs(detected_ms - at) < reach]):
+            axis.axvline(t - at, color=_DETECTED, linewidth=1.2, label="detected" * (k == 0))
         true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
         for k, t in enumerate(true[np.abs(true - at) < reach]):
             axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--", label="true" * (k == 0))
@@ -198,22 +198,22 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
     if array is None:
         raise ProblemError(f"{outcome.name}: spike trains do not state their array")
     largest = float(np.abs(weights).max()) or 1.0
-    named = _planes(weights, readout, array.rows * array.columns)
-    if not named or array.rows * array.columns < 4:
+    planes = _planes(weights, readout, array.rows * array.columns)
+    if not planes or array.rows * array.columns < 4:
         figure, axis = plt.subplots(figsize=(6.5, 2.2), layout="constrained")
         axis.bar(np.arange(len(weights)), weights, color=_POTENTIAL)
         axis.axhline(0, color="#999999", linewidth=0.8)
         axis.set_xlabel("input, in the encoder's order")
         axis.set_ylabel("weight, mV")
         return figure
-    named = sorted(named, key=lambda one: -float(np.abs(one[1]).max()))[:_MAPS]
-    columns = min(4, len(named))
-    rows = -(-len(named) // columns)
+    planes = sorted(planes, key=lambda one: -float(np.abs(one[1]).max()))[:_MAPS]
+    columns = min(4, len(planes))
+    rows = -(-len(planes) // columns)
     figure, axes = plt.subplots(rows, columns, figsize=(2.4 * columns, 2.4 * rows), layout="constrained", squeeze=False)
     scale = Normalize(-largest, largest)
     for axis in axes.flat:
         axis.set_axis_off()
-    for axis, (name, plane) in zip(axes.flat, named, strict=False):
+    for axis, (name, plane) in zip(axes.flat, planes, strict=False):
         axis.set_axis_on()
         picture = plane.reshape(array.shape)
         axis.imshow(picture if array.exists is None else np.where(array.exists, picture, np.nan), "RdBu_r", scale)

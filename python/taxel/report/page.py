@@ -38,7 +38,7 @@ def render(template: str, *, package: str = "taxel", **values: Any) -> str:
         What the template shows; figures as `taxel.report.charts.chart` makes them.
     """
     plot = _core.page_file("vendor/uPlot.js").decode()
-    # A module in a page exports nothing: the name is handed out, and all others stay within.
+    # A script in a page cannot export: a function returns uPlot's public name, and its other names stay local.
     drawn, exported, _ = plot.rpartition("export {")
     assert exported, "uPlot.js ends with what it exports"
     own = files("taxel.report").joinpath("charts.js").read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ __all__ = ["Act", "Contact", "Motion", "Pictures", "Scene", "Silence", "Track"]
 
 
 class Contact(NamedTuple):
-    """One touch, as it really was: from the moment when force leaves zero to that when it returns there.
+    """One true touch: from the time at which its force leaves zero to that at which it returns there.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Contact(NamedTuple):
 
 
 class Track(NamedTuple):
-    """A body's way, at even steps.
+    """A body's path, at even steps.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Track(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """A scene, worked out at even steps.
+    """The motion of a scene, computed at even steps.
 
     Attributes
     ----------
@@ -235,7 +235,7 @@ class Scene:
         return Scene({**self.parameters, "bodies": bodies})
 
     def motion(self, step_us: float = 48.0, *, array: Array | None = None) -> Motion:
-        """Work the scene out; by default in quarters of a frame of 5208 Hz, over the thesis' array.
+        """Compute the motion; by default in quarters of a frame of 5208 Hz, over the thesis' array.
 
         Parameters
         ----------
@@ -268,7 +268,7 @@ class Scene:
         return parameters(self.parameters)
 
     def _warn(self, narrow: str | None) -> None:
-        """Warn once a scene that a touch is too narrow."""
+        """Warn, once for each scene, that a touch is too narrow."""
         if narrow is not None and not self._warned:
             self._warned = True
             warnings.warn(narrow, stacklevel=3)
@@ -280,18 +280,18 @@ class Scene:
 
     def __repr__(self) -> str:
         bodies = self.parameters.get("bodies", [])
-        said = [f"{_only(body, 'shape')} {_only(body, 'motion')}" for body in bodies]
-        return f"Scene({', '.join(said)})"
+        kinds = [f"{_only(body, 'shape')} {_only(body, 'motion')}" for body in bodies]
+        return f"Scene({', '.join(kinds)})"
 
 
-#: What a body may be given beside what it has.
+#: Optional parameters of a body.
 _BODY = ("mass_g", "material", "stiffness_n_mm", "friction", "rolling_friction", "after_ms")
 
 
 def _only(body: object, part: str) -> str:
     """Return the one name in a part of a body."""
-    named = body.get(part) if isinstance(body, Mapping) else None
-    return "/".join(map(str, named)) if isinstance(named, Mapping) else "?"
+    kinds = body.get(part) if isinstance(body, Mapping) else None
+    return "/".join(map(str, kinds)) if isinstance(kinds, Mapping) else "?"
 
 
 def _replaced(

@@ -16,7 +16,7 @@ from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit
 from taxel.wire import Registers
-from taxel.wire.given import given_bytes
+from taxel.wire.buffer import buffer_bytes
 
 __all__ = ["NOT_RETURNED", "Board", "Version2", "fitting", "reading"]
 
@@ -29,7 +29,7 @@ _THESIS_LINES = 64
 
 @dataclass(frozen=True)
 class Version2:
-    """Say how a board speaks wire version 2.
+    """Hold the options of a board that sends version 2 of the wire.
 
     Parameters
     ----------
@@ -38,9 +38,10 @@ class Version2:
     seed : int, 0 to 65535
         The number of its first session; each reset takes the next.
     hold_us : int, us
-        For how long events may wait for company: 1000 makes sparse scenes a quarter smaller, and all up to 1 ms later.
+        For how long events wait for others in their datagram: 1000 makes sparse scenes a quarter smaller, and all up to
+        1 ms later.
     heartbeat_us : int, us
-        How often it promises that nothing has happened; each frame for 0.1 s after an event.
+        How often it sends that nothing has happened; each frame for 0.1 s after an event.
     states_us : int, us
         How often each value and the board's totals are sent again; 0: never.
 
@@ -68,7 +69,7 @@ class Version2:
 
 
 def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
-    """Return how taxels are read as the compiled part takes it.
+    """Return how taxels are read, as the compiled part expects it.
 
     Raises
     ------
@@ -220,7 +221,7 @@ class Board:
         >>> len(Board().command(bytes.fromhex("e000000000"))) > 0
         True
         """
-        return self._core.command(given_bytes(data))
+        return self._core.command(buffer_bytes(data))
 
     def record(self, start: bool) -> None:
         """Start or stop a recording: a marker goes out where that changes anything.

@@ -85,8 +85,8 @@ class Fabric(Value):
         >>> Fabric().conductance([0.0]) == Fabric().rest_us
         array([ True])
         """
-        given = _finite("force_n", force_n, "N")
-        return _core.fabric(self._json(), given.ravel(), False).reshape(given.shape)
+        checked = _finite("force_n", force_n, "N")
+        return _core.fabric(self._json(), checked.ravel(), False).reshape(checked.shape)
 
     def force(self, conductance_us: ArrayLike) -> Values:
         """Return forces in N of conductances in uS, of the same shape: the inverse; 0 at rest and below.
@@ -109,8 +109,8 @@ class Fabric(Value):
         >>> fabric.force(fabric.conductance([0.0, 2.0])).round(6)
         array([0., 2.])
         """
-        given = _finite("conductance_us", conductance_us, "uS")
-        return _core.fabric(self._json(), given.ravel(), True).reshape(given.shape)
+        checked = _finite("conductance_us", conductance_us, "uS")
+        return _core.fabric(self._json(), checked.ravel(), True).reshape(checked.shape)
 
 
 class _Lines(Value):
@@ -132,9 +132,9 @@ class _Lines(Value):
         ------
         ProblemError : a conductance that is none (names the taxel), or another shape
         """
-        given = _pictures("conductance_us", conductance_us, "uS")
-        shape: tuple[int, int] = given.shape[-2:]
-        return _core.circuit_volts(self._kind, self._json(), shape, given.ravel()).reshape(given.shape)
+        checked = _pictures("conductance_us", conductance_us, "uS")
+        shape: tuple[int, int] = checked.shape[-2:]
+        return _core.circuit_volts(self._kind, self._json(), shape, checked.ravel()).reshape(checked.shape)
 
     def volts_alone(self, conductance_us: ArrayLike) -> Values:
         """Return what taxels would make by themselves on ideal lines, V, of the same shape: no crosstalk.
@@ -143,8 +143,8 @@ class _Lines(Value):
         ------
         ProblemError : conductances that are not finite
         """
-        given = _finite("conductance_us", conductance_us, "uS")
-        return _core.circuit_volts_alone(self._kind, self._json(), given.ravel()).reshape(given.shape)
+        checked = _finite("conductance_us", conductance_us, "uS")
+        return _core.circuit_volts_alone(self._kind, self._json(), checked.ravel()).reshape(checked.shape)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -212,7 +212,7 @@ class VirtualGround(_Lines):
 class Divider(_Lines):
     """Pull rows to ground by resistors and put the supply on one driven line after the other: no amplifier.
 
-    Currents go astray by other taxels, so a taxel reads less, or more, than it would by itself.
+    Currents also flow through other taxels, so a taxel reads less, or more, than it would by itself.
 
     Parameters
     ----------
@@ -257,11 +257,11 @@ class Trace(NamedTuple):
     ----------
     t_us : float64, shape (n,), us
     line_v : float64, shape (n,), V
-        The sense line that the multiplexer has chosen, V.
+        The sense line that the multiplexer has chosen.
     input_v : float64, shape (n,), V
-        The comparator's input, which settles towards it, V.
+        The comparator's input, which settles towards it.
     ramp_v : float64, shape (n,), V
-        V.
+        The ramp.
     high : bool, shape (n,)
         The comparator's output: whether the ramp has passed.
     """
@@ -351,9 +351,9 @@ class Converter(Value):
         ------
         ProblemError : voltages that are not finite, or another shape
         """
-        given = _pictures("volts", volts, "V")
-        shape: tuple[int, int] = given.shape[-2:]
-        return _core.converter_ticks(self._json(), shape, given.ravel()).reshape(given.shape)
+        checked = _pictures("volts", volts, "V")
+        shape: tuple[int, int] = checked.shape[-2:]
+        return _core.converter_ticks(self._json(), shape, checked.ravel()).reshape(checked.shape)
 
     def ramp_volts(self, ticks: ArrayLike) -> Values:
         """Return where the ramp stands after so many ticks.
@@ -376,8 +376,8 @@ class Converter(Value):
         >>> converter.ramp_ticks(converter.ramp_volts([50.0])).round(6)
         array([50.])
         """
-        given = _finite("ticks", ticks)
-        return _core.converter_ramp(self._json(), given.ravel(), False).reshape(given.shape)
+        checked = _finite("ticks", ticks)
+        return _core.converter_ramp(self._json(), checked.ravel(), False).reshape(checked.shape)
 
     def ramp_ticks(self, volts: ArrayLike) -> Values:
         """Return when the ramp passes a voltage: the inverse of `ramp_volts`.
@@ -395,8 +395,8 @@ class Converter(Value):
         ------
         ProblemError : voltages that are not finite
         """
-        given = _finite("volts", volts, "V")
-        return _core.converter_ramp(self._json(), given.ravel(), True).reshape(given.shape)
+        checked = _finite("volts", volts, "V")
+        return _core.converter_ramp(self._json(), checked.ravel(), True).reshape(checked.shape)
 
     def trace(self, line_v: Sequence[float], *, every_us: float = 0.01, stop_us: float = 3.0) -> Trace:
         """Return the signals of one comparator while its lines are read, again and again.
@@ -434,13 +434,13 @@ class Converted(NamedTuple):
     Attributes
     ----------
     t_us : float64, shape (frames,), us
-        When each began, us, shape (frames,); a column is read as it is when its turn comes.
+        When each began; a column is read with the voltages at the time of its own conversion.
     ramp : uint32, shape (frames,), ticks
-        How long its ramp took, ticks, shape (frames,).
+        How long its ramp took.
     ticks : float64, shape (frames, rows, columns), ticks
-        When the comparators tripped, shape (frames, rows, columns), as `Converter.ticks`.
+        When the comparators tripped, as `Converter.ticks`.
     volts : float64, shape (frames, rows, columns), V
-        The voltages of the whole ticks that a counter shows, V: halfway to the next tick, 3 V at the end.
+        The voltages of the whole ticks that a counter shows: halfway to the next tick, 3 V at the end.
     """
 
     t_us: Values
@@ -509,8 +509,8 @@ class AdaptiveRamp(Value):
         ------
         ProblemError : voltages that are not finite, another shape, or so many that more than 2e8 readings could come
         """
-        given = _pictures("volts", volts, "V")
-        frames = given if given.ndim == 3 else given[None]
+        checked = _pictures("volts", volts, "V")
+        frames = checked if checked.ndim == 3 else checked[None]
         shape: tuple[int, int] = frames.shape[1:]
         period = number("period_us", period_us, "us")
         t_us, ramp, *read = _core.adaptive_convert(self._json(), shape, frames.ravel(), period)
@@ -565,14 +565,14 @@ class Circuit(Value):
 
 
 def _finite(name: str, values: ArrayLike, unit: str | None = None) -> Values:
-    given = numbers(name, values, np.float64, unit)
-    if not np.isfinite(given).all():
-        raise ProblemError(f"{name}: must be finite, {shown(given[~np.isfinite(given)][0].item())} is not")
-    return given
+    checked = numbers(name, values, np.float64, unit)
+    if not np.isfinite(checked).all():
+        raise ProblemError(f"{name}: must be finite, {shown(checked[~np.isfinite(checked)][0].item())} is not")
+    return checked
 
 
 def _pictures(name: str, values: ArrayLike, unit: str) -> Values:
-    given = _finite(name, values, unit)
-    if given.ndim not in (2, 3) or 0 in given.shape[-2:]:
-        raise ProblemError(f"{name} has shape {given.shape}: must be (rows, columns) or (n, rows, columns)")
-    return given
+    checked = _finite(name, values, unit)
+    if checked.ndim not in (2, 3) or 0 in checked.shape[-2:]:
+        raise ProblemError(f"{name} has shape {checked.shape}: must be (rows, columns) or (n, rows, columns)")
+    return checked

@@ -49,7 +49,7 @@ class Played(NamedTuple):
 def truth(
     acts: Sequence[Act], *, preset: str | None = None, array: Array | None = None
 ) -> tuple[list[Contact], NDArray[np.float32]]:
-    """Return what really happens in acts: touches by the board's clock (us from its first frame), force (N) by frame.
+    """Return the truth of acts: touches by the board's clock (us from its first frame), and force (N) by frame.
 
     Parameters
     ----------
@@ -240,10 +240,10 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
     registers = instance("registers", options.registers, Registers)
     felt: Any = touch._touch(registers) if isinstance(touch, Replay | Pipe) else _checked(touch, sensed)
 
-    def tell(said: str, contacts: list[Any]) -> None:
+    def tell(state: str, contacts: list[Any]) -> None:
         if contacts:
             options.touched([Contact(*contact) for contact in contacts])
-        options.watch(EmulatorReport._from_json(said))
+        options.watch(EmulatorReport._from_json(state))
 
     callback("watch", options.watch), callback("touched", options.touched)
     report = _core.emulate(
@@ -277,11 +277,11 @@ def _parts(acts: Sequence[Act], array: Array) -> list[Any]:
 
 
 def _warn(acts: Sequence[Act], narrow: list[tuple[int, str]]) -> None:
-    """Say of scenes, by number of the act, that a touch is too narrow."""
-    for n, said in narrow:
+    """Warn of scenes, by number of the act, in which a touch is too narrow."""
+    for n, problem in narrow:
         act = acts[n]
         if isinstance(act, Scene):
-            act._warn(said)
+            act._warn(problem)
 
 
 def _part(n: int, act: Act, array: Array) -> Any:

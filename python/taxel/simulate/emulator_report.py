@@ -72,7 +72,7 @@ class EmulatorReport:
     @property
     def verdict(self) -> str:
         """One line: whether the rate was held, or by how much not, and how late frames were."""
-        late = ", ".join(f"{to_ms(self.late_us[q]):.2f} ms ({said})" for q, said in _QUANTILES.items())
+        late = ", ".join(f"{to_ms(self.late_us[q]):.2f} ms ({quantile})" for q, quantile in _QUANTILES.items())
         late = f"late by {late}; {self.late_frames} of {self.frames} by a frame or more"
         if self.held:
             whole = "held" if self.late_frames <= 0.01 * self.frames else "held on the whole, but not frame by frame"
@@ -84,8 +84,8 @@ class EmulatorReport:
         )
 
     @classmethod
-    def _from_json(cls, said: str) -> EmulatorReport:
-        report = json.loads(said)
+    def _from_json(cls, text: str) -> EmulatorReport:
+        report = json.loads(text)
         board, sent, late = report["board"], report["sent"], report["late"]
         return cls(
             frames=board["frames"],

@@ -27,7 +27,7 @@ __all__ = ["EmulateOptions"]
 
 
 def _nothing(_: object) -> None:
-    """Ignore what a function that was left out would be called with."""
+    """Do nothing: the default of a callback."""
 
 
 def _path(name: str, path: str | os.PathLike[str]) -> str:
@@ -46,9 +46,7 @@ class EmulateOptions:
         None, f"The registers: one of {QUOTED_PRESETS}. Default: the scene's, or those of the array at reset."
     )
     registers: Registers | None = None
-    tare_ms: float = option(
-        50.0, "How long the noise floor is 0 before the start marker, s. Default: 0.05, or the scene's."
-    )
+    tare_ms: float = 50.0
     array: Array | None = None
     sensor: Mapping[str, float] | None = None
     wire: Literal[1, 2] | None = option(None, "Version of the wire. Default: by the registers.", least=1, most=2)
@@ -87,7 +85,7 @@ class EmulateOptions:
     touched: Callable[[list[Contact]], object] = _nothing
 
     def completed(self) -> EmulateOptions:
-        """Return them with the array of the touch and the registers that the board begins with."""
+        """Return the options with the array of the touch and the registers that the board begins with."""
         touch, registers = self.touch, self.registers
         if isinstance(touch, Replay | Pipe):
             array, preset = touch.array, touch.registers

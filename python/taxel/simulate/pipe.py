@@ -13,7 +13,7 @@ from taxel.wire import Registers
 
 __all__ = ["Pipe"]
 
-#: Longer first lines are none, bytes.
+#: Largest length of the first line, bytes.
 _LONGEST_LINE = 1 << 16
 
 
@@ -45,13 +45,13 @@ class Pipe:
             raise ProblemError(f"source is {shown(source)}: must be a pipe or a file, opened to read bytes") from None
         line = self._line()
         try:
-            said = json.loads(line)
-            rows, columns, rate, bits = (said[name] for name in ("rows", "columns", "rate", "bits"))
+            header = json.loads(line)
+            rows, columns, rate, bits = (header[name] for name in ("rows", "columns", "rate", "bits"))
         except (ValueError, TypeError, KeyError) as error:
-            wanted = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
+            expected = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
             begin = line[:60].decode("utf-8", "replace")
-            raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {wanted}") from None
-        self.array = Array(rows, columns, pitch_mm=said.get("pitch_mm", 1.0), name=said.get("name", "pipe"))
+            raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {expected}") from None
+        self.array = Array(rows, columns, pitch_mm=header.get("pitch_mm", 1.0), name=header.get("name", "pipe"))
         self.rate_hz, floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
         try:
             held, self.shift = Registers._of_source(self.array, self.rate_hz, whole("bits", bits, 1, 16))
@@ -60,7 +60,7 @@ class Pipe:
         self._registers = held.replace(noise_floor=floor)
 
     def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames' line has their rate
-        """Return what the board holds that scans such frames.
+        """Return the registers of a board that scans such frames.
 
         Parameters
         ----------

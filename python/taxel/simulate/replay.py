@@ -56,12 +56,12 @@ class Replay:
         return self.source.array
 
     def registers(self, preset: str | None) -> Registers:
-        """Return what the board holds that plays it: as it was recorded where that is known, else a preset.
+        """Return the registers of the board that plays it: the recording's where they are known, else a preset.
 
         Parameters
         ----------
         preset : str or None
-            What the board holds where the recording does not say.
+            The registers where the recording has none.
 
         Raises
         ------
@@ -69,14 +69,14 @@ class Replay:
         """
         known = None if self.recording is None else self.recording.registers
         if known is not None and known.array != self.array:
-            # A part of a sensor: a board of its own, as fast as the whole one was.
+            # A region of a sensor is played as a board of its own, at the frame rate of the whole one.
             held, _ = Registers._of_source(self.array, 1e6 / known.frame_us, int(known.ramp).bit_length())
             held = held.replace(noise_floor=known.noise_floor, wire_version=known.wire_version)
         else:
             held = fitting(preset, self.array) if known is None else known.replace(record=False)
         values = self.source.intensity if isinstance(self.source, Events) else None
         most = 0 if values is None else int(values.max())
-        # A converter sees nothing above its ramp: where that is a preset's and the sensor another, it is made longer.
+        # A converter reads nothing above its ramp, so a preset's ramp is lengthened until the largest value fits.
         rate_hz = 1e6 / held.frame_us
         while most >= held.ramp:
             longer, halved = Registers._of_source(self.array, rate_hz, (most + 1).bit_length())

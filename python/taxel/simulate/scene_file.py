@@ -24,7 +24,7 @@ from taxel.wire import Registers
 
 __all__ = ["SceneFile"]
 
-#: What a file may hold beside what a scene holds.
+#: Keys of a file beside those of a scene.
 _OWN = ("seed", "preset", "tare_ms", "array", "taxels")
 _SCENE = ("surface", "cells_per_pitch", "foam", "bodies", "slant_deg", "downhill_deg", "lead_ms", "tail_ms")
 _TAXELS = (
@@ -40,7 +40,7 @@ _TAXELS = (
 )
 #: Silence between the tare and the scene, and after it, ms.
 _BEFORE_MS, _AFTER_MS = 250.0, 100.0
-#: As long as a scene's silences may be.
+#: The longest tare, ms: the limit of a scene's silences.
 _LONGEST_MS = 60_000.0
 
 
@@ -110,42 +110,43 @@ class SceneFile:
         """
         place = Path(checked_path("path", path))
         try:
-            said = tomllib.loads(place.read_text(encoding="utf-8-sig"))
+            document = tomllib.loads(place.read_text(encoding="utf-8-sig"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise SceneError(f"{place}: not TOML: {error}") from None
         try:
-            return cls._of(said, place.parent)
+            return cls._of(document, place.parent)
         except _core.Error as error:
             raise SceneError(f"{place}: {error}") from None
 
     @classmethod
-    def _of(cls, said: Mapping[str, Any], folder: Path) -> SceneFile:
-        _known("", said, (*_OWN, *_SCENE))
-        of = said.get("array", {})
+    def _of(cls, document: Mapping[str, Any], folder: Path) -> SceneFile:
+        _known("", document, (*_OWN, *_SCENE))
+        of = document.get("array", {})
         _known("array", of, ("rows", "columns", "pitch_mm"))
         thesis = Array.thesis()
         array = Array(
             of.get("rows", thesis.rows), of.get("columns", thesis.columns), pitch_mm=of.get("pitch_mm", thesis.pitch_mm)
         ) if of else thesis  # fmt: skip
-        sensor = said.get("taxels", {})
+        sensor = document.get("taxels", {})
         _known("taxels", sensor, _TAXELS)
-        if "bodies" not in said:
+        if "bodies" not in document:
             raise SceneError("bodies is missing: write [[bodies]] and what one is")
         scene = Scene(
-            {name: said[name] for name in _SCENE if name in said} | {"bodies": _bodies(said["bodies"], folder)}
+            {name: document[name] for name in _SCENE if name in document}
+            | {"bodies": _bodies(document["bodies"], folder)}
         )
-        # Says what makes no sense before anything is played.
+        # Refuses what makes no sense here, instead of when the scene is played.
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
         if not np.isfinite(scene.motion(array=array).force_n).all():
             raise SceneError("foam: the force on it is beyond what a float32 holds; must be softer")
-        preset = text("preset", said["preset"]) if "preset" in said else cls.preset
+        preset = text("preset", document["preset"]) if "preset" in document else cls.preset
         fitting(preset, array)
-        tare_ms = number("tare_ms", said.get("tare_ms", cls.tare_ms))
+        tare_ms = number("tare_ms", document.get("tare_ms", cls.tare_ms))
         if not 0 <= tare_ms <= _LONGEST_MS:
             raise SceneError(f"tare_ms is {tare_ms:g} ms: must be from 0 to {_LONGEST_MS:g}")
         return cls(
             scene,
-            whole("seed", said.get("seed", cls.seed), 0),
+            whole("seed", document.get("seed", cls.seed), 0),
             preset,
             tare_ms,
             array,
@@ -154,7 +155,7 @@ class SceneFile:
 
     @property
     def registers(self) -> Registers:
-        """What the board holds that plays it."""
+        """The registers of the board that plays it."""
         return fitting(self.preset, self.array)
 
     def acts(self) -> list[Act]:
@@ -163,27 +164,27 @@ class SceneFile:
 
     @property
     def options(self) -> dict[str, Any]:
-        """What `play` and `emulate` take beside acts and seed."""
+        """Arguments of `play` and `emulate` beside acts and seed."""
         return {"preset": self.preset, "tare_ms": self.tare_ms, "array": self.array, "sensor": self.sensor}
 
 
-def _known(place: str, said: object, names: tuple[str, ...] | list[str]) -> None:
+def _known(place: str, table: object, names: tuple[str, ...] | list[str]) -> None:
     """Refuse a key that is not known, with the one that was meant."""
-    if not isinstance(said, Mapping):
-        raise SceneError(f"{place} is {json.dumps(said, default=str)}: must be a table")
-    for name in said:
+    if not isinstance(table, Mapping):
+        raise SceneError(f"{place} is {json.dumps(table, default=str)}: must be a table")
+    for name in table:
         if name not in names:
             near = difflib.get_close_matches(name, names, 1)
             meant = f" (did you mean {near[0]}?)" if near else ""
             raise SceneError(f"{place}{'.' * bool(place)}{name} is not known{meant}: there is {', '.join(names)}")
 
 
-def _bodies(said: Any, folder: Path) -> Any:
+def _bodies(described: Any, folder: Path) -> Any:
     """Return bodies with the height maps that lie in files."""
-    if not isinstance(said, list):
-        raise SceneError(f"bodies is {json.dumps(said, default=str)}: must be written [[bodies]], once a body")
+    if not isinstance(described, list):
+        raise SceneError(f"bodies is {json.dumps(described, default=str)}: must be written [[bodies]], once a body")
     bodies = []
-    for n, body in enumerate(said):
+    for n, body in enumerate(described):
         if isinstance(body, Mapping):
             for part in ("shape", "motion"):
                 kinds = body.get(part)

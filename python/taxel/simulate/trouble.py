@@ -76,9 +76,9 @@ class Flaws:
         return {name: {"size": float(getattr(self, name)), "seed": seeds.get(name, 0)} for name in self._names()}
 
     def __repr__(self) -> str:
-        given = [f"{name}={getattr(self, name)}" for name in self._names() if getattr(self, name)]
-        given += [f"seeds={dict(self.seeds)}"] if self.seeds else []
-        return f"Flaws({', '.join(given)})"
+        settings = [f"{name}={getattr(self, name)}" for name in self._names() if getattr(self, name)]
+        settings += [f"seeds={dict(self.seeds)}"] if self.seeds else []
+        return f"Flaws({', '.join(settings)})"
 
 
 @dataclass(frozen=True)

@@ -87,7 +87,9 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
         raise FormatError(f"{place}: no NWB file that can be read: {shown(str(error))}") from None
     every = np.concatenate([*times, [0.0]])
     widest = (watched[:, 0].min(), watched[:, 1].max()) if len(watched) else (every.min(), every.max())
-    first, last = (float(found) if given is None else given for given, found in zip(window_ms, widest, strict=True))
+    first, last = (
+        float(outermost) if chosen is None else chosen for chosen, outermost in zip(window_ms, widest, strict=True)
+    )
     return times, first, last, values
 
 

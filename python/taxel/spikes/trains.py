@@ -15,9 +15,10 @@ from taxel import _core
 from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, column, floats, nth, number, several, shown, window
 from taxel._base.arguments import path as checked_path
-from taxel._base.columns import Columns, frozen, kept
+from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
 from taxel._base.files import write_whole
+from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.spikes.exchange import read_nwb, write_nwb
 
@@ -67,9 +68,9 @@ class SpikeTrains(Columns):
         stop: float,
         values: ArrayLike | None = None,
     ) -> None:
-        self.times: NDArray[np.float64] = kept("times", times, np.float64, "ms")
-        self.offsets: NDArray[np.int64] = kept("offsets", offsets, np.int64)
-        self.values: NDArray[np.float32] | None = None if values is None else kept("values", values, np.float32)
+        self.times: NDArray[np.float64] = own_column("times", times, np.float64, "ms")
+        self.offsets: NDArray[np.int64] = own_column("offsets", offsets, np.int64)
+        self.values: NDArray[np.float32] | None = None if values is None else own_column("values", values, np.float32)
         _finite_values(self.values)
         self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())
@@ -188,7 +189,7 @@ class SpikeTrains(Columns):
         Examples
         --------
         >>> SpikeTrains.from_lists([[1.0, 5.0], [3.0]], stop=10.0).between(2.0, 5.0)
-        SpikeTrains(2 trains, 1 spikes, 2 to 5 ms)
+        SpikeTrains(2 trains, 1 spike, 2 to 5 ms)
         """
         start, stop = window("ms", start, stop)
         return self._where((self.times >= start) & (self.times < stop), start, stop)
@@ -503,7 +504,8 @@ class SpikeTrains(Columns):
 
     def __repr__(self) -> str:
         signed = ", signed" if self.signed else ""
-        return f"SpikeTrains({len(self)} trains, {len(self.times)} spikes{signed}, {self.start:g} to {self.stop:g} ms)"
+        size = f"{counted(len(self), 'train')}, {counted(len(self.times), 'spike')}"
+        return f"SpikeTrains({size}{signed}, {self.start:g} to {self.stop:g} ms)"
 
 
 def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[NDArray[Any], list[int]]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, whole
 from taxel._base.columns import frozen
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -48,7 +49,7 @@ class Columns:
     >>> from taxel.wire import Decoder
     >>> columns, decoder = Columns(1000), Decoder()
     >>> decoder.push_into(columns, bytes.fromhex("c000050304 c000060304"))
-    Events(1 events, 500 to 500 us, 64 x 64 taxels, no intensities)
+    Events(1 event, 500 to 500 us, 64 x 64 taxels, no intensities)
     """
 
     def __init__(self, rows: int) -> None:
@@ -69,7 +70,7 @@ class Columns:
         return len(self.t)
 
     def __repr__(self) -> str:
-        return f"Columns(room for {len(self)} events)"
+        return f"Columns(room for {counted(len(self), 'event')})"
 
     def _parts(
         self,
@@ -92,7 +93,7 @@ class Columns:
         return columns
 
     @classmethod
-    def _asked_for(cls, columns: Columns | None, rows: int) -> tuple[Columns, bool]:
+    def _or_fresh(cls, columns: Columns | None, rows: int) -> tuple[Columns, bool]:
         """Return the caller's columns, or fresh ones for so many rows; and whether they are fresh."""
         return (cls._fresh(rows), True) if columns is None else (instance("columns", columns, cls), False)
 
@@ -109,7 +110,7 @@ class Columns:
         t, x, y, p = self.t[:rows], self.x[:rows], self.y[:rows], self.p[:rows]
         return Events._unchecked(t, x, y, p, array, ticks, present, repaired, tuple(markers))
 
-    def _given(
+    def _owning(
         self,
         array: Array,
         rows: int,

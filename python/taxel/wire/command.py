@@ -7,7 +7,7 @@ from typing import Any
 
 from taxel import _core
 from taxel._base.arguments import whole
-from taxel.wire.given import given_bytes
+from taxel.wire.buffer import buffer_bytes
 
 __all__ = ["Command"]
 
@@ -81,4 +81,4 @@ class Command:
         >>> Command.from_bytes(Command(4, 140).to_bytes()).value
         140
         """
-        return cls(*_core.command_read(given_bytes(data)))
+        return cls(*_core.command_read(buffer_bytes(data)))

@@ -75,7 +75,7 @@ class Counts:
     >>> decoder = Decoder()
     >>> events = decoder.push(bytes.fromhex("05 c000050304"))
     >>> decoder.end_of_datagram()
-    Events(1 events, 500 to 500 us, 64 x 64 taxels, no intensities)
+    Events(1 event, 500 to 500 us, 64 x 64 taxels, no intensities)
     >>> decoder.counts.bytes, decoder.counts.words, decoder.counts.skipped
     (6, 1, 1)
     """

@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import column, flag, instance, text, whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
+from taxel.wire.buffer import buffer_bytes
 from taxel.wire.columns import Columns
 from taxel.wire.counts import Counts, Received, Status
-from taxel.wire.given import given_bytes
 
 __all__ = ["Decoder", "decode"]
 
@@ -69,7 +70,7 @@ def decode(
     Examples
     --------
     >>> decode(bytes.fromhex("c000050304 e000280304"))
-    Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+    Events(1 event, 500 to 500 us, 64 x 64 taxels, 1 intensity)
     >>> from taxel.simulate import Board
     >>> from taxel.wire import Registers
     >>> sent = Board(Registers(wire_version=2)).frame(np.full(4096, 40, np.uint16))
@@ -77,8 +78,8 @@ def decode(
     Events(4096 events, 0 to 0 us, 64 x 64 taxels, 4096 intensities)
     """
     decoder = Decoder(version, array=array, pairing=pairing, differences=differences)
-    stream = given_bytes(data)
-    room, own = Columns._asked_for(columns, _core.wire_rows(decoder.version, len(stream)))
+    stream = buffer_bytes(data)
+    room, own = Columns._or_fresh(columns, _core.wire_rows(decoder.version, len(stream)))
     if decoder.version == 2:
         if lengths is not None:
             raise ProblemError("lengths: each datagram of version 2 has its own before it; leave them out")
@@ -87,7 +88,7 @@ def decode(
         filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())
     else:
         filled = decoder._core.fill(stream, None, room._parts(), pairing == "direct")
-    events = (room._given if own else room._first)(decoder.array, *filled)
+    events = (room._owning if own else room._first)(decoder.array, *filled)
     if pairing == "taxel":
         markers, events = events.markers, decoder.finish()
         events.markers = markers
@@ -133,7 +134,7 @@ class Decoder:
     >>> decoder.push(bytes.fromhex("c000050304 e00028"))
     Events(0 events, no time, 64 x 64 taxels, no intensities)
     >>> decoder.push(bytes.fromhex("0304"))
-    Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+    Events(1 event, 500 to 500 us, 64 x 64 taxels, 1 intensity)
     >>> decoder.counts.words, decoder.counts.skipped
     (2, 0)
 
@@ -143,7 +144,7 @@ class Decoder:
     >>> ticks = np.zeros(4096, np.uint16)
     >>> ticks[board.array.index(3, 4)] = 40
     >>> [decoder.push(datagram) for datagram in board.frame(ticks)]
-    [Events(1 events, 0 to 0 us, 64 x 64 taxels, 1 intensities)]
+    [Events(1 event, 0 to 0 us, 64 x 64 taxels, 1 intensity)]
     >>> decoder.last, decoder.counts.intact, decoder.counts.missing
     (Received(until=192, intact=True), 1, 0)
     """
@@ -185,11 +186,11 @@ class Decoder:
         Examples
         --------
         >>> Decoder().push(bytes.fromhex("c000050304 e000280304"))
-        Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+        Events(1 event, 500 to 500 us, 64 x 64 taxels, 1 intensity)
         """
-        stream = given_bytes(data)
+        stream = buffer_bytes(data)
         columns = Columns._fresh(_core.wire_rows(self.version, len(stream)))
-        return columns._given(self.array, *self._fill(columns, stream, arrived))
+        return columns._owning(self.array, *self._fill(columns, stream, arrived))
 
     def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
         """Decode into memory that is used again; return the events as views of it.
@@ -219,7 +220,7 @@ class Decoder:
         array([40], dtype=uint16)
         """
         room = instance("columns", columns, Columns)
-        return room._first(self.array, *self._fill(room, given_bytes(data), arrived))
+        return room._first(self.array, *self._fill(room, buffer_bytes(data), arrived))
 
     def _fill(
         self, columns: Columns, data: NDArray[np.uint8], arrived: int | None
@@ -287,5 +288,5 @@ class Decoder:
     def __repr__(self) -> str:
         c, size = self.counts, f"{self.array.rows} x {self.array.columns} taxels"
         if self.version == 2:
-            return f"Decoder(version 2, {size}, {c.intact} datagrams, {c.missing} missing)"
-        return f"Decoder({size}, {c.changes} events, {c.skipped} bytes skipped)"
+            return f"Decoder(version 2, {size}, {counted(c.intact, 'datagram')}, {c.missing} missing)"
+        return f"Decoder({size}, {counted(c.changes, 'event')}, {counted(c.skipped, 'byte')} skipped)"

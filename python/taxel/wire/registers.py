@@ -223,8 +223,8 @@ class Registers:
         >>> slow.line_period, slow.noise_floor, slow.wire_version
         (7.81, 10, 2)
         """
-        named = text("preset", name)
-        held = json.loads(_core.registers_with_preset(self._json(), named, self.array._parts()))
+        preset = text("preset", name)
+        held = json.loads(_core.registers_with_preset(self._json(), preset, self.array._parts()))
         return self._of(held, self.array)
 
     @property

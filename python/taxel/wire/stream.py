@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from taxel import _core
-from taxel.wire.given import given_bytes
+from taxel.wire.buffer import buffer_bytes
 
 __all__ = ["StreamReader"]
 
@@ -51,7 +51,7 @@ class StreamReader:
         >>> StreamReader().push(b"no datagram")
         []
         """
-        return self._core.push(given_bytes(data))
+        return self._core.push(buffer_bytes(data))
 
     def finish(self) -> list[bytes]:
         """End the stream; return the datagrams within bytes that seemed to begin a longer one.

@@ -1,11 +1,25 @@
 """Gait events from touch: the protocols of thesis 6.5.2 and 6.5.3 on real recordings.
 
-The files in the order of the way: `sources` (recordings, their truth, their spikes), `insole` (a plate's footfall as an
-insole feels it), `pieces`, `folds`, `recipes` (all parameters, as data), `rules` (the plain rules beside the neuron),
-`protocols` (in which folds), `realise` (one fit and its test), `plans` (what is run), `outcomes` (what it comes to),
-`statements` and `pictures` (what the page shows), `study`.
+The files in the order of their use: `sources` (recordings, their truth, their spikes), `insole` (the cells of an insole
+under a footfall on a plate), `pieces`, `recipes` (all parameters, as data), `rules` (the plain rules beside the
+neuron), `protocols` (which folds), `fits` (one fit and its test), `plans` (the fits of a run), `outcomes` (their
+summary), `judgement` (statements and tables) and `pictures`.
 """
 
-from taxel_studies.gait.study import STUDY
+from taxel_studies.gait.fits import realise
+from taxel_studies.gait.judgement import statements, tables
+from taxel_studies.gait.outcomes import summarise
+from taxel_studies.gait.pictures import draw
+from taxel_studies.gait.plans import PARAMETERS, SIZES, tasks, unread
+from taxel_studies.gait.sources import SOURCES
 
-__all__ = ["STUDY"]
+__all__ = ["PARAMETERS", "SIZES", "draw", "realise", "statements", "summarise", "tables", "tasks", "unread"]
+
+WHERE = "thesis 6.5, figures 6.12 to 6.14, Table 6.2"
+PROTOCOL = (
+    "The protocols of 6.5.2 and 6.5.3 on recordings of other people, as far as each recording's truth allows. "
+    "Errors are neuron minus reference (negative: early), window ±50 ms, one to one; every further spike counts as "
+    "false, inside the window too. Where parameters are chosen, they are chosen inside each training fold "
+    "(taxel.detect.choose)."
+)
+DATA = tuple(source.folder for source in SOURCES.values())

@@ -119,7 +119,7 @@ def placement(others: Sequence[Footprint]) -> Placement:
 
 
 def cut(trial: Trial, origin_mm: NDArray[np.float64], placed: Placement) -> Frames:
-    """Return the footfall as the 92 taxels of an insole feel it.
+    """Return the footfall as the 92 taxels of an insole measure it.
 
     Parameters
     ----------

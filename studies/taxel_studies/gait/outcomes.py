@@ -1,4 +1,4 @@
-"""What the study comes to: every foot, summed up by row, event, person and group."""
+"""The results of the study: every foot, summed up by row, event, person and group."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from taxel_studies.gait import insole, sources
+from taxel_studies.gait.fits import TEST
 from taxel_studies.gait.plans import Plan, chooses, each, plans
 from taxel_studies.gait.protocols import ROWS, Protocol
-from taxel_studies.gait.realise import TEST
 from taxel_studies.gait.recipes import FULL, NOTES, SEARCH
 from taxel_studies.gait.sources import SOURCES
 from taxel_studies.runner import Task
@@ -43,7 +43,7 @@ GOALS: dict[str, dict[str, dict[str, float]]] = {
 
 
 class Known:
-    """Look up what realisations gave, by their tasks."""
+    """The results of realisations, by their tasks."""
 
     def __init__(self, rows: Sequence[Row]) -> None:
         self._rows = {Task(row.params, row.seed).key(""): row for row in rows}
@@ -59,7 +59,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Unit:
-    """What was found at one foot in one fold."""
+    """The result at one foot in one fold."""
 
     name: str
     person: str
@@ -222,13 +222,13 @@ def _conversion(data: Path) -> dict[str, Any]:
 
 
 def _full_search(plan: Plan, known: Known) -> Iterator[dict[str, Any]]:
-    """List what each fold chose of the 528 settings, what it had found of it inside, and what it came to."""
+    """List the setting of the 528 that each fold chose, its errors inside the training groups and in the test."""
     for scope, event, row in each(plan):
         for left_out in plan.outer(scope) if row in FULL else ():
             fitted = known[plan.task(scope, left_out, event, row)]
             point = fitted["point"]
             units = [_unit(name, unit) for group in fitted["tested"].values() for name, unit in group.items()]
-            found = figures(units)
+            result = figures(units)
             yield {
                 "event": event,
                 "all_else": row.removeprefix("528: "),
@@ -238,7 +238,7 @@ def _full_search(plan: Plan, known: Known) -> Iterator[dict[str, Any]]:
                 "lambda_1": point["learner"]["lambdas"][0],
                 "lambda_2": point["learner"]["lambdas"][1],
                 "inside": fitted["inside"],
-                **{name: found[name] for name in ("missed", "false", "error_ms")},
+                **{name: result[name] for name in ("missed", "false", "error_ms")},
             }
 
 
@@ -256,7 +256,7 @@ def _unit(name: str, unit: Mapping[str, Any]) -> Unit:
 
 
 def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
-    found: dict[tuple[str, str], Outcome] = {}
+    outcomes: dict[tuple[str, str], Outcome] = {}
     for scope, event, row in each(plan):
         units, points, tasks = [], [], []
         for left_out in plan.outer(scope):
@@ -266,8 +266,8 @@ def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
             tasks.append(task)
             for group in [TEST] if plan.testing else [str(g) for g in left_out]:
                 units += [_unit(name, unit) for name, unit in known[task]["tested"][group].items()]
-        before = found.get((event, row))
-        found[event, row] = Outcome(
+        before = outcomes.get((event, row))
+        outcomes[event, row] = Outcome(
             plan.source,
             plan.protocol.name,
             event,
@@ -276,7 +276,7 @@ def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
             [*(before.points if before else []), *points],
             (before.seconds if before else 0.0) + known.seconds(tasks),
         )
-    return list(found.values())
+    return list(outcomes.values())
 
 
 def _row(outcome: Outcome, protocol: Protocol, test: bool) -> dict[str, Any]:
@@ -318,7 +318,7 @@ def _counted(points: Sequence[Any]) -> list[dict[str, Any]]:
 
 
 def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Say, event by event, how the neuron stands beside the plain rules: by missed + false, then by % within 10 ms."""
+    """Compare the neuron with the plain rules, event by event: by missed + false, then by % within 10 ms."""
     lines = []
     for event in dict.fromkeys(row["event"] for row in rows):
         here = {row["row"]: row["figures"] for row in rows if row["event"] == event}
@@ -341,10 +341,10 @@ def _names(units: Sequence[Unit]) -> list[str]:
     return list(dict.fromkeys(u.name for u in units))
 
 
-def _reaches(found: dict[str, Any], goal: dict[str, float]) -> bool:
+def _reaches(result: dict[str, Any], goal: dict[str, float]) -> bool:
     at_least = {"found_percent", "within_10_ms_percent"}
     for name, value in goal.items():
-        is_ = found["error_ms"] and found["error_ms"]["sd"] if name == "sd_ms" else found[name]
+        is_ = result["error_ms"] and result["error_ms"]["sd"] if name == "sd_ms" else result[name]
         if is_ is None or (is_ < value if name in at_least else is_ > value):
             return False
     return True

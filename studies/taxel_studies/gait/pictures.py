@@ -1,17 +1,17 @@
-"""Figures 6.12 to 6.14: pressure and spikes of the insole during a footfall, and what was found."""
+"""Figures 6.12 to 6.14: pressure and spikes of the insole during a footfall, and the shares of events found."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from taxel_studies.gait import insole
+from taxel_studies.gait.judgement import STAND, stand_for
 from taxel_studies.gait.outcomes import EVENTS
-from taxel_studies.gait.statements import STAND, stand_for
 from taxel_studies.study import Parameters, Summary
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["draw"]
 
@@ -25,8 +25,6 @@ def draw(p: Parameters, summary: Summary) -> list[Figure]:
 
 def _bars(rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw 6.14: top found, bottom error, a group a source and event."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 6.5), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
     groups = list(dict.fromkeys((r["source"], r["event"]) for r in rows))
@@ -52,10 +50,7 @@ def _bars(rows: Sequence[Mapping[str, Any]]) -> Figure:
 
 
 def _conversion(summary: Mapping[str, Any]) -> Figure:
-    """Draw 6.12 and 6.13: the insole, what three taxels feel, and the spikes of all inputs over one footfall."""
-    from matplotlib.colors import Normalize  # noqa: PLC0415  loads slowly
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
+    """Draw 6.12 and 6.13: the insole, the readings of three taxels, and the spikes of all inputs over one footfall."""
     figure = Figure(figsize=(13, 4.6), layout="constrained")
     foot, analog, raster = figure.subplots(1, 3, width_ratios=[1, 2, 3])
     at = [(c - (n - 1) / 2, r) for r, n in enumerate(insole.CELLS) for c in range(n)]

@@ -30,7 +30,7 @@ from taxel_studies.study import Parameters
 
 __all__ = [
     "PARAMETERS",
-    "TOY",
+    "SIZES",
     "Plan",
     "chooses",
     "each",
@@ -47,7 +47,7 @@ PARAMETERS: dict[str, Any] = {
     "search": "listed",  # "full": on the plate, people left out, also the 528 settings of 6.5.2
     "test": "",  # another folder of other people: trained on all of the data, judged there, instead of by folds
 }
-TOY: dict[str, Any] = {"protocols": ["people left out"], "events": 1, "points": 2}
+SIZES = {"toy": {"protocols": ["people left out"], "events": 1, "points": 2}}
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Plan:
             yield from ([g] for g in range(len(scope.groups)))
 
     def neuron(self, scope: Scope, left_out: list[int], event: str, row: str) -> Task:
-        """Name the fit of a row's neuron in a fold, with the points that it chooses from inside the training groups."""
+        """Return the fit of a row's neuron in a fold, with the points that are tried inside the training groups."""
         points = _points(self, event, row)
         placed = "others" if row == "others" else "own"
         params: dict[str, Any] = {"kind": "neuron", "left_out": left_out, "event": event, "points": points}
@@ -88,24 +88,24 @@ class Plan:
         return Task(self.common | params, seed=1)
 
     def _each(self, scope: Scope, left_out: list[int]) -> list[list[int]]:
-        """Let each of the other groups test what the rest trained."""
+        """Return folds that test on each of the other groups, trained on the rest."""
         return [[g] for g in range(len(scope.groups)) if g not in left_out]
 
     def _third(self, scope: Scope, left_out: list[int]) -> list[list[int]]:
-        """Let a third of the other groups test what the rest trained."""
+        """Return one fold that tests on a third of the other groups, trained on the rest."""
         after = max(left_out, default=-1) + 1
         groups = len(scope.groups)
         others = [g for g in ((after + k) % groups for k in range(groups)) if g not in left_out]
         return [sorted(others[: max(1, len(others) // 3 + (len(others) % 3 > 1))])]
 
     def task(self, scope: Scope, left_out: list[int], event: str, row: str) -> Task:
-        """Name the task of a row in a fold."""
+        """Return the task of a row in a fold."""
         if row.startswith("rule: "):
             return self.rule(scope, left_out, event, row.removeprefix("rule: "))
         return self.neuron(scope, left_out, event, row)
 
     def rule(self, scope: Scope, left_out: list[int], event: str, rule: str) -> Task:
-        """Name a plain rule's choice."""
+        """Return the task that chooses the numbers of a plain rule in a fold."""
         encoder = RULE_ENCODERS[self.source][event]
         params = {"kind": "rule", "left_out": left_out, "event": event, "rule": rule, "encoder": encoder}
         train = dict(self.protocol.train)
@@ -119,11 +119,11 @@ def unread(p: Parameters, data: Path) -> dict[str, str]:
     ------
     FormatError : none of the sources is there, or can be read
     """
-    found = sources.unread(data, p["sources"])
+    files = sources.unread(data, p["sources"])
     if p["test"]:
         other = Path(p["test"])
-        found |= {f"{other.name}/{file}": why for file, why in sources.unread(other, p["sources"]).items()}
-    return found
+        files |= {f"{other.name}/{file}": why for file, why in sources.unread(other, p["sources"]).items()}
+    return files
 
 
 def plans(p: Parameters, data: Path) -> list[Plan]:
@@ -177,13 +177,13 @@ def _plans(p: Parameters, name: str, folder: Path, other: Path) -> Iterator[Plan
 
 def tasks(p: Parameters, *, data: Path) -> list[Task]:
     """List the fits of every row in every fold, ordered so that one encoding serves many of them in turn."""
-    found = [
+    listed = [
         plan.task(scope, left_out, event, row)
         for plan in plans(p, data)
         for scope, event, row in each(plan)
         for left_out in plan.outer(scope)
     ]
-    return sorted({t.key(""): t for t in found}.values(), key=_by_encoder)
+    return sorted({t.key(""): t for t in listed}.values(), key=_by_encoder)
 
 
 def _by_encoder(task: Task) -> str:
@@ -208,7 +208,7 @@ def _points(plan: Plan, event: str, row: str) -> list[Point]:
 
 
 def _rest(point: Point) -> list[float]:
-    """Return the lambdas of a point behind the first two."""
+    """Return the lambdas of a point after the first two."""
     rest: list[float] = point["learner"]["lambdas"][2:]
     return rest
 

@@ -32,7 +32,7 @@ __all__ = [
     "to_json",
 ]
 
-#: The three rows of the study, and what stands beside them.
+#: The three rows of the study, and those for comparison.
 ROWS = {
     "notes": "the notes' recipe (tuned on the shared people, and flattered by that)",
     "chosen": "parameters chosen inside the training folds (missed + false first, then error): the honest row",
@@ -81,19 +81,19 @@ def by_person(pieces: Sequence[Piece], folds: int, seed: int) -> list[Scope]:
 def by_count(pieces: Sequence[Piece], folds: int, repeats: int, seed: int) -> list[Scope]:
     """Split each person's footfalls at random: with 3 folds 40 of 60 train and 20 test, `repeats` times."""
     rng = np.random.default_rng(seed)
-    found = []
+    scopes = []
     for person in sorted({p.person for p in pieces}):
         mine = _of(pieces, person)
         for r in range(repeats):
             order = rng.permutation(len(mine))
             groups = tuple(tuple(mine[k] for k in sorted(order[g::folds])) for g in range(folds))
-            found.append(Scope(person if repeats == 1 else f"{person}, split {r + 1}", groups))
-    return found
+            scopes.append(Scope(person if repeats == 1 else f"{person}, split {r + 1}", groups))
+    return scopes
 
 
 def by_time(pieces: Sequence[Piece], folds: int) -> list[Scope]:
     """Cut each person's recording into stretches of equal length, as 6.5.3 does."""
-    found = []
+    scopes = []
     for person in sorted({p.person for p in pieces}):
         groups: list[list[Part]] = [[] for _ in range(folds)]
         for whole in _of(pieces, person):
@@ -102,8 +102,8 @@ def by_time(pieces: Sequence[Piece], folds: int) -> list[Scope]:
             ends[0], ends[-1] = 0.0, piece.duration
             for g, part in enumerate(to_us(ends)[:-1]):
                 groups[g].append(Part(whole.example, float(part), float(to_us(ends[g + 1]))))
-        found.append(Scope(person, tuple(tuple(g) for g in groups)))
-    return found
+        scopes.append(Scope(person, tuple(tuple(g) for g in groups)))
+    return scopes
 
 
 def by_piece(pieces: Sequence[Piece]) -> list[Scope]:
@@ -131,7 +131,7 @@ def to_json(scopes: Sequence[Scope], names: Sequence[str]) -> list[dict[str, Any
 
 @dataclass(frozen=True)
 class Protocol:
-    """Say how a source is split and what is run on it.
+    """Describe how a source is split and what is run on it.
 
     Attributes
     ----------
@@ -261,8 +261,8 @@ def of(source: str, name: str) -> Protocol:
 @lru_cache(maxsize=32)
 def scopes(folder: Path, source: str, protocol: str, least: int = 2) -> tuple[Scope, ...]:
     """Split the recordings of a source's folder as one of its protocols says; scopes of fewer groups are left out."""
-    found = of(source, protocol).scopes(list(_pieces(folder, source).values()))
-    return tuple(scope for scope in found if len(scope.groups) >= least)
+    split = of(source, protocol).scopes(list(_pieces(folder, source).values()))
+    return tuple(scope for scope in split if len(scope.groups) >= least)
 
 
 def names(folder: Path, source: str) -> list[str]:

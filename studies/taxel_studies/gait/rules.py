@@ -1,4 +1,4 @@
-"""The plain rules that stand beside each neuron: count spikes, count what is on now, watch a sum.
+"""The plain rules that each neuron is compared with: thresholds on spike counts, on trains that are on, and on sums.
 
 Every rule has few numbers; they and its offset are chosen in the training folds, as the neuron's weights are.
 """
@@ -67,7 +67,7 @@ def detection_times(
     sum_name: str,
     dead_ms: float,
 ) -> NDArray[np.float64]:
-    """Return when a rule says the event in a piece, ms.
+    """Return when a rule detects the event in a piece, ms.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def detection_times(
     channels : int array or None
         The sensors that count; all where None.
     sum_name : str
-        Which sum "sum" watches.
+        The sum that the rule "sum" compares with its threshold.
     dead_ms : float
         After a detection there is none for so long.
     """
@@ -110,7 +110,7 @@ def _crossings(
 
 
 def _trains(piece: Piece, levels: int, channels: NDArray[np.int64] | None, level: int | None) -> NDArray[np.int64]:
-    """Return the ON trains that count; the OFF trains lie half of all trains behind them."""
+    """Return the ON trains that count; the index of an OFF train is larger by half of all trains."""
     every = np.arange(len(piece.spikes) // 2 // levels) if channels is None else channels
     which = np.arange(levels) if level is None else np.array([level])
     return (every[:, None] * levels + which).ravel()
@@ -142,7 +142,7 @@ def _on_at_first(piece: Piece, levels: int, channels: NDArray[np.int64] | None, 
 
 
 def _apart(t: NDArray[np.float64], dead_ms: float) -> NDArray[np.float64]:
-    """Keep the first of times and every next one that lies `dead_ms` or more behind the last kept."""
+    """Keep the first of times and every next one that lies `dead_ms` or more after the last one kept."""
     kept = []
     k = 0
     while k < len(t):

@@ -27,9 +27,9 @@ from taxel_studies.study import refuse
 
 __all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "readable", "readings", "unread"]
 
-#: Silence before each footfall of the plate, ms: random, so that no cut marks time.
+#: Silence before each footfall of the plate, ms: random, so that its length does not reveal when events come.
 SILENCE_MS = (300, 900)
-#: A footfall's piece ends so long after foot-off, ms; the encoder and the delay have spoken by then.
+#: A footfall's piece ends so long after foot-off, ms; by then the encoder's latency and the delay are over.
 TAIL_MS = 100
 #: How long a row of footfalls stays silent at its end, ms.
 END_MS = 500
@@ -123,17 +123,17 @@ def _present(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
     """Return those of the wanted sources of which a folder holds files, each with its own folder."""
     if not folder.is_dir():
         raise FileNotFoundError(2, "No such folder", str(folder))
-    found = {}
+    folders = {}
     for name in [one_of("sources", name, SOURCES) for name in wanted]:
         place = folder / SOURCES[name].folder
         if place.is_dir() and formats.FORMATS[name].files(place):
-            found[name] = place
-    return found
+            folders[name] = place
+    return folders
 
 
 @dataclass(frozen=True)
 class Readings:
-    """Hold what a source's files gave.
+    """The trials that a source's files hold.
 
     Attributes
     ----------
@@ -156,13 +156,13 @@ def readings(folder: Path, name: str) -> Readings:
     read, unread = [], {}
     for file in kind.files(folder):
         try:
-            found = list(kind.trials(file))
+            own = list(kind.trials(file))
         except (FormatError, OSError) as error:
             why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
             unread[f"{folder.name}/{file.name}"] = why.removeprefix(f"{file.name}: ").removeprefix(f"{file.name}, ")
         else:
-            long = [trial for trial in found if _lasts_s(trial) >= least_s]
-            short = [trial for trial in found if _lasts_s(trial) < least_s]
+            long = [trial for trial in own if _lasts_s(trial) >= least_s]
+            short = [trial for trial in own if _lasts_s(trial) < least_s]
             for trial in short if long else short[:1]:
                 which = trial.name if long else file.name
                 unread[f"{folder.name}/{which}"] = (
@@ -201,9 +201,9 @@ def unread(folder: Path, wanted: Sequence[str]) -> dict[str, str]:
     if not here:
         names = ", ".join(SOURCES[name].folder for name in wanted)
         raise FormatError(f"{folder}: holds no recordings; must have one or more of the folders {names}")
-    found = {file: why for name, place in here.items() for file, why in readings(place, name).unread.items()}
-    refuse(found, strict=not readable(folder, wanted))
-    return found
+    files = {file: why for name, place in here.items() for file, why in readings(place, name).unread.items()}
+    refuse(files, strict=not readable(folder, wanted))
+    return files
 
 
 def fingerprint(folder: Path, name: str) -> str:
@@ -243,7 +243,7 @@ def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "
     encoder : mapping
         Its `name` and parameters.
     placed : {"own", "others"}
-        Whose footfalls tell the insole's size and toe-out on the plate: the person's other ones, or other people's.
+        Whose footfalls give the insole's size and toe-out on the plate: the person's other ones, or other people's.
     """
     return _encoded(folder, name, json.dumps(encoder, sort_keys=True), placed)
 
@@ -257,7 +257,7 @@ def _encoded(folder: Path, name: str, encoder: str, placed: str) -> Encoded:
 
 
 def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piece]:
-    found = []
+    pieces = []
     for trial in readings(folder, name).trials:
         if not any(len(times) for times in trial.truth.values()):
             continue
@@ -265,7 +265,7 @@ def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piec
         spikes = encoder.encode(trial.frames).split_by_sign()
         spikes = _moved(spikes, -start, stop - start)
         assert trial.scored is not None
-        found.append(
+        pieces.append(
             Piece(
                 name=trial.name,
                 unit=trial.name,
@@ -277,15 +277,15 @@ def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piec
                 sums={name: (to_ms(trial.frames.t) - start, column) for name, column in trial.series.items()},
             )
         )
-    return found
+    return pieces
 
 
 def _footfalls(folder: Path, name: str, encoder: Encoder, placed: str) -> list[Piece]:
     all_cuts = cuts(folder, name, placed)
-    found = []
+    pieces = []
     for person in dict.fromkeys(c.person for c in all_cuts):
-        found += _row([c for c in all_cuts if c.person == person], encoder)
-    return found
+        pieces += _row([c for c in all_cuts if c.person == person], encoder)
+    return pieces
 
 
 def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
@@ -303,15 +303,15 @@ def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
     frames = Frames(values[:, None, :], t, unit="counts", array=Array(1, insole.TAXELS, name="insole"))
     spikes = encoder.encode(frames).split_by_sign()
     total, heel = values.sum(axis=1, dtype=np.float64), values[:, insole.HEEL].sum(axis=1, dtype=np.float64)
-    found = []
+    pieces = []
     for at, silence, k in zip(begins, silences, order, strict=True):
         start, stop = float(at - silence), float(at + lengths[k])
-        if at > silences[0]:  # the tail of the footfall before belongs to it
+        if at > silences[0]:  # the first spikes still belong to the footfall before
             start += TAIL_MS
         stop += TAIL_MS
         rows = slice(int(start) // step, int(stop) // step)
         part = spikes.between(start, stop)
-        found.append(
+        pieces.append(
             Piece(
                 name=cuts[k].name,
                 unit=cuts[k].person,
@@ -323,12 +323,12 @@ def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
                 sums={"total": (to_ms(t[rows]) - start, total[rows]), "heel": (to_ms(t[rows]) - start, heel[rows])},
             )
         )
-    return found
+    return pieces
 
 
 @dataclass(frozen=True)
 class Cut:
-    """One footfall as the insole feels it; truth in ms from its first frame."""
+    """One footfall as the insole measures it; truth in ms from its first frame."""
 
     name: str
     person: str
@@ -341,15 +341,15 @@ def cuts(folder: Path, name: str, placed: str) -> tuple[Cut, ...]:
     """Cut every footfall, once all footprints are known."""
     feet = readings(folder, name).trials
     prints = [insole.footprint(t) for t in feet]
-    found = []
+    footfalls = []
     for k, trial in enumerate(feet):
         others = [
             prints[n] for n, other in enumerate(feet) if n != k and (other.person == trial.person) == (placed == "own")
         ]
         frames = insole.cut(trial, prints[k].origin_mm, insole.placement(others))
         truth = {e: to_ms(times) for e, times in trial.truth.items()}
-        found.append(Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
-    return tuple(found)
+        footfalls.append(Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
+    return tuple(footfalls)
 
 
 def _boxed(trial: Trial) -> Trial:

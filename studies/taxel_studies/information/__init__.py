@@ -1,25 +1,34 @@
-"""Chapter 5's question on other people's recordings: how many bits do touches hold, and what else would tell as much.
+"""Chapter 5's question on other people's recordings: how many bits do touches hold, and which simpler measurements do.
 
-Footfalls on a plate, grasps of a robot's hand, postures on a mat; each beside chance, pictures and what is trivial.
+Footfalls on a plate, grasps of a robot's hand, postures on a mat; each compared with chance, with pictures and with
+trivial measurements.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from taxel_studies.information import footfalls, grasps, postures
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Statement, Study, Summary, Table
+from taxel_studies.study import Parameters, Row, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-__all__ = ["STUDY"]
-
-#: Folders of recordings, and what is asked of each.
+WHERE = "beside thesis 5.5 and 5.6"
+PROTOCOL = (
+    "Bits of a classifier's answers, corrected by Panzeri and Treves; linear discriminants, smoothing and ridge "
+    "chosen inside the folds. Plate: who walked (trials left out) and how fast (people left out); footfalls are "
+    "aligned on contact, the middle of the heel in one column, a picture of rest before each (the plate records "
+    "none); change events with a floor of 25 counts, phases drawn. Hand: which object, by slice, as the source "
+    "gives no times; changes since the first slice, as that one names the object by itself. Mat: which of four "
+    "postures, whole poses with all their variants left out; it has no time, so only the number of taxels counts. "
+    "What was tried beforehand is our own, with other code, and stands where else published values stand."
+)
+#: Folders of recordings, and the module with the questions on each.
 ASKED: dict[str, Any] = {"plate": footfalls, "touch_icub_grasp": grasps, "mat_popu": postures}
+DATA = tuple(ASKED)
 
 PARAMETERS: dict[str, Any] = {
     "periods_ms": [2.0, 4.0, 10.0, 20.0, 50.0],
@@ -35,26 +44,39 @@ PARAMETERS: dict[str, Any] = {
     "most_trials": 0,
     "seed": 1,
 }
+SIZES = {
+    "toy": {
+        "periods_ms": [10.0, 50.0],
+        "windows_ms": [50.0],
+        "taxels": [30],
+        "pools": [7],
+        "draws": 1,
+        "shuffles": 2,
+        "slices": [1, 4],
+        "mat_taxels": [16],
+        "most_trials": 12,
+    }
+}
 
 
 def tasks(p: Parameters, data: Path) -> list[Task]:
     """List one realisation a question, of the recordings that are there."""
-    found = []
+    listed = []
     for folder, module in ASKED.items():
         if (data / folder).is_dir():
             common = {name: p[name] for name in module.USES}
-            found += [Task({"folder": folder, "ask": ask, **common}, p["seed"]) for ask in module.ASKS]
-    return found
+            listed += [Task({"folder": folder, "ask": ask, **common}, p["seed"]) for ask in module.ASKS]
+    return listed
 
 
 def realise(params: dict[str, Any], seed: int, data: Path) -> dict[str, Any]:
     """Answer one question."""
-    found: dict[str, Any] = ASKED[params["folder"]].realise(params, seed, data / params["folder"])
-    return found
+    answer: dict[str, Any] = ASKED[params["folder"]].realise(params, seed, data / params["folder"])
+    return answer
 
 
 def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Summary:
-    """Keep every answer, by folder and question."""
+    """Return every answer, by folder and question."""
     del p, data
     summary: Summary = {}
     for row in rows:
@@ -63,52 +85,15 @@ def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Summary:
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold the answers against what was tried beforehand, with other code."""
-    return [one for folder, found in summary.items() for one in ASKED[folder].statements(p, found)]
+    """Compare the answers with those of an earlier trial with other code."""
+    return [one for folder, judged in summary.items() for one in ASKED[folder].statements(p, judged)]
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
     """Return a table for each set of recordings."""
-    return [one for folder, found in summary.items() for one in ASKED[folder].tables(p, found)]
+    return [one for folder, listed in summary.items() for one in ASKED[folder].tables(p, listed)]
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw each set of recordings."""
-    return [one for folder, found in summary.items() for one in ASKED[folder].draw(p, found)]
-
-
-STUDY = Study(
-    name="information",
-    title="how many bits real touches hold, and which simpler measurements hold as many",
-    where="beside thesis 5.5 and 5.6",
-    protocol=(
-        "Bits of a classifier's answers, corrected by Panzeri and Treves; linear discriminants, smoothing and ridge "
-        "chosen inside the folds. Plate: who walked (trials left out) and how fast (people left out); footfalls are "
-        "aligned on contact, the middle of the heel in one column, a picture of rest before each (the plate records "
-        "none); change events with a floor of 25 counts, phases drawn. Hand: which object, by slice, as the source "
-        "gives no times; changes since the first slice, as that one names the object by itself. Mat: which of four "
-        "postures, whole poses with all their variants left out; it has no time, so only the number of taxels counts. "
-        "What was tried beforehand is our own, with other code, and stands where else published values stand."
-    ),
-    parameters=PARAMETERS,
-    sizes={
-        "toy": {
-            "periods_ms": [10.0, 50.0],
-            "windows_ms": [50.0],
-            "taxels": [30],
-            "pools": [7],
-            "draws": 1,
-            "shuffles": 2,
-            "slices": [1, 4],
-            "mat_taxels": [16],
-            "most_trials": 12,
-        }
-    },
-    tasks=tasks,
-    realise=realise,
-    summarise=summarise,
-    statements=statements,
-    tables=tables,
-    draw=draw,
-    data=tuple(ASKED),
-)
+    return [one for folder, answers in summary.items() for one in ASKED[folder].draw(p, answers)]

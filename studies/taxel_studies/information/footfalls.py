@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taxel.array import Array
 from taxel.encode import ChangeEvents
@@ -14,9 +15,6 @@ from taxel.formats.trial import Trial
 from taxel.frames import Frames
 from taxel.information import LabelledTrial, answer
 from taxel_studies.study import Parameters, Statement, Summary, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["ASKS", "USES", "draw", "footfalls", "realise", "statements", "tables"]
 
@@ -48,7 +46,7 @@ def footfalls(folder: Path, ask: str, most: int = 0) -> list[LabelledTrial]:
     most : int
         Of each person; all where it is 0.
     """
-    found, count = [], dict[str, int]()
+    trials, count = [], dict[str, int]()
     for trial in plate.trials(folder):
         count[trial.person] = count.get(trial.person, 0) + 1
         if most and count[trial.person] > most:
@@ -57,8 +55,10 @@ def footfalls(folder: Path, ask: str, most: int = 0) -> list[LabelledTrial]:
         label = trial.person if ask == "person" else condition
         group = "" if ask == "person" else trial.person
         frames, contact = _placed(trial)
-        found.append(LabelledTrial(frames, label, contact, int(trial.truth["foot_off"][0]), group, {}, name=trial.name))
-    return found
+        trials.append(
+            LabelledTrial(frames, label, contact, int(trial.truth["foot_off"][0]), group, {}, name=trial.name)
+        )
+    return trials
 
 
 def _placed(trial: Trial) -> tuple[Frames, int]:
@@ -78,7 +78,7 @@ def _placed(trial: Trial) -> tuple[Frames, int]:
 
 
 def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
-    """Ask the footfalls."""
+    """Estimate the bits of the footfalls on one question."""
     return answer(
         footfalls(folder, params["ask"], params["most_trials"]),
         encoder=ChangeEvents(noise_floor=params["floor_counts"]),
@@ -99,8 +99,8 @@ def _bits(summary: dict[str, Any], period: float, window: float) -> float | None
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold bits by period and time against what was tried beforehand."""
-    found = []
+    """Compare bits by period and time with the earlier trial."""
+    judged = []
     whole = p["most_trials"] == 0
     if "person" in summary:
         person = summary["person"]
@@ -108,7 +108,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         before |= {(2.0, 10.0): 1.47, (2.0, 20.0): 1.90, (2.0, 400.0): 2.53, (50.0, 400.0): 2.49}
         ours = {key: _bits(person, *key) for key in before}
         there = {key: bits for key, bits in ours.items() if bits is not None}
-        found.append(
+        judged.append(
             Statement(
                 "Who walked: bits by sampling period and time since contact.",
                 ", ".join(f"{a:g} ms to {b:g}: {before[a, b]:.2f}" for a, b in there),
@@ -120,7 +120,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         fast, slow = _bits(person, p["periods_ms"][0], 50.0), _bits(person, p["periods_ms"][-1], 50.0)
         if fast is not None and slow is not None:
             late = [q["bits"] for q in person["points"] if q["window_ms"] == p["window_ms"]]
-            found.append(
+            judged.append(
                 Statement(
                     "A fast period has more bits early, and none has more in the end (5.8, 5.13).",
                     "figures 5.8 and 5.13",
@@ -133,7 +133,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
         condition = summary["condition"]
         length = next((c["bits"] for c in condition["controls"] if c["name"] == "length"), None)
         full = condition["full"]["bits"]
-        found.append(
+        judged.append(
             Statement(
                 "How fast a person not trained on walked: the length of the stance has more bits than the events.",
                 "length .89; events to 400 ms .47",
@@ -142,12 +142,12 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 "people left out; six people carry no curve",
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
     """Return bits by period and time, and those of simpler measurements."""
-    found = []
+    listed = []
     for ask, one in summary.items():
         windows = sorted({q["window_ms"] for q in one["points"]})
         rows = []
@@ -166,14 +166,12 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
         low, high = one["full"]["interval"]
         beside.append(f"full [{low:.2f} {high:.2f}] of {one['full']['most']:.2f}")
         head = [ask, *(f"to {w:g} ms" for w in windows), "kbit/s", "keeps 95 %?"]
-        found.append(Table(f"plate, {ask}: bits", head, rows, "; ".join(beside)))
-    return found
+        listed.append(Table(f"plate, {ask}: bits", head, rows, "; ".join(beside)))
+    return listed
 
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over time, a line a period, and the confusion of the full setting."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     figure = Figure(figsize=(11, 4.2), layout="constrained")
     axes = figure.subplots(1, len(summary), squeeze=False)[0]
     for ax, (ask, one) in zip(axes, summary.items(), strict=True):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.encode import ChangeEvents
@@ -14,9 +15,6 @@ from taxel.frames import Frames
 from taxel.information import GramLDA, estimate, nested_predictions, zero_test
 from taxel_studies.study import Parameters, Statement, Summary, Table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 __all__ = ["ASKS", "USES", "draw", "realise", "statements", "tables"]
 
 ASKS = ("object",)
@@ -24,12 +22,12 @@ USES = ("slices", "draws", "shuffles", "most_trials")
 
 #: A change of so much of the 8-bit value makes an event.
 _FLOOR = 3.0
-#: Of the comparison of early grasps with late ones, as nothing is chosen there.
+#: Ridge of the comparison of early grasps with late ones, in which no parameter is chosen.
 _RIDGE = 1.0
 
 
 def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
-    """Ask the grasps: pictures and events since the first slice, that slice itself, and how many slices there are."""
+    """Estimate the bits of pictures and events since the first slice, of that slice, and of the number of slices."""
     values, labels, order = [], [], []
     count: dict[str, int] = {}
     for trial in icub.trials(folder):
@@ -45,7 +43,7 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
     since = held[:, 1:] - held[:, :1]
     events = np.stack([_events(v) for v in held])
     lengths = np.array([len(v) for v in values], np.float64)
-    found: dict[str, Any] = {"trials": len(y), "classes": len(set(labels)), "slices": params["slices"]}
+    result: dict[str, Any] = {"trials": len(y), "classes": len(set(labels)), "slices": params["slices"]}
 
     def bits(x: NDArray[Any]) -> dict[str, Any]:
         flat = x.reshape(len(x), -1).astype(np.float64)
@@ -57,40 +55,40 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
         ]
         return estimate(y, np.array(answers), seed=seed).to_dict()
 
-    found["first"] = bits(held[:, 0] - held[:, 0].mean(0))
-    found["length"] = bits((lengths - lengths.mean())[:, None])
-    found["pictures"] = [bits(since[:, :s]) for s in params["slices"]]
-    found["events"] = [bits(events[:, :s]) for s in params["slices"]]
+    result["first"] = bits(held[:, 0] - held[:, 0].mean(0))
+    result["length"] = bits((lengths - lengths.mean())[:, None])
+    result["pictures"] = [bits(since[:, :s]) for s in params["slices"]]
+    result["events"] = [bits(events[:, :s]) for s in params["slices"]]
     flat = events[:, : params["slices"][-1]].reshape(len(y), -1)
     gram, features = flat @ flat.T, max(1, int(flat.any(0).sum()))
     zero = zero_test(
         lambda mixed: nested_predictions([gram], [features], mixed, count=5, seed=seed).responses,
         y,
-        found["events"][-1]["bits"],
+        result["events"][-1]["bits"],
         shuffles=params["shuffles"],
         seed=seed,
     )
-    found["zero"] = {"level": zero.level, "p": zero.p}
-    found["drift"] = {
+    result["zero"] = {"level": zero.level, "p": zero.p}
+    result["drift"] = {
         "first": _early_and_late(held[:, 0], y, np.array(order), seed),
         "since": _early_and_late(since[:, : min(4, longest)], y, np.array(order), seed),
     }
-    return found
+    return result
 
 
 def _events(values: NDArray[Any]) -> NDArray[np.float64]:
     """Return the change events of a grasp, slices x taxels."""
     frames = Frames(values[:, None, :], np.arange(len(values)) * 1000)
     trains = ChangeEvents(noise_floor=_FLOOR, period_ms=1.0).encode(frames)
-    found = np.zeros((len(values) - 1, values.shape[1]))
+    events = np.zeros((len(values) - 1, values.shape[1]))
     taxel = np.repeat(np.arange(len(trains)), trains.counts)
     assert trains.values is not None  # change events are signed
-    found[np.rint(trains.times).astype(np.int64) - 1, taxel] = trains.values
-    return found
+    events[np.rint(trains.times).astype(np.int64) - 1, taxel] = trains.values
+    return events
 
 
 def _early_and_late(x: NDArray[Any], y: NDArray[Any], order: NDArray[np.int64], seed: int) -> dict[str, float]:
-    """Return the share named rightly: late grasps by early ones, and random halves by the others."""
+    """Return the share classified right: late grasps after training on early ones, and random halves on the others."""
     flat = x.reshape(len(x), -1).astype(np.float64)
     flat = flat - flat.mean(0)
     gram, features = flat @ flat.T, max(1, int(flat.any(0).sum()))
@@ -111,10 +109,10 @@ def _early_and_late(x: NDArray[Any], y: NDArray[Any], order: NDArray[np.int64], 
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold bits by slice against what was tried beforehand."""
+    """Compare bits by slice with the earlier trial."""
     one, whole = summary["object"], p["most_trials"] == 0
     first = one["first"]
-    found = [
+    judged = [
         Statement(
             "A warning: the first slice's pressure alone, before anything changed, names the object.",
             "3.27 of 3.32 bits",
@@ -128,7 +126,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
     before = {"pictures": {1: 1.85, 4: 2.91, 7: 3.12}, "events": {1: 1.16, 4: 2.36, 7: 2.62}}
     for name, values in before.items():
         ours = {s: b["bits"] for s, b in zip(one["slices"], one[name], strict=True) if s in values}
-        found.append(
+        judged.append(
             Statement(
                 f"Which object, by slice, from changes since the first ({name}).",
                 ", ".join(f"slice {s}: {values[s]:.2f}" for s in ours),
@@ -137,7 +135,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 "tried beforehand with other code; within .3 bit counts as the same",
             )
         )
-    return found
+    return judged
 
 
 def tables(p: Parameters, summary: Summary) -> list[Table]:
@@ -159,8 +157,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over slices."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     one = summary["object"]
     figure = Figure(figsize=(6, 4), layout="constrained")

@@ -1,19 +1,17 @@
-"""Postures on a mat: how many taxels it takes. It has no time."""
+"""Postures on a mat: bits by the number of taxels. The recordings have no time."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from taxel.formats import popu
 from taxel.information import estimate, nested_predictions, zero_test
 from taxel_studies.study import Parameters, Statement, Summary, Table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 __all__ = ["ASKS", "USES", "draw", "realise", "statements", "tables"]
 
@@ -22,7 +20,7 @@ USES = ("mat_taxels", "draws", "shuffles", "most_trials")
 
 
 def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
-    """Ask which of the postures, whole poses with all their variants left out."""
+    """Estimate the bits on the posture, whole poses with all their variants left out."""
     values, labels, groups = [], [], []
     for trial in popu.trials(folder):
         if trial.about["posture"] == "empty":
@@ -44,7 +42,7 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
         return estimate(y, answers, groups=poses, seed=seed).to_dict()
 
     random = np.random.default_rng(seed)
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "looks": len(y),
         "poses": len(set(groups)),
         "taxels": params["mat_taxels"],
@@ -57,14 +55,14 @@ def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
         ],
     }
     zero = zero_test(
-        lambda mixed: named(x, 0, mixed), y, found["all"]["bits"], groups=poses, shuffles=params["shuffles"], seed=seed
+        lambda mixed: named(x, 0, mixed), y, result["all"]["bits"], groups=poses, shuffles=params["shuffles"], seed=seed
     )
-    found["zero"] = {"level": zero.level, "p": zero.p}
-    return found
+    result["zero"] = {"level": zero.level, "p": zero.p}
+    return result
 
 
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
-    """Hold bits by number of taxels against what was tried beforehand."""
+    """Compare bits by number of taxels with the earlier trial."""
     one = summary["posture"]
     before = {16: 1.1, 64: 1.87}
     ours = {n: b["bits"] for n, b in zip(one["taxels"], one["random"], strict=True) if n in before}
@@ -98,8 +96,6 @@ def tables(p: Parameters, summary: Summary) -> list[Table]:
 
 def draw(p: Parameters, summary: Summary) -> list[Figure]:
     """Draw bits over the number of taxels."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
     del p
     one = summary["posture"]
     figure = Figure(figsize=(6, 4), layout="constrained")

@@ -69,7 +69,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``p``, ``load``, and ``tried``: (patterns, runs, mean share right, runs with all right) of each load looked at.
+        ``p``, ``load``, and ``tried``: (patterns, runs, mean share right, runs with all right) of each load tried.
         In "b" a load is left at the first run that fails.
     """
     tried: dict[int, list[Any]] = {}

@@ -14,12 +14,9 @@ from typing import Any
 from taxel.learn import FILT, FP, HTP, INST, PSD, SPAN, Chronotron, ConeX, ReSuMe
 from taxel.neuron import Neuron
 
-__all__ = ["CHOSEN_ON", "PUBLISHED", "RULES", "Rule", "learner"]
+__all__ = ["CHOSEN_ON", "RULES", "Rule", "learner"]
 
 CHOSEN_ON = range(1000, 1006)
-
-#: Loads that others published for one spike a pattern, each under criteria of its own (thesis 6.4.4).
-PUBLISHED = {"E-learning": 0.22, "PSD": 0.144, "SPAN": 0.075, "ReSuMe": 0.04, "I-learning": 0.02}
 
 #: Membrane, synapse and threshold of Gardner and Grüning.
 NEURON: dict[str, Any] = {"tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
@@ -27,7 +24,7 @@ NEURON: dict[str, Any] = {"tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
 
 @dataclass(frozen=True)
 class Rule:
-    """Hold what the comparison gives a rule.
+    """The learner and constants that the comparison gives a rule.
 
     Attributes
     ----------

@@ -1,29 +1,29 @@
-//! Each taxel as an FA-1 afferent (5.4.2), in the whole numbers that the logic has (docs: *Registers*).
+//! Models each taxel as an FA-1 afferent (5.4.2), in the integer arithmetic of the logic (docs: *Registers*).
 
 use crate::wire::Registers;
 use crate::wire::registers::{POWER_LAW, POWER_LAW_FRACTION};
 
-/// Bits behind the point of `threshold_rest` and of the intensity word.
+/// Fractional bits of `threshold_rest` and of the intensity word.
 const WORD_FRACTION: u32 = 10;
 
 /// Integrals and thresholds of all taxels.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Afferents {
-    /// By taxel: compressed pressure (5.1) where the integral (5.3) was last reset; none before the first frame.
+    /// By taxel: the compressed pressure (5.1) when the integral (5.3) was last reset; empty before the first frame.
     base: Vec<u32>,
     /// By taxel: the threshold (5.5).
     threshold: Vec<u32>,
-    /// By taxel: the integral with which it last fired.
+    /// By taxel: the integral at its last spike.
     fired: Vec<i64>,
 }
 
 impl Afferents {
-    /// Returns to the state before the first frame, whose pressures become the reference.
+    /// Returns to the state before the first frame; the next frame's pressures become the reference.
     pub(super) fn forget(&mut self) {
         self.base.clear();
     }
 
-    /// Samples the trip time of a taxel (already held within the ramp), frame by frame; returns whether it fires.
+    /// Processes a taxel's next trip time (already limited to the ramp); returns whether the taxel fires.
     pub(super) fn sample(&mut self, taxel: usize, ticks: u16, registers: &Registers) -> bool {
         let rest = rest(registers);
         let share = |part: u16, whole: u32| (u64::from(part) * u64::from(rest) / u64::from(whole)) as u32;
@@ -44,7 +44,7 @@ impl Afferents {
         false
     }
 
-    /// Begins with the pressures of a frame, where this is the first.
+    /// Initialises the state with the pressures of the first frame; does nothing later.
     pub(super) fn begin(&mut self, ticks: &[u16], registers: &Registers) {
         if self.base.is_empty() {
             self.base = ticks.iter().map(|&t| pressure(t.min(registers.ramp))).collect();
@@ -53,7 +53,7 @@ impl Afferents {
         }
     }
 
-    /// The spike of a taxel that fired: its polarity, and its intensity word, which is how large the integral was.
+    /// The spike of a taxel that fired: its polarity, and its intensity word, the magnitude of the integral.
     pub(super) fn spike(&self, taxel: usize) -> (bool, u16) {
         let integral = self.fired[taxel];
         let size = integral.unsigned_abs() >> (POWER_LAW_FRACTION - WORD_FRACTION);

@@ -1,33 +1,33 @@
-//! Taxels that compare by themselves: no scan, each change sent as it happens (thesis 4.5 and Table 7.1).
+//! Taxels that compare their values by themselves: no scan, each change sent as it happens (thesis 4.5 and Table 7.1).
 
-/// A taxel whose value has moved by a step since its last event, and when.
+/// A taxel whose value has changed by a step since its last event, and the time at which it did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
-    /// Since reset, 10 ns.
+    /// Time since reset, 10 ns.
     pub(super) at: u64,
     pub(super) x: u16,
     pub(super) y: u16,
     pub(super) p: bool,
     /// The value reached, ticks.
     pub(super) value: u16,
-    /// How far that is from the one before.
+    /// Difference from the value before.
     pub(super) moved: u16,
 }
 
-/// The readings of the last frame, and the crossings that are still to be sent.
+/// The readings of the last frame, and the crossings that still wait to be sent.
 ///
-/// The reading of a taxel is known once a frame, at the time of its line. Between two readings the value counts as a
-/// straight line, and each step of `floor + 1` ticks on it is an event. So what lies between two readings is known with the
-/// second, and is sent a frame after it has happened, with the time at which it did.
+/// A taxel is read once per frame, at the time of its line. Between two readings its value is interpolated linearly,
+/// and each step of `floor + 1` ticks is an event. The interpolation needs the second reading, so an event is sent one
+/// frame after it happened, with the time at which it happened.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Asynchronous {
-    /// When the frame before began, and its reading of each taxel; nothing before the first frame.
+    /// Start of the previous frame, and its reading of each taxel; `None` before the first frame.
     last: Option<(u64, Vec<u16>)>,
-    /// Crossings that lie after the start of the frame in which they were found.
+    /// Crossings later than the start of the frame in which they were found.
     waiting: Vec<Crossing>,
 }
 
-/// A reading: its taxel, how long after the frame's start it is made, and its value.
+/// A reading: its taxel, its time after the frame's start, and its value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     pub(super) taxel: usize,
@@ -38,18 +38,18 @@ pub(super) struct Sample {
 }
 
 impl Asynchronous {
-    /// Whether no frame has come yet.
+    /// Whether there was no frame yet.
     pub(super) fn is_new(&self) -> bool {
         self.last.is_none()
     }
 
-    /// Drops the crossings that would still be sent.
+    /// Discards the crossings that wait.
     pub(super) fn clear(&mut self) {
         self.waiting.clear();
     }
 
-    /// Finds the steps of a taxel since the last frame; `sent` is the value of its last event, and becomes that of its new
-    /// last event. Before the first frame the reading itself is an event.
+    /// Finds the steps of a taxel since the last frame; `sent` is the value of its last event, and is updated. Before
+    /// the first frame, the reading itself is an event.
     pub(super) fn cross(&mut self, begins: u64, sample: Sample, floor: u16, sent: &mut u16) {
         let Sample { taxel, x, y, after, ticks } = sample;
         let Some((began, last)) = &self.last else {
@@ -63,7 +63,7 @@ impl Asynchronous {
         let p = ticks >= *sent;
         while ticks.abs_diff(*sent) > floor && (ticks >= *sent) == p {
             *sent = if p { *sent + moved } else { *sent - moved };
-            // Past already where the floor was lowered since.
+            // Already passed at the last reading, if the floor was lowered since.
             let passed = if p { *sent <= from } else { *sent >= from };
             let share = if passed || way == 0.0 { 0.0 } else { f64::from(sent.abs_diff(from)) / way };
             let at = began + after + (share * span as f64) as u64;
@@ -71,7 +71,7 @@ impl Asynchronous {
         }
     }
 
-    /// Ends a frame that began at `begins`: stores its readings, returns what happened before it, by time.
+    /// Ends a frame that began at `begins`: stores its readings, and returns the crossings before `begins`, by time.
     pub(super) fn end_frame(&mut self, begins: u64, ticks: impl Iterator<Item = u16>) -> Vec<Crossing> {
         match &mut self.last {
             Some((began, last)) => {

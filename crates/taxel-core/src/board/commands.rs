@@ -11,7 +11,7 @@ impl Board {
         format!("taxel-board v{wire_version} {}x{} {channels}ch\n", self.array.rows, self.array.columns)
     }
 
-    /// Executes command bytes as they come; returns the status lines that answer them, each with its line end.
+    /// Executes command bytes as they arrive; returns the status lines that answer them, each with its line end.
     pub fn command(&mut self, bytes: &[u8]) -> String {
         let mut lines = String::new();
         for &byte in bytes {
@@ -43,7 +43,7 @@ impl Board {
         }
     }
 
-    /// Starts or stops a recording, as a write of `record` does: a marker goes out where that changes anything.
+    /// Starts or stops a recording, as a write of `record` does; sends a marker if this changes the state.
     pub fn record(&mut self, start: bool) {
         if self.written.record != start {
             self.written.record = start;
@@ -59,7 +59,7 @@ impl Board {
         }
     }
 
-    /// The faults whose count has changed since the last call, one status line each.
+    /// One status line for each kind of fault whose count has changed since the last call.
     pub fn faults(&mut self) -> String {
         let now = [
             ("queue", self.counts.dropped),

@@ -2,30 +2,30 @@
 
 use crate::wire::Registers;
 
-/// A trip time that marks a fault: the comparator had not returned when the ramp began, so there is no value.
+/// A trip time that marks a fault: the comparator had not returned when the ramp began, so there is no reading.
 pub const NOT_RETURNED: u16 = u16::MAX;
 
-/// What each taxel is compared with, and which of them changed in this frame.
+/// The reference value of each taxel, and which taxels changed in this frame.
 #[derive(Debug, Clone)]
 pub(super) struct Comparators {
     columns: usize,
-    /// By taxel: what a new value is compared with.
+    /// By taxel: the value with which a new one is compared.
     pub(super) values: Vec<u16>,
     /// By taxel: whether this frame's value makes an event.
     pub(super) changed: Vec<bool>,
-    /// By driven line: whether any of its taxels does.
+    /// By driven line: whether any of its taxels makes an event.
     pub(super) line_changed: Vec<bool>,
 }
 
 impl Comparators {
-    /// Comparators of taxels that all hold 0.
+    /// Comparators of taxels whose reference is 0.
     pub(super) fn new(taxels: usize, columns: u16) -> Self {
         let columns = usize::from(columns);
         Self { columns, values: vec![0; taxels], changed: vec![false; taxels], line_changed: vec![false; columns] }
     }
 
-    /// Compares a frame with the values, in one pass over the whole array; counts faults, and returns whether any taxel
-    /// changed.
+    /// Compares a frame with the reference values, in one pass over the whole array; counts faults, and returns whether
+    /// any taxel changed.
     pub(super) fn compare(&mut self, ticks: &[u16], registers: &Registers, not_returned: &mut u64) -> bool {
         let columns = self.columns;
         let (ramp, floor, lines) = (registers.ramp, u16::from(registers.noise_floor), registers.lines.into());
@@ -42,8 +42,8 @@ impl Comparators {
         self.line_changed[..lines].iter().any(|&hit| hit)
     }
 
-    /// Marks the taxels that `fires` names, of a board whose comparators are afferents; counts faults, and returns whether
-    /// any fired.
+    /// Marks the taxels for which `fires` returns true, on a board whose comparators are afferents; counts faults, and
+    /// returns whether any fired.
     pub(super) fn fire(
         &mut self,
         ticks: &[u16],
@@ -70,7 +70,7 @@ impl Comparators {
         any
     }
 
-    /// Compares the next frame with this one's samples, whether they were sent or not.
+    /// Makes this frame's samples the reference of the next frame, whether they were sent or not.
     pub(super) fn sample(&mut self, ticks: &[u16], registers: &Registers) {
         let columns = self.columns;
         for (ticks, values) in ticks.chunks_exact(columns).zip(self.values.chunks_exact_mut(columns)) {

@@ -1,22 +1,22 @@
-//! What a board counts.
+//! The counts of a board.
 
 use serde::{Deserialize, Serialize};
 
-/// What the board did and lost.
+/// Counts of what the board did and lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct BoardCounts {
-    /// Frames scanned.
+    /// Number of scanned frames.
     pub frames: u64,
     /// Taxels that changed by more than the noise floor.
     pub changes: u64,
-    /// Words that entered the queue; an event of version 2 counts as two.
+    /// Number of words that entered the queue; an event of version 2 counts as two.
     pub words: u64,
-    /// Datagrams that the sink took.
+    /// Number of datagrams that the sink accepted.
     pub datagrams: u64,
-    /// Words that the sink took.
+    /// Number of words that the sink accepted.
     pub sent: u64,
-    /// Changes dropped with their intensities, and markers, because the queue was full.
+    /// Number of changes, each with its intensity, and markers that were dropped because the queue was full.
     pub dropped: u64,
-    /// Conversions whose comparator had not returned.
+    /// Number of conversions whose comparator had not returned.
     pub not_returned: u64,
 }

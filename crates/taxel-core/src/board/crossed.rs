@@ -1,4 +1,4 @@
-//! Lines that taxels share, and comparators that are not ideal: what they do to trip times before the board compares them.
+//! Effects of lines that taxels share, and of real comparators, on trip times before the board compares them.
 
 use super::NOT_RETURNED;
 use crate::circuit::{Chain, Converter, Ramp, Scan};
@@ -6,29 +6,29 @@ use crate::contact::Sensor;
 use crate::wire::Registers;
 use crate::{Array, Result, Stop, problem};
 
-/// Puts frames of trip times through a circuit, one after the other.
+/// Passes frames of trip times through a circuit, one after the other.
 ///
-/// The reading of each taxel by itself gives its conductance, and the network turns all conductances into voltages. The
-/// difference of these from the taxels' own voltages is added to the latter, so an ideal circuit changes nothing. The
-/// converter's times are the registers'.
+/// The reading of each taxel alone determines its conductance, and the network computes all voltages from all
+/// conductances. The difference of these from the taxels' own voltages is added to the latter, so an ideal circuit
+/// changes nothing. The registers define the converter's times.
 #[derive(Debug, Clone)]
 pub struct Crossed {
     chain: Chain,
     array: Array,
     registers: Registers,
     scan: Scan,
-    /// Voltage of a reading, halfway between its tick and the next: the counter shows whole ticks.
+    /// Voltage of each reading, in the middle of its tick, because the counter shows whole ticks.
     own_v: Vec<f64>,
     conductance_us: Vec<f64>,
     ticks: Vec<f64>,
 }
 
 impl Crossed {
-    /// A circuit of an array whose board holds `registers`.
+    /// The circuit of an array whose board has these `registers`.
     ///
     /// # Errors
     ///
-    /// `Problem` where a parameter makes no sense.
+    /// `Problem` if a parameter is out of range.
     pub fn new(chain: Chain, registers: &Registers, array: &Array) -> Result<Self> {
         chain.check()?;
         let scan = Scan::new(timed(&chain.converter, registers, array), array.rows.into(), array.columns.into())?;
@@ -43,13 +43,13 @@ impl Crossed {
         })
     }
 
-    /// How many taxels it reads.
+    /// Number of taxels that the circuit reads.
     #[must_use]
     pub fn taxels(&self) -> usize {
         self.ticks.len()
     }
 
-    /// Refuses a circuit whose voltage and resistor are not those by which a simulated sensor makes trip times.
+    /// Checks that a circuit has the voltage and the resistor with which the simulated sensor computes trip times.
     ///
     /// # Errors
     ///
@@ -66,11 +66,12 @@ impl Crossed {
         Ok(())
     }
 
-    /// Changes a frame's trip times to what the board reads of them; one at the ramp's end stays there.
+    /// Replaces a frame's trip times by those that the board reads through the circuit; one at the ramp's end stays
+    /// there.
     ///
     /// # Errors
     ///
-    /// `Problem` where registers that were written since leave the converter no time; `Interrupted`.
+    /// `Problem` if the current registers leave the converter no time; `Interrupted`.
     pub fn read(&mut self, registers: &Registers, ticks: &mut [u16], stop: Stop<'_>) -> Result<()> {
         if self.registers != *registers {
             *self = Self::new(self.chain.clone(), registers, &self.array)?;
@@ -88,7 +89,8 @@ impl Crossed {
         let ramp = registers.ramp;
         for (value, &read) in ticks.iter_mut().zip(&self.ticks) {
             if *value < ramp {
-                // An ideal circuit gives back what it got, but for the rounding of a logarithm.
+                // An ideal circuit returns its input except for the rounding error of a logarithm, which the margin
+                // absorbs.
                 *value = if read.is_nan() { NOT_RETURNED } else { (read + 1e-9) as u16 };
             }
         }
@@ -159,7 +161,7 @@ mod tests {
         let resting =
             Chain { readout: VirtualGround { switch_ohm: 50.0, gain: None, ..VirtualGround::default() }, ..ideal() };
         let got = read(resting, &registers, &[frame]);
-        // 64 taxels of 24 uS on 50 ohm: 7 % of what they read above rest is lost.
+        // 64 taxels of 24 uS on 50 ohm: they lose 7 % of their reading above rest.
         let volts = |tick: f64| Ramp::rc(150.0).volts(tick);
         let (own, conductance) = (volts(140.5), 64.0 * 1e-6 * (volts(140.5) / 1.3 - 1.0) / 47e-3);
         let wanted = Ramp::rc(150.0).ticks(1.3 + (own - 1.3) / (1.0 + 50.0 * conductance));

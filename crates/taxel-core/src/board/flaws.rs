@@ -1,4 +1,4 @@
-//! Taxels that are not perfect: what they do to trip times before the board compares them, each flaw with its own seed.
+//! Defects of taxels and their effect on trip times before the board compares them; each flaw has its own seed.
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -8,40 +8,41 @@ use serde::{Deserialize, Serialize};
 use super::NOT_RETURNED;
 use crate::{Array, Result, problem};
 
-/// How strong a flaw is, and what it is drawn from.
+/// Magnitude of a flaw, and the seed from which it is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flaw {
-    /// In the flaw's own unit; 0 is none.
+    /// Magnitude in the flaw's own unit; 0 is none.
     pub size: f64,
-    /// Draws it.
+    /// Seed of the random draws.
     pub seed: u64,
 }
 
-/// Which flaws taxels have; all are 0 at first.
+/// The flaws of taxels; the default is none.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Flaws {
-    /// How far gains differ: standard deviation of their logarithm.
+    /// Gain mismatch: standard deviation of the gains' logarithm.
     pub gain: Flaw,
-    /// How far thresholds differ: a taxel reads so many ticks too few, the absolute value of a normal draw of this standard
-    /// deviation.
+    /// Threshold mismatch, ticks: a taxel's reading is too low by the absolute value of a normal draw with this
+    /// standard deviation.
     pub threshold: Flaw,
-    /// How far a reading stays behind its way up and down, ticks; of each taxel half to three halves of it.
+    /// Hysteresis, ticks: how far a reading lags behind its input in both directions; drawn per taxel from half to
+    /// three halves of this.
     pub hysteresis: Flaw,
-    /// How fast readings wander, ticks a minute: standard deviation over taxels of a steady drift.
+    /// Drift, ticks per minute: standard deviation over taxels of a constant drift rate.
     pub drift: Flaw,
-    /// Share of taxels that read 0 for ever.
+    /// Fraction of taxels that always read 0.
     pub dead: Flaw,
-    /// Share of taxels that read one value for ever.
+    /// Fraction of taxels that always read one value.
     pub stuck: Flaw,
-    /// Number of lines with a loose contact: all of a line reads 0 for a while, now and then.
+    /// Number of lines with a loose contact: at random times, all taxels of such a line read 0 for a while.
     pub loose: Flaw,
     /// Noise of one reading: standard deviation, ticks.
     pub noise: Flaw,
 }
 
-/// A loose line holds for so long on average, and is broken for so long, s.
+/// Mean duration for which a loose line is connected, and for which it is broken, s.
 const HOLDS_S: f64 = 1.0;
 const BROKEN_S: f64 = 0.05;
 
@@ -51,7 +52,7 @@ pub struct Flawed {
     flaws: Flaws,
     gain: Vec<f64>,
     threshold: Vec<f64>,
-    /// Ticks that a reading may lie off its input, either way, and where each reads now.
+    /// Half-width of the hysteresis of each taxel, ticks, and its current output.
     play: Vec<f64>,
     reads: Vec<f64>,
     drift_per_us: Vec<f64>,
@@ -65,7 +66,7 @@ pub struct Flawed {
 
 #[derive(Debug, Clone, Copy)]
 struct Loose {
-    /// A driven line (a column), else a sense line (a row).
+    /// Whether the line is a driven line (a column); otherwise it is a sense line (a row).
     driven: bool,
     line: usize,
     holds: bool,
@@ -73,11 +74,11 @@ struct Loose {
 }
 
 impl Flawed {
-    /// Draws the taxels of an array.
+    /// Draws the flaws of an array's taxels.
     ///
     /// # Errors
     ///
-    /// `Problem` where a size makes no sense (names the flaw).
+    /// `Problem` if a magnitude is out of range; the message names the flaw.
     pub fn new(flaws: Flaws, array: &Array) -> Result<Self> {
         let lines = f64::from(array.rows) + f64::from(array.columns);
         for (name, size, most) in [
@@ -132,13 +133,13 @@ impl Flawed {
         })
     }
 
-    /// Which taxels read one value for ever, and which (0: dead), by index.
+    /// The taxels that always read one value, by index, with this value (0: dead).
     #[must_use]
     pub fn fixed(&self) -> &[Option<u16>] {
         &self.fixed
     }
 
-    /// Changes a frame's trip times to what these taxels read at `time_us` since the board's start.
+    /// Replaces a frame's trip times by the readings of these taxels at `time_us` since the board's start.
     pub fn read(&mut self, time_us: f64, ticks: &mut [u16]) {
         let Flaws { gain, threshold, hysteresis, drift, noise, .. } = self.flaws;
         let wanders = [gain, threshold, hysteresis, drift, noise].iter().any(|flaw| flaw.size > 0.0);

@@ -1,4 +1,4 @@
-//! One frame of the board: the array is scanned, its changes are queued, time moves on.
+//! One frame of the board: it scans the array, queues the changes and advances time.
 
 use super::Board;
 use super::asynchronous::{Asynchronous, Crossing, Sample};
@@ -9,15 +9,16 @@ use super::refresh::totals;
 use crate::{Result, problem};
 
 impl Board {
-    /// Scans one frame and moves time on by it.
+    /// Scans one frame and advances time by its length.
     ///
-    /// `ticks` are the trip times of the comparators by taxel index, in 1/300 us from the ramp's start; one at or above
-    /// the ramp's length reads as that length, and [`NOT_RETURNED`] is a fault. `sink` gets each datagram's payload and
-    /// returns whether it accepted it; what it does not accept waits in the queue, and a full queue drops a taxel's words.
+    /// `ticks` are the comparators' trip times by taxel index, in 1/300 us from the ramp's start; one at or above the
+    /// ramp's length reads as that length, and [`NOT_RETURNED`] is a fault. `sink` receives each datagram's payload and
+    /// returns whether it accepted it. Datagrams that it does not accept wait in the queue; if the queue is full, a
+    /// taxel's words are dropped.
     ///
     /// # Errors
     ///
-    /// `Problem` where there is not one trip time a taxel.
+    /// `Problem` if the number of trip times is not that of taxels.
     pub fn frame(&mut self, ticks: &[u16], mut sink: impl FnMut(&[u8]) -> bool) -> Result<()> {
         if ticks.len() != self.array.len() {
             return Err(problem!("frame of {} trip times: the array has {} taxels", ticks.len(), self.array.len()));
@@ -45,7 +46,7 @@ impl Board {
         Ok(())
     }
 
-    /// Takes over the registers that were written, at a frame's edge.
+    /// Applies the written registers, between two frames.
     fn take_over(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
         if self.active == self.written {
             return;
@@ -73,8 +74,8 @@ impl Board {
         self.comparators.fire(ticks, &registers, faults, |taxel, t| afferents.sample(taxel, t, &registers))
     }
 
-    /// Queues the events of one driven line: step after step, channel after channel; of version 2 with all of a frame at one
-    /// time row after row, as its words ask for.
+    /// Queues the events of one driven line: step by step, channel by channel. For version 2, with all events of a
+    /// frame at one time, row by row, because the words' positions must ascend.
     fn line(&mut self, x: u16, start: u64, ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
         let registers = self.active;
         if registers.wire_version == 2 && registers.frame_sync {
@@ -90,7 +91,7 @@ impl Board {
         }
     }
 
-    /// Queues the event of a taxel, where it has one.
+    /// Queues the event of a taxel, if it has one.
     fn taxel(&mut self, at: u64, (x, y): (u16, u16), ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
         let registers = self.active;
         let taxel = self.array.index(x, y);
@@ -111,7 +112,7 @@ impl Board {
         }
     }
 
-    /// Finds the crossings of taxels that compare by themselves, and queues those from before this frame.
+    /// Finds the crossings of taxels that compare by themselves, and queues those before this frame.
     fn queue_crossings(&mut self, any: bool, ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
         let Some(mut asynchronous) = self.asynchronous.take() else { return };
         let (registers, columns, new) = (self.active, usize::from(self.array.columns), asynchronous.is_new());
@@ -127,12 +128,12 @@ impl Board {
                 asynchronous.cross(self.time, sample, registers.noise_floor.into(), sent);
             }
         }
-        // The reading of a taxel whose comparator has not returned is its last one.
+        // A taxel whose comparator has not returned keeps its last reading.
         let read =
             ticks.iter().zip(&self.comparators.values).map(|(&t, &value)| if t == NOT_RETURNED { value } else { t });
         let due = asynchronous.end_frame(self.time, read.map(|t| t.min(registers.ramp)));
         self.asynchronous = Some(asynchronous);
-        // The events of all taxels at reset are of the first frame itself.
+        // At reset, the events of all taxels are in the first frame itself.
         debug_assert!(!new || due.is_empty());
         for Crossing { at, x, y, p, value, moved } in due {
             let intensity = if self.intensity == IntensityWord::Difference { moved } else { value };
@@ -140,7 +141,8 @@ impl Board {
         }
     }
 
-    /// Queues an event on the active version of the wire; false where the queue is full and it was dropped.
+    /// Queues an event on the active version of the wire; returns false if the queue was full and the event was
+    /// dropped.
     fn enqueue(&mut self, found: Found, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
         self.counts.changes += 1;
         if self.active.wire_version == 2 {
@@ -150,7 +152,8 @@ impl Board {
         self.link.words(found, valued, &mut self.counts, sink)
     }
 
-    /// Sends what is due at a frame's end: all of version 1; of version 2 events, promises, states and totals.
+    /// Sends what is due at the end of a frame: all words of version 1; for version 2 events, promises, states and
+    /// totals.
     fn end_frame(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
         if self.active.wire_version == 1 {
             self.link.flush_words(&mut self.counts, sink);
@@ -171,7 +174,7 @@ impl Board {
         }
     }
 
-    /// Repeats the values of a driven line as states: what the board compares with.
+    /// Sends the values of a driven line again as states, with the comparators' reference values.
     fn repeat(&mut self, x: u16, now: u64, sink: &mut impl FnMut(&[u8]) -> bool) {
         if self.active.mechanoreceptor || self.intensity == IntensityWord::Nothing {
             return;

@@ -1,5 +1,5 @@
-//! The board's side of the link: events, markers, states and totals become datagrams of either version of the wire, in
-//! a queue with a bound.
+//! The board's side of the link: encodes events, markers, states and totals as datagrams of either version of the wire,
+//! in a bounded queue.
 
 use std::collections::VecDeque;
 
@@ -11,34 +11,34 @@ use crate::{Array, Result};
 /// Most words of a datagram of version 1: 1400 bytes (read).
 pub const DATAGRAM_WORDS: usize = 280;
 
-/// Where the board sends its datagrams (read).
+/// UDP port to which the board sends its datagrams (read).
 pub const PORT: u16 = 5208;
 
-/// Words that the queue holds by default (read): two frames of 4096 taxels, change and intensity.
+/// Default capacity of the queue, words (read): two frames of 4096 taxels, change and intensity.
 pub const QUEUE_WORDS: usize = 16_384;
 
-/// Words of version 1 that an event of version 2 counts as, in the queue's bound and in the totals.
+/// Number of words as which an event of version 2 counts in the queue's capacity and in the totals.
 const EVENT_WORDS: usize = 2;
 
-/// An event as the scan found it.
+/// An event found by the scan.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Found {
-    /// Since reset, 10 ns.
+    /// Time since reset, 10 ns.
     pub(super) at: u64,
     pub(super) x: u16,
     pub(super) y: u16,
     pub(super) p: bool,
-    /// What its intensity word holds.
+    /// Content of its intensity word.
     pub(super) intensity: u16,
 }
 
-/// The datagrams that fill and those that wait.
+/// The current datagrams and the queue of those that wait.
 #[derive(Debug, Clone)]
 pub(super) struct Link {
     capacity: usize,
-    /// The datagram of version 1 that fills.
+    /// The current datagram of version 1.
     filling: Vec<u8>,
-    /// The datagrams of version 2.
+    /// Builds the datagrams of version 2.
     packer: Packer,
     queue: Queue,
 }
@@ -54,30 +54,30 @@ impl Link {
         })
     }
 
-    /// Begins a session: what fills is dropped, whole datagrams that wait are still sent.
+    /// Starts a session: the current datagrams are discarded, whole datagrams in the queue are still sent.
     pub(super) fn reset(&mut self, settings: Settings, array: &Array) -> Result<()> {
         self.filling.clear();
         self.packer = Packer::new(settings, array)?;
         Ok(())
     }
 
-    /// Bounds the queue, in words.
+    /// Sets the capacity of the queue, in words.
     pub(super) fn bound(&mut self, words: usize) {
         self.capacity = words;
     }
 
-    /// Goes on with other settings of version 2; nothing of version 2 may wait.
+    /// Continues with other settings of version 2; no event of version 2 may be waiting.
     pub(super) fn follow(&mut self, settings: Settings) {
         self.packer.follow(settings);
     }
 
-    /// Offers the sink the datagrams that wait, oldest first.
+    /// Passes the waiting datagrams to the sink, oldest first.
     pub(super) fn offer(&mut self, counts: &mut BoardCounts, sink: &mut impl FnMut(&[u8]) -> bool) {
         self.queue.offer(counts, sink);
     }
 
-    /// Queues an event of version 1, with its intensity word where `valued`; false where the queue is full and it was
-    /// dropped.
+    /// Queues an event of version 1, with its intensity word if `valued`; returns false if the queue was full and the
+    /// event was dropped.
     pub(super) fn words(
         &mut self,
         found: Found,
@@ -85,7 +85,7 @@ impl Link {
         counts: &mut BoardCounts,
         sink: &mut impl FnMut(&[u8]) -> bool,
     ) -> bool {
-        // Rule 8: on version 1 columns and rows fit a byte.
+        // Rule 8 guarantees that columns and rows fit in a byte on version 1.
         let (x, y, p) = (found.x as u8, found.y as u8, found.p);
         let mut words = [0; 2 * WORD_BYTES];
         words[..WORD_BYTES].copy_from_slice(&Word::Change { stamp: stamp(found.at), x, y, p }.to_bytes());
@@ -99,7 +99,7 @@ impl Link {
         self.enqueue(&word.to_bytes(), counts, &mut |_| false);
     }
 
-    /// Queues the words of a taxel, or a marker; false where the queue is full and they were dropped.
+    /// Queues the words of a taxel, or a marker; returns false if the queue was full and they were dropped.
     fn enqueue(&mut self, words: &[u8], counts: &mut BoardCounts, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
         if self.filling.len() + words.len() > DATAGRAM_WORDS * WORD_BYTES {
             self.flush_words(counts, sink);
@@ -114,7 +114,7 @@ impl Link {
         true
     }
 
-    /// Ends the datagram of version 1 that fills: sent after what waits, or left to wait.
+    /// Ends the current datagram of version 1: passes it to the sink after those that wait, or queues it.
     pub(super) fn flush_words(&mut self, counts: &mut BoardCounts, sink: &mut impl FnMut(&[u8]) -> bool) {
         self.queue.offer(counts, sink);
         let words = self.filling.len() / WORD_BYTES;
@@ -124,7 +124,7 @@ impl Link {
         }
     }
 
-    /// Queues an event of version 2; false where the queue is full and it was dropped.
+    /// Queues an event of version 2; returns false if the queue was full and the event was dropped.
     pub(super) fn pack(
         &mut self,
         found: Found,
@@ -154,13 +154,13 @@ impl Link {
         });
     }
 
-    /// Sends the events of version 2 that wait, whatever the hold.
+    /// Sends the waiting events of version 2, regardless of the hold time.
     pub(super) fn flush(&mut self, now: u64, counts: &mut BoardCounts, sink: &mut impl FnMut(&[u8]) -> bool) {
         let Self { packer, queue, .. } = self;
         packer.flush(now, &mut |datagram, events| queue.send(datagram, EVENT_WORDS * events, counts, sink));
     }
 
-    /// Ends a frame of version 2: everything before `now` was queued, and the next frame ends at `next` (us).
+    /// Ends a frame of version 2: every event before `now` was queued, and the next frame ends at `next` (us).
     pub(super) fn end_frame(
         &mut self,
         (now, next): (u64, u64),
@@ -198,7 +198,7 @@ impl Link {
     }
 }
 
-/// Datagrams that the sink has not accepted yet, oldest first, and how many words they count as.
+/// Datagrams that the sink has not accepted yet, oldest first, and the number of words as which they count.
 #[derive(Debug, Clone, Default)]
 struct Queue {
     waiting: VecDeque<(Vec<u8>, usize)>,
@@ -206,7 +206,7 @@ struct Queue {
 }
 
 impl Queue {
-    /// Offers the sink what waits, oldest first.
+    /// Passes the waiting datagrams to the sink, oldest first.
     fn offer(&mut self, counts: &mut BoardCounts, sink: &mut impl FnMut(&[u8]) -> bool) {
         while let Some((oldest, words)) = self.waiting.front() {
             if !sink(oldest) {
@@ -218,7 +218,7 @@ impl Queue {
         }
     }
 
-    /// Sends a datagram after those that wait, or lets it wait too.
+    /// Passes a datagram to the sink after those that wait, or queues it.
     fn send(&mut self, datagram: &[u8], words: usize, counts: &mut BoardCounts, sink: &mut impl FnMut(&[u8]) -> bool) {
         self.offer(counts, sink);
         if self.waiting.is_empty() && sink(datagram) {
@@ -235,7 +235,7 @@ fn count_sent(counts: &mut BoardCounts, words: usize) {
     counts.sent += words as u64;
 }
 
-/// The stamp of version 1 of a time in 10 ns.
+/// The stamp of version 1 for a time in 10 ns.
 fn stamp(time: u64) -> u16 {
     ((time / 10_000) & 0xffff) as u16
 }

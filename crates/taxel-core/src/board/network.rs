@@ -1,4 +1,4 @@
-//! Simulated network: drops, repeats, delays, cuts and damages datagrams, by a seed.
+//! Simulated network: drops, duplicates, reorders, truncates and corrupts datagrams, drawn from a seed.
 
 use std::collections::VecDeque;
 
@@ -8,24 +8,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Result, problem};
 
-/// A datagram that is overtaken comes behind so many others at most.
+/// Largest number of datagrams that can overtake a reordered one.
 const BEHIND: usize = 8;
 
-/// The share of all datagrams that each fault hits, 0 to 1; at most one fault hits a datagram.
+/// Probability of each fault for a datagram, 0 to 1; at most one fault hits a datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Faults {
-    /// Never arrive.
+    /// Never delivered.
     pub lost: f64,
-    /// Arrive twice.
+    /// Delivered twice.
     pub repeated: f64,
-    /// Are overtaken by 1 to 8 others.
+    /// Overtaken by 1 to 8 others.
     pub reordered: f64,
-    /// Arrive without their end, which lies anywhere.
+    /// Delivered truncated, at any byte.
     pub cut: f64,
-    /// Arrive with one to eight flipped bits.
+    /// Delivered with one to eight flipped bits.
     pub corrupted: f64,
-    /// Draws all of it.
+    /// Seed of the random draws.
     pub seed: u64,
 }
 
@@ -44,28 +44,28 @@ impl Faults {
 /// The number of datagrams that each fault has hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct NetworkCounts {
-    /// Given to the network.
+    /// Datagrams passed to the network.
     pub given: u64,
-    /// That came out, whole or not, and repeated ones twice.
+    /// Datagrams delivered, whole or not; duplicated ones count twice.
     pub delivered: u64,
-    /// By fault.
+    /// Datagrams dropped.
     pub lost: u64,
-    /// By fault.
+    /// Datagrams duplicated.
     pub repeated: u64,
-    /// By fault.
+    /// Datagrams reordered.
     pub reordered: u64,
-    /// By fault.
+    /// Datagrams truncated.
     pub cut: u64,
-    /// By fault.
+    /// Datagrams corrupted.
     pub corrupted: u64,
 }
 
-/// Passes the datagrams of a board on to a host, with faults.
+/// Forwards a board's datagrams to a host, with faults.
 #[derive(Debug, Clone)]
 pub struct Network {
     faults: Faults,
     draw: StdRng,
-    /// Those that are overtaken, and by how many others still.
+    /// Reordered datagrams that wait, each with the number of datagrams that still have to overtake it.
     behind: VecDeque<(usize, Vec<u8>)>,
     counts: NetworkCounts,
 }
@@ -75,7 +75,7 @@ impl Network {
     ///
     /// # Errors
     ///
-    /// `Problem` where a share, or all of them together, do not lie in 0 to 1.
+    /// `Problem` if a probability, or the sum of all, is not between 0 and 1.
     pub fn new(faults: Faults) -> Result<Self> {
         let shares = faults.shares();
         for (name, share) in shares {
@@ -97,7 +97,7 @@ impl Network {
         &self.counts
     }
 
-    /// Takes a datagram; gives the sink what comes out.
+    /// Sends a datagram through the network; passes each delivered datagram to the sink.
     pub fn pass(&mut self, datagram: &[u8], sink: &mut impl FnMut(&[u8])) {
         self.counts.given += 1;
         let at: f64 = self.draw.random();
@@ -130,7 +130,7 @@ impl Network {
             "corrupted" if !datagram.is_empty() => {
                 self.counts.corrupted += 1;
                 let mut hurt = datagram.to_vec();
-                // Different bits, so that none is flipped back.
+                // The bits are distinct, so that none is flipped back.
                 for bit in rand::seq::index::sample(&mut self.draw, 8 * hurt.len(), 8) {
                     hurt[bit / 8] ^= 1 << (bit % 8);
                     if self.draw.random() {
@@ -151,7 +151,7 @@ impl Network {
         }
     }
 
-    /// Lets out what is still on the way.
+    /// Delivers the datagrams that still wait.
     pub fn flush(&mut self, sink: &mut impl FnMut(&[u8])) {
         while let Some((_, late)) = self.behind.pop_front() {
             self.out(&late, sink);

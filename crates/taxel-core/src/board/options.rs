@@ -1,31 +1,31 @@
-//! What a user chooses about a board beside its registers: what a value is compared with, what an event holds, version 2.
+//! A user's options of a board besides its registers: the reference of a change, the content of an event, version 2.
 
 use serde::{Deserialize, Serialize};
 
 use crate::wire::Registers;
 use crate::wire::v2::{Kind, Settings};
 
-/// What a new value is compared with.
+/// The reference with which a new value is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Previous {
-    /// The last value sent, 0 after reset. Reading: only so does the host's picture stay within the floor.
+    /// The last value sent, 0 after reset. Reading: only this keeps the host's values within the noise floor.
     #[default]
     LastSent,
-    /// The last value sampled, as the thesis words it in 4.3.
+    /// The last value sampled, as in the text of the thesis, 4.3.
     LastSample,
 }
 
-/// What an intensity word holds.
+/// The content of an intensity word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IntensityWord {
     /// The new value.
     #[default]
     Value,
-    /// How far it is from the previous one ("delta intensity"); polarity is the sign.
+    /// The difference from the previous value ("delta intensity"); the polarity is its sign.
     Difference,
-    /// There is none: a change has its taxel, time and polarity only.
+    /// No intensity word: a change has its taxel, time and polarity only.
     Nothing,
 }
 
@@ -33,15 +33,15 @@ pub enum IntensityWord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Version2 {
-    /// Its number.
+    /// Number of the board.
     pub board: u16,
-    /// What its session numbers are drawn from; two resets of one board never have the same within 65 536.
+    /// Seed of the session numbers; two resets of one board within 65 536 never have the same number.
     pub seed: u16,
-    /// For how long events may wait until their datagram is fuller, us.
+    /// Longest time that an event may wait until its datagram is fuller, us.
     pub hold_us: u64,
-    /// How often it promises that nothing has happened, us; each frame for 0.1 s after an event.
+    /// Interval between promises that nothing has happened, us; within 0.1 s after an event, each frame is promised.
     pub heartbeat_us: u64,
-    /// How often each value is repeated as a state and the board's totals are sent, us; 0: never.
+    /// Interval at which each value is repeated as a state and the board's totals are sent, us; 0 is never.
     pub states_us: u64,
 }
 
@@ -52,7 +52,7 @@ impl Default for Version2 {
 }
 
 impl Version2 {
-    /// What the datagrams of a session have in common, on a board with these registers.
+    /// The settings that the datagrams of a session share, on a board with these registers.
     pub(super) fn settings(&self, registers: &Registers, intensity: IntensityWord, session: u16) -> Settings {
         let kind = if registers.mechanoreceptor {
             Kind::Large

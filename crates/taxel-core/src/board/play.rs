@@ -1,66 +1,66 @@
-//! Acts played to a board that arms, is tared, starts and stops.
+//! Plays acts to a board that arms, is tared, starts and stops.
 
 use super::{Board, Crossed, session};
 use crate::circuit::Chain;
 use crate::contact::{Act, Narrow, Sensor, Stage, Taxels};
-use crate::wire::{Command, Decoder, Receiver, Registers, WORD_BYTES};
+use crate::wire::{Command, Decoder, Registers, SenderDecoder, WORD_BYTES};
 use crate::{Array, Events, Result, Stop};
 
-/// What is played, and to which board.
+/// The scene to play, and the board that receives it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Play {
-    /// Of the sensor and of the board.
+    /// The array of the sensor and of the board.
     pub array: Array,
-    /// What the board's registers hold from the start.
+    /// The board's initial registers.
     pub registers: Registers,
-    /// The law by which taxels turn force into readings.
+    /// The model by which taxels convert force into readings.
     pub sensor: Sensor,
-    /// What taxels and their noise are drawn from.
+    /// Seed of the taxels' parameters and of their noise.
     pub seed: u64,
-    /// What touches the array, one act after the other.
+    /// The acts that touch the array, one after the other.
     pub acts: Vec<Act>,
     /// Duration of the tare, ms.
     pub tare_ms: f64,
-    /// What taxels share and how they are converted; nothing: each reads by itself.
+    /// The circuit of shared lines and converter; without it each taxel is read by itself.
     pub circuit: Option<Chain>,
-    /// Each taxel compares by itself: nothing is scanned.
+    /// Whether each taxel compares its value by itself, without a scan.
     pub asynchronous: bool,
 }
 
-/// A board that has armed, what it is shown from its second frame on, and the commands of its session.
+/// A board that has armed, its input from the second frame on, and the commands of its session.
 #[derive(Debug)]
 pub struct Armed {
-    /// Its first frame was the stage's.
+    /// The board; it has scanned the stage's first frame.
     pub board: Board,
-    /// The circuit through which it reads.
+    /// The circuit through which the board reads.
     pub crossed: Option<Crossed>,
-    /// The frames that are left.
+    /// The remaining frames.
     pub stage: Stage,
-    /// Before which frame each comes.
+    /// The commands, each with the frame before which it is sent.
     pub commands: Vec<(u64, Command)>,
 }
 
-/// What a host decoded of a board's datagrams.
+/// The events that a host decoded from a board's datagrams, and their numbers.
 #[derive(Debug, Clone)]
 pub struct Played {
-    /// What changed, when.
+    /// The decoded events.
     pub events: Events,
-    /// How many datagrams there were.
+    /// Number of datagrams.
     pub datagrams: u64,
-    /// How many words of version 1, of five bytes, they held.
+    /// Number of words of version 1, of five bytes each, that the datagrams held.
     pub words: u64,
-    /// How many bytes they held.
+    /// Number of bytes in the datagrams.
     pub bytes: u64,
-    /// The acts, numbered from 0, with a touch that is narrower than their cells resolve.
+    /// Acts, by index from 0, with a touch that is narrower than their cells resolve.
     pub narrow: Vec<(usize, Narrow)>,
 }
 
 impl Play {
-    /// The acts, ready to be played frame by frame.
+    /// Prepares the acts to be played frame by frame.
     ///
     /// # Errors
     ///
-    /// `Device` where registers break a rule, `Scene` where an act cannot be played.
+    /// `Device` if the registers break a rule, `Scene` if an act cannot be played.
     pub fn stage(&self, stop: Stop<'_>) -> Result<Stage> {
         let Self { array, registers, .. } = self;
         registers.check(array)?;
@@ -72,7 +72,7 @@ impl Play {
     ///
     /// # Errors
     ///
-    /// As [`Play::stage`], [`Board::new`], [`Board::asynchronous`], [`Crossed::new`] and [`Crossed::fits`]; `Problem` where
+    /// As [`Play::stage`], [`Board::new`], [`Board::asynchronous`], [`Crossed::new`] and [`Crossed::fits`]; `Problem` if
     /// the tare leaves no frame for the acts.
     pub fn arm(&self, stop: Stop<'_>) -> Result<Armed> {
         let mut stage = self.stage(stop)?;
@@ -95,20 +95,20 @@ impl Play {
         Ok(Armed { board, crossed, stage, commands })
     }
 
-    /// Plays as fast as it goes and decodes what the board sends; `watch` is called once a second of the board's with the share
-    /// that is played.
+    /// Plays as fast as possible and decodes the board's datagrams; calls `watch` once per second of the board's time
+    /// with the fraction played.
     ///
     /// # Errors
     ///
-    /// As [`Play::arm`]; `Interrupted` where asked to stop.
+    /// As [`Play::arm`]; `Interrupted` if asked to stop.
     pub fn run(&self, mut watch: impl FnMut(f64), stop: Stop<'_>) -> Result<Played> {
         let Armed { mut board, mut crossed, mut stage, commands } = self.arm(stop)?;
         let version = self.registers.wire_version;
-        let mut receiver = Receiver::new(Decoder::new(self.array.clone()), version);
+        let mut decoder = SenderDecoder::new(Decoder::new(self.array.clone()), version);
         let mut events = Events::empty(self.array.clone());
         let (mut datagrams, mut bytes) = (0, 0);
         let sink = |datagram: &[u8]| {
-            receiver.push(datagram, None, &mut events);
+            decoder.push(datagram, None, &mut events);
             datagrams += 1;
             bytes += datagram.len() as u64;
             true
@@ -116,7 +116,7 @@ impl Play {
         let narrow = stage.narrow().to_vec();
         let (frames, second) = (stage.frames(), (1e6 / self.registers.frame_us()) as usize);
         let mut done = 0_usize;
-        // The session writes the floor and the markers alone: neither moves the converter.
+        // The session writes only the noise floor and the markers, neither of which affects the converter.
         let touch = |ticks: &mut [u16]| {
             done += 1;
             if done.is_multiple_of(second) {

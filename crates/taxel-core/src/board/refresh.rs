@@ -1,22 +1,22 @@
-//! What a board of version 2 repeats from time to time: the value of each taxel, a line at a time, and its totals.
+//! Schedules what a board of version 2 repeats: the value of each taxel, a line at a time, and its totals.
 
 use super::counts::BoardCounts;
 use crate::wire::Registers;
 use crate::wire::v2::Status;
 
-/// How far the repeats have come since reset.
+/// How much was repeated since reset.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Refresh {
-    /// How often the totals were sent.
+    /// Number of times that the totals were sent.
     totals: u64,
-    /// How many lines were repeated, over and over the array.
+    /// Number of lines repeated, over all passes of the array.
     lines: u64,
 }
 
 impl Refresh {
-    /// The driven lines whose values are due at `time` (10 ns), where all are repeated once in `every` (10 ns).
+    /// The driven lines whose values are due at `time` (10 ns), if all lines are repeated once in `every` (10 ns).
     ///
-    /// A frame that is longer than the period repeats each line once.
+    /// If a frame is longer than the period, each line is repeated once per frame.
     pub(super) fn lines(&mut self, time: u64, every: u64, registers: &Registers) -> impl Iterator<Item = u16> + use<> {
         let lines = u64::from(registers.lines);
         let due = (u128::from(time) * u128::from(lines) / u128::from(every)) as u64;
@@ -32,7 +32,7 @@ impl Refresh {
     }
 }
 
-/// The totals since reset; how many datagrams went before is known where the datagram is made.
+/// The totals since reset; the packer fills in the number of datagrams before this one.
 pub(super) fn totals(now: &BoardCounts, at_reset: &BoardCounts) -> Status {
     let dropped = now.dropped - at_reset.dropped;
     Status {

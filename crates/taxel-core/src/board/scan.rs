@@ -1,4 +1,4 @@
-//! In which order the board reads its taxels.
+//! The order in which the board reads its taxels.
 
 use crate::Array;
 use crate::wire::Registers;
@@ -6,15 +6,15 @@ use crate::wire::Registers;
 /// The driven lines of a frame and the sense lines of each, in their order.
 #[derive(Debug, Clone)]
 pub(super) struct Scan {
-    /// The sense lines of a driven line in the order of steps, within a step of channels; each with its step.
+    /// The sense lines of a driven line, by step and then by channel, each with its step.
     sense_lines: Vec<(u64, u16)>,
     lfsr: Lfsr,
 }
 
 impl Scan {
-    /// The scan at reset.
+    /// The state of the scan at reset.
     ///
-    /// Step s puts sense line (steps x c + s) on channel c; of these only the array's rows are there.
+    /// In step s, channel c reads sense line (steps x c + s); lines beyond the array's rows are left out.
     pub(super) fn new(registers: &Registers, array: &Array) -> Self {
         let (steps, channels) = (registers.steps(array) as u16, u16::from(registers.channels));
         let of_step = |step: u16| (0..channels).map(move |channel| (step.into(), steps * channel + step));
@@ -22,7 +22,7 @@ impl Scan {
         Self { sense_lines, lfsr: Lfsr(Lfsr::SEED) }
     }
 
-    /// Begins the random order of lines anew.
+    /// Restarts the random order of lines.
     pub(super) fn reset(&mut self) {
         self.lfsr = Lfsr(Lfsr::SEED);
     }
@@ -42,15 +42,16 @@ impl Scan {
     }
 }
 
-/// The 16-bit shift register that shuffles the driven lines (Fibonacci; taps 16, 14, 13, 11: all 65 535 states).
+/// The 16-bit linear feedback shift register that shuffles the driven lines (Fibonacci; taps 16, 14, 13, 11: all 65 535
+/// states).
 #[derive(Debug, Clone)]
 struct Lfsr(u16);
 
 impl Lfsr {
-    /// What it holds at reset (read).
+    /// State at reset (read).
     const SEED: u16 = 0xace1;
 
-    /// Sixteen shifts on: each draw is a fresh word.
+    /// Shifts sixteen times, so that each draw is an independent word.
     fn draw(&mut self) -> u16 {
         for _ in 0..16 {
             let bit = (self.0 ^ self.0 >> 2 ^ self.0 >> 3 ^ self.0 >> 5) & 1;
@@ -59,7 +60,7 @@ impl Lfsr {
         self.0
     }
 
-    /// Shuffles lines (Fisher and Yates, from the last place down; place = word x (k + 1) >> 16).
+    /// Shuffles lines (Fisher and Yates, from the last position down; position = word x (k + 1) >> 16).
     fn shuffle(&mut self, lines: &mut [u16]) {
         for k in (1..lines.len()).rev() {
             let place = (usize::from(self.draw()) * (k + 1)) >> 16;

@@ -1,18 +1,19 @@
-//! A board from reset to stop, as the demo and `taxel emulate` use it: arming, tare, start and stop.
+//! A board's session from reset to stop, as the demo and `taxel emulate` use it: arming, tare, start and stop.
 
 use super::{Board, BoardCounts};
 use crate::spikes::us;
 use crate::wire::{Command, Registers};
 use crate::{Result, Stop, problem};
 
-/// The commands of a session of `frames` frames, and before which frame each comes.
+/// The commands of a session of `frames` frames, each with the frame before which it is sent.
 ///
-/// The first frame arms the board ([`Board::arm`]). For the tare the noise floor is 0, so that every taxel sends its rest
-/// again and again; `tare_ms` later come the floor of `registers` and the start marker, before the last frame the stop.
+/// The first frame arms the board ([`Board::arm`]). During the tare the noise floor is 0, so that every taxel sends its
+/// rest repeatedly; `tare_ms` later the floor of `registers` is written and the recording started, and before the last
+/// frame it is stopped.
 ///
 /// # Errors
 ///
-/// `Problem` where the tare is not between 0 and a minute, or does not leave two frames.
+/// `Problem` if the tare is not between 0 and a minute, or does not leave two frames.
 pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(u64, Command)>> {
     let mut commands = opening(registers, tare_ms)?;
     let start = commands.last().map_or(1, |(frame, _)| *frame);
@@ -23,11 +24,11 @@ pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(
     Ok(commands)
 }
 
-/// The commands with which a session of any length begins: those of [`session`] but the stop.
+/// The commands at the start of a session of any length: those of [`session`] without the stop.
 ///
 /// # Errors
 ///
-/// `Problem` where the tare is not between 0 and a minute.
+/// `Problem` if the tare is not between 0 and a minute.
 pub fn opening(registers: &Registers, tare_ms: f64) -> Result<Vec<(u64, Command)>> {
     if !(0.0..=60_000.0).contains(&tare_ms) {
         return Err(problem!("tare of {tare_ms} ms: must be 0 to 60000"));
@@ -47,8 +48,8 @@ fn write(register: u8, registers: Registers) -> Command {
 }
 
 impl Board {
-    /// Scans the first frame and discards its events: at reset all previous values are 0, and every taxel would be sent.
-    /// The frame and its faults are counted, the discarded events are not.
+    /// Scans the first frame and discards its events: at reset all reference values are 0, so every taxel would be
+    /// sent. The frame and its faults are counted, the discarded events are not.
     ///
     /// # Errors
     ///
@@ -64,13 +65,13 @@ impl Board {
         Ok(())
     }
 
-    /// Scans frame after frame as fast as it goes, until `touch` has no more of them.
+    /// Scans frames as fast as possible until `touch` returns none.
     ///
-    /// `touch` writes the trip times of a frame; `commands` come before the frames that they name.
+    /// `touch` writes the trip times of a frame; each command is executed before the frame with its number.
     ///
     /// # Errors
     ///
-    /// As [`Board::frame`]; `Interrupted` where asked to stop.
+    /// As [`Board::frame`]; `Interrupted` if asked to stop.
     pub fn play(
         &mut self,
         mut touch: impl FnMut(&mut [u16]) -> Result<bool>,
@@ -105,7 +106,7 @@ mod tests {
         let (mut frame, mut words) = (0, [0; 12]);
         let last = std::cell::Cell::new(0);
         let touch = |ticks: &mut [u16]| {
-            // A taxel that moves by one tick a frame: only a floor of 0 shows it.
+            // A taxel that changes by one tick per frame, which makes events with a floor of 0 only.
             frame += 1;
             ticks.fill(50);
             ticks[9] += frame as u16 % 2;
@@ -117,7 +118,7 @@ mod tests {
             true
         };
         board.play(touch, &commands, sink, Stop::never()).unwrap();
-        // Six frames of 192 us for the tare; then a start, silence, a stop.
+        // Six frames of 192 us for the tare; then a start, no events, a stop.
         assert_eq!(words, [0, 2, 2, 2, 2, 2, 2, 1, 0, 0, 0, 1]);
         let counts = board.counts();
         assert_eq!((counts.frames, counts.changes, counts.sent), (12, 6, words.iter().sum::<usize>() as u64));

@@ -1,4 +1,4 @@
-//! The emulated board as a whole: trip times and commands in, datagrams and status lines out.
+//! Tests of the emulated board as a whole: trip times and commands in, datagrams and status lines out.
 
 use super::*;
 use crate::Array;
@@ -108,7 +108,7 @@ fn a_full_queue_drops_both_words_of_a_taxel_and_counts_them() {
     board.frame(&[100; 4096], |_| false).unwrap();
     assert_eq!((board.counts().words, board.counts().dropped), (1000, 4096 - 500));
     let later = play(&mut board, &[100; 4096]);
-    // What was never sent still differs, so it comes with the next frame.
+    // Values that were never sent still differ from the reference, so the next frame sends them.
     assert_eq!(words(&later).len(), 2 * 4096);
     assert_eq!(board.counts().sent, board.counts().words);
     assert_eq!(board.faults(), "fault queue 3596\n");
@@ -152,7 +152,7 @@ fn a_board_of_afferents_fires_as_equations_5_1_to_5_5_say() {
     let mut random = StdRng::seed_from_u64(9);
     let registers = Registers::preset("5.2 kHz, FA-1").unwrap();
     let mut board = Board::new(registers, &Array::thesis()).unwrap();
-    // In whole numbers of 2^-16, as the page of the registers says.
+    // In units of 2^-16, as the page of the registers defines.
     let rest = i64::from(registers.threshold_rest) * 64;
     let jump = i64::from(registers.threshold_jump) * rest / 256;
     let decay = i64::from(registers.threshold_decay) * rest / 1024;

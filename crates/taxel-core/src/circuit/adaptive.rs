@@ -8,16 +8,16 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop, problem};
 
-/// A converter whose ramp lasts another time in each frame; the rest of a step's and of a column's time is constant.
+/// A converter that sets the duration of its ramp frame by frame; the rest of a step and of a column is constant.
 ///
-/// After a frame the taxel that moved farthest sets the length of the next ramp: the length that lets it move by `moves_ticks`
-/// of that ramp within the frame, so that a reading's error by its age stays of the size of that by its resolution. A
-/// move of `noise_ticks` or less of the coarser of two ramps is none; without any, the next ramp lasts twice as long,
-/// up to the gentlest. The rule is ours: the thesis calls for one and states none.
+/// After a frame the taxel that moved farthest sets the length of the next ramp: the length that lets it move by
+/// `moves_ticks` of that ramp within the frame, so that a reading's error by its age stays of the size of that by its
+/// resolution. A move of `noise_ticks` or less of the coarser of two ramps does not count; without any, the next ramp
+/// lasts twice as long, up to the gentlest. The rule is ours: the thesis calls for one and states none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Adaptive {
-    /// Its times, those of a step and a column with the `ramp` that they hold.
+    /// The converter; its times of a step and a column are those with its own `ramp`, which they include.
     pub converter: Converter,
     /// The shortest time of the ramp, ticks.
     pub steepest: u32,
@@ -38,17 +38,17 @@ impl Default for Adaptive {
 /// Frames that were converted one after the other.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Converted {
-    /// When each began, us.
+    /// When each frame began, us.
     pub t_us: Vec<f64>,
-    /// How long its ramp took, ticks.
+    /// How long the ramp of each lasted, ticks.
     pub ramp: Vec<u32>,
-    /// What was read, as [`Scan::frame`] gives it, frame after frame.
+    /// The ticks, as [`Scan::frame`] gives them, frame after frame.
     pub ticks: Vec<f64>,
-    /// The voltage that whole ticks stand for, V: the ramp's halfway to the next tick, or at its end.
+    /// The voltage of each number of ticks, V: that of the ramp halfway to the next tick, or at its end.
     pub volts: Vec<f64>,
 }
 
-/// As many readings as one call makes.
+/// The most readings of one call.
 const MOST: f64 = 2e8;
 
 impl Adaptive {
@@ -101,7 +101,7 @@ impl Adaptive {
         (ramp.min(65_534.0) as u32).clamp(self.steepest, self.gentlest)
     }
 
-    /// Converts what lines give: frames of voltages, `[row * columns + column]`, each `period_us` after the last, straight
+    /// Converts the voltages of lines: frames, `[row * columns + column]`, each `period_us` after the last, straight
     /// in between. Each column is read as it is then; a frame that would end after the last voltages is not begun.
     ///
     /// # Errors
@@ -218,7 +218,7 @@ mod tests {
     fn it_turns_steep_at_once_and_gentle_step_by_step() {
         let got = converted(&Adaptive::default(), |t| if t < 1000.0 { 1.3 } else { 2.5 }, 3000);
         let jump = got.ramp.iter().position(|&ramp| ramp < 510).unwrap();
-        // It falls into a frame: columns that were read before it move in the next.
+        // The step falls within a frame: columns that were read before it move in the next one.
         assert!(got.ramp[jump] < 60, "{:?}", got.ramp);
         assert_eq!(got.ramp[jump + 1..jump + 6], [38, 76, 152, 304, 510], "{:?}", got.ramp);
         assert!(got.ramp[jump + 6..].iter().all(|&ramp| ramp == 510));

@@ -1,8 +1,8 @@
 //! The multiplexer, the comparators and the counters: from the amplifiers' voltages to ticks.
 //!
 //! While a column is read its sense lines are put on the channels' comparators one after the other. A comparator's input
-//! settles towards its line's voltage as the multiplexer lets it, and that line, where the amplifiers are slow, from what
-//! the last column left there. Meanwhile the ramp rises; a reading is when the comparator first trips.
+//! settles towards its line's voltage with the multiplexer's time constant, and that line, where the amplifiers are slow,
+//! from its voltage in the last column. Meanwhile the ramp rises; a reading is the time at which the comparator first trips.
 
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,7 @@ pub struct Converter {
     pub hysteresis_v: f64,
     /// Time constant of a comparator's input behind the multiplexer, us: it settles to 2 % in 0.2 us (4.4.1).
     pub settle_us: f64,
-    /// Time constant of the amplifiers, `R_f C`, us: what a column leaves for the next. 0: they settle at once.
+    /// Time constant of the amplifiers, `R_f C`, us: a column's voltage decays with it in the next. 0: they settle at once.
     pub amplifier_us: f64,
     /// Time constant with which the ramp falls back, us. A guess.
     pub discharge_us: f64,
@@ -110,7 +110,7 @@ impl Converter {
         Ramp { shape: self.shape, ticks: f64::from(self.ramp) }
     }
 
-    /// Where the ramp that ended `after_us` ago stands, V.
+    /// The voltage of the ramp that ended `after_us` ago, V.
     fn fallen(&self, after_us: f64) -> f64 {
         RAMP_END_V * decay(after_us, self.discharge_us)
     }
@@ -122,7 +122,7 @@ impl Converter {
     fn input(&self, line_v: f64, over_v: f64, input_v: f64) -> Input {
         let (slow, mut fast) = (self.amplifier_us, self.settle_us);
         if (slow - fast).abs() < 1e-6 * fast {
-            // Two equal time constants have a form of their own; a millionth apart it is the same.
+            // Equal time constants have a formula of their own; those a millionth apart give the same result.
             fast *= 1.0 + 2e-6;
         }
         let carried = if over_v == 0.0 { 0.0 } else { over_v * slow / (slow - fast) };
@@ -135,7 +135,7 @@ impl Converter {
         let (ramp, most, half) = (self.ramp(), f64::from(self.ramp), 0.5 * self.hysteresis_v);
         let at = |tick: f64| input.at(self.wait_us + tick / TICKS_A_US);
         let passes = |tick: f64| ramp.ticks_if_it_went_on(at(tick) + half) - from;
-        // Where the input moves much more slowly than the ramp they meet once, and each pass comes closer.
+        // An input that moves much more slowly than the ramp meets it once, and each iteration comes closer to that time.
         if input.steepest(self.wait_us) / TICKS_A_US < 0.1 * ramp.least_slope() {
             let mut tick = passes(most).clamp(0.0, most);
             for _ in 0..30 {
@@ -146,7 +146,7 @@ impl Converter {
                 tick = next;
             }
         }
-        // Else the counter's own way, a tick at a time; between two of them straight.
+        // Otherwise tick by tick, as the counter does; between two ticks the input is taken as a straight line.
         let ahead = |tick: f64| tick - passes(tick);
         let mut before = ahead(0.0);
         if before >= 0.0 {
@@ -163,8 +163,8 @@ impl Converter {
         most
     }
 
-    /// The signals of one comparator, as an oscilloscope would show them, while its lines, `line_v`, are read one after the other, again and
-    /// again, with a point each `every_us`.
+    /// The signals of one comparator, as an oscilloscope would show them, while its lines, `line_v`, are read one after
+    /// the other, again and again, with a point each `every_us`.
     ///
     /// # Errors
     ///
@@ -219,12 +219,13 @@ impl Converter {
     }
 }
 
-/// `exp(-t / tau)`; of no time constant nothing is left.
+/// `exp(-t / tau)`; 0 where the time constant is 0.
 fn decay(t_us: f64, tau_us: f64) -> f64 {
     if tau_us > 0.0 { (-t_us / tau_us).exp() } else { 0.0 }
 }
 
-/// A comparator's input in a step: its line's voltage, what the last column left there, what the last line left here.
+/// A comparator's input in a step: its line's settled voltage, the rest of the last column's on the line, and the rest of
+/// the last line's at the input.
 #[derive(Debug, Clone, Copy)]
 struct Input {
     line_v: f64,
@@ -246,7 +247,7 @@ impl Input {
         volts
     }
 
-    /// The fastest that it can move from then on, V/us.
+    /// The largest slope that it can have from then on, V/us.
     fn steepest(&self, since_us: f64) -> f64 {
         let of = |size: f64, tau: f64| if size == 0.0 { 0.0 } else { size.abs() * decay(since_us, tau) / tau };
         of(self.carried, self.slow) + of(self.own, self.fast)
@@ -268,7 +269,7 @@ pub struct Moment {
     pub high: bool,
 }
 
-/// A converter that scans frame after frame, and what the last one left.
+/// A converter that scans frame after frame, with its state at the end of the last one.
 #[derive(Debug, Clone)]
 pub struct Scan {
     converter: Converter,
@@ -308,7 +309,7 @@ impl Scan {
     /// Converts a frame of voltages, `[row * columns + column]`, columns in their order; each step of a channel reads its
     /// next row. Ticks with their fraction; not a number where a comparator had not returned when the ramp began.
     ///
-    /// The first frame finds everything settled. Where there is not a voltage a taxel, what there is is converted.
+    /// Before the first frame everything is settled. Where voltages are fewer than taxels, those given are converted.
     pub fn frame(&mut self, volts: &[f64], ticks: &mut [f64]) {
         let Converter { steps, step_us, line_us, wait_us, amplifier_us, hysteresis_v, ramp, .. } = self.converter;
         let (columns, half) = (self.columns, 0.5 * hysteresis_v);
@@ -429,7 +430,7 @@ mod tests {
         let slow = Converter { discharge_us: 5.0, ..at_once() };
         let read = frames(slow, &[&volts, &volts], 1);
         assert!(read[0][0].is_finite() && read[0][1].is_nan() && read[1][0].is_nan(), "{read:?}");
-        // What lies above the ramp even where it begins charged never trips, so nothing has to return.
+        // An input that stays above the ramp, even one that begins charged, never trips: no comparator has to return.
         let read = frames(Converter { discharge_us: 5.0, ..at_once() }, &[&[4.9; 8], &[4.9; 8]], 1);
         assert!(read.concat().iter().all(|&t| t == 150.0), "{read:?}");
         let quick = frames(Converter { discharge_us: 0.02, ..at_once() }, &[&volts, &volts], 1);

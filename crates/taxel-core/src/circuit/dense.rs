@@ -6,12 +6,12 @@
 use crate::vectors::wide;
 use crate::{Result, problem};
 
-/// Columns that are worked on together.
+/// Columns that are processed together.
 const LANES: usize = 32;
 
 type Lanes = [f64; LANES];
 
-/// A matrix, its columns in blocks of [`LANES`], each block row by row. What fills the last block up stays 0.
+/// A matrix, its columns in blocks of [`LANES`], each block row by row. Columns that fill up the last block stay 0.
 #[derive(Debug, Clone)]
 pub(super) struct Matrix {
     rows: usize,
@@ -84,8 +84,8 @@ wide! {
 }
 
 wide! {
-    /// Makes of a matrix M its factor U, `M = U'U`; gives U' row by row, and what to multiply a row of it by. False where
-    /// M is not positive definite in these numbers.
+    /// Factors a matrix, `M = U'U`; gives U' row by row, and the number that each of its rows is multiplied by. False
+    /// where M is not positive definite in float64.
     fn eliminate(matrix: &mut Matrix, lower: &mut [f64], inverse: &mut [f64]) -> bool {
         let n = matrix.rows;
         for j in 0..n {
@@ -94,7 +94,7 @@ wide! {
             for (factor, row) in factors[..j].iter_mut().zip(&matrix.lanes[own * n..]) {
                 *factor = row[j % LANES];
             }
-            // The first block at work holds the pivot.
+            // The first block that is processed holds the pivot.
             for block in own..matrix.lanes.len() / n {
                 let (above, rest) = matrix.lanes[block * n..].split_at_mut(j);
                 rest[0] = less(rest[0], &factors[..j], above);
@@ -142,7 +142,7 @@ wide! {
 }
 
 impl Matrix {
-    /// Subtracts a product from it: of a matrix that stands row by row, and another.
+    /// Subtracts from it the product of a matrix stored row by row and another one.
     pub(super) fn subtract(&mut self, left: &[f64], right: &Matrix) {
         subtract(self, left, right);
     }

@@ -9,7 +9,7 @@ use crate::parameters::Described;
 /// The force at which [`Fabric::touch_us`] is stated, N: the least that the thesis could detect (4.4.1).
 pub const TOUCH_N: f64 = 0.02;
 
-/// A law of conductance, `G = G0 + k F^n`, the same for each taxel. All three are guesses: no maker's curve was found.
+/// A law of conductance, `G = G0 + k F^n`, the same for each taxel. All three values are guesses: no maker publishes them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fabric {

@@ -1,6 +1,6 @@
 //! The network of rows, columns and taxels, solved exactly.
 //!
-//! A sense line hangs on its source by `sense_ohm`, a driven line on its switch by `drive_ohm`; every crossing conducts.
+//! `sense_ohm` connects a sense line to its source, `drive_ohm` a driven line to its switch; every crossing conducts.
 //! Solved for is the current `I` that each sense line gives into the network while one driven line is read, with all
 //! voltages counted from that of the idle lines. Without wire resistance the driven lines' voltages fall out, and with
 //! `K = diag(sum of a row of G) - G W G'`, `W = diag(w)`, `w = r / (1 + r b)`, `r` the drive resistance and `b` the sums
@@ -23,7 +23,7 @@ use super::dense::{Matrix, beyond};
 use super::limit::Limit;
 use crate::{Result, Stop, problem};
 
-/// What the driven lines that are not read do.
+/// The state of the driven lines that are not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Idle {
@@ -47,13 +47,13 @@ pub struct Grid {
     pub drive_ohm: f64,
     /// Of a line from one crossing to the next, and from its end to the first, ohm; 0, or 0.001 or more.
     pub wire_ohm: f64,
-    /// What the lines that are not read do.
+    /// The state of the lines that are not read.
     pub idle: Idle,
-    /// Where a sense line's source gives no more; nothing: nowhere.
+    /// Limits of a sense line's source; `None`: it has none.
     pub limit: Option<Limit>,
 }
 
-/// The least wire resistance that is solved as one: below it the network's numbers lie too far apart.
+/// The least wire resistance above 0: with less the system is too badly conditioned.
 pub const LEAST_WIRE_OHM: f64 = 1e-3;
 
 impl Grid {
@@ -213,7 +213,7 @@ impl Grid {
         for first in (0..m).step_by(at_once) {
             stop.check()?;
             entries.truncate(fixed);
-            // A line that floats and that no taxel touches has no current, whatever holds it.
+            // A floating line without a conducting taxel has no current, so a connection of any resistance may hold it.
             let ends = |k: &usize| (first..first + at_once).contains(k) || untouched(*k);
             entries.extend((0..m).filter(ends).map(|k| Triplet::new(driven(0, k), driven(0, k), driven_end)));
             let mut volts = Mat::zeros(2 * n * m, at_once);

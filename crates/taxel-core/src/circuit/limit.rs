@@ -1,9 +1,9 @@
-//! Sense lines whose source gives no more: where an amplifier saturates, its line is no longer held.
+//! Sense lines whose source is at its limit: an amplifier that saturates no longer holds its line's voltage.
 
 use super::dense::{Matrix, beyond};
 use crate::Result;
 
-/// Between which voltages a source works; beyond, its line hangs on that voltage, behind `ohm`.
+/// The voltages between which a source works; beyond, `ohm` connects its line to the nearer one.
 ///
 /// Of an amplifier these are its rails, and `ohm` its feedback resistor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +16,7 @@ pub struct Limit {
     pub ohm: f64,
 }
 
-/// What a source is at.
+/// The limit that a source is at, if any.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum End {
     Within,
@@ -65,7 +65,7 @@ impl Limit {
             for round in 0.. {
                 let wanted = |row: usize| match (ends[row], moved[row]) {
                     (End::Within, _) => past(row, now[row]),
-                    // One that would have to give more than it had without a limit is at none.
+                    // A source that would have to give more than without limits is at none.
                     (End::Most, e) if e > 0.0 => End::Within,
                     (End::Least, e) if e < 0.0 => End::Within,
                     (end, _) => end,

@@ -1,4 +1,4 @@
-//! The ramp that the comparators wait for: voltage against ticks of the counter.
+//! The ramp that the comparators compare with: voltage against ticks of the counter.
 
 use serde::{Deserialize, Serialize};
 
@@ -39,7 +39,7 @@ impl Ramp {
         self.ticks / (SUPPLY_V / (SUPPLY_V - RAMP_END_V)).ln()
     }
 
-    /// Where it stands after `ticks`, V.
+    /// Its voltage after `ticks`, V.
     #[must_use]
     pub fn volts(&self, ticks: f64) -> f64 {
         let ticks = ticks.clamp(0.0, self.ticks);
@@ -89,7 +89,7 @@ mod tests {
             assert!((ramp.volts(150.0) - 3.0).abs() < 1e-12 && ramp.volts(9e9) == ramp.volts(150.0));
             assert!(ramp.ticks(7.0) == 150.0 && ramp.ticks(-1.0) == 0.0);
         }
-        // Half the supply stands after ln 2 time constants.
+        // The ramp reaches half the supply after ln 2 time constants.
         let constant = 150.0 / 2.5_f64.ln();
         assert!((Ramp::rc(150.0).volts(constant * 2.0_f64.ln()) - 2.5).abs() < 1e-12);
     }

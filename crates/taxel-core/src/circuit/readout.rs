@@ -1,4 +1,4 @@
-//! How lines are held, and what voltage a sense line makes of its current.
+//! How lines are driven, and the voltage that the current of a sense line gives.
 
 use rand::SeedableRng;
 use rand::rngs::StdRng;
@@ -86,13 +86,13 @@ impl VirtualGround {
         wire_is_sound(self.wire_ohm)
     }
 
-    /// What an amplifier makes of one taxel by itself, V; the rail is left out.
+    /// The amplifier's voltage for one taxel by itself, V, without its rails.
     #[must_use]
     pub fn volts_alone(&self, conductance_us: f64) -> f64 {
         self.v_trans * (1.0 + 1e-3 * self.feedback_kohm * conductance_us)
     }
 
-    /// What a taxel by itself conducts where the amplifier gives so much, uS: the inverse of the former.
+    /// The conductance of a taxel by itself at this voltage of the amplifier, uS: the inverse of the former.
     #[must_use]
     pub fn conductance_us_alone(&self, volts: f64) -> f64 {
         (volts / self.v_trans - 1.0) / (1e-3 * self.feedback_kohm)
@@ -114,7 +114,7 @@ impl VirtualGround {
             drive_ohm: self.switch_ohm,
             wire_ohm: self.wire_ohm,
             idle: Idle::Held,
-            // One that saturates holds its line no longer: that hangs on the rail by its feedback resistor.
+            // An amplifier that saturates no longer holds its line: the feedback resistor connects that to the rail.
             limit: Some(Limit { least_v: -self.v_trans, most_v: self.rail_v - self.v_trans, ohm: feedback_ohm }),
         };
         let mut draw = StdRng::seed_from_u64(self.seed);
@@ -132,7 +132,7 @@ impl VirtualGround {
     }
 }
 
-/// Rows that resistors pull to ground, one driven line at the supply: no amplifier, and currents that go astray
+/// Rows that resistors pull to ground, one driven line at the supply: no amplifier, and crosstalk between taxels
 /// (thesis 3.4.2; Appendix 1, figure 1.1).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -179,7 +179,7 @@ impl Divider {
         wire_is_sound(self.wire_ohm)
     }
 
-    /// What the divider makes of one taxel by itself, V.
+    /// The divider's voltage for one taxel by itself, V.
     #[must_use]
     pub fn volts_alone(&self, conductance_us: f64) -> f64 {
         let ratio = 1e-3 * self.resistor_kohm * conductance_us;

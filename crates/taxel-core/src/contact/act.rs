@@ -14,7 +14,7 @@ pub struct Pictures {
     pub period_us: f64,
 }
 
-/// One stretch of what the board is shown.
+/// One stretch of a board's input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Act {

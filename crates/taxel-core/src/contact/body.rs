@@ -1,4 +1,4 @@
-//! A body, and what becomes of it.
+//! A body and its motion.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use super::within;
 use crate::allowed::Range;
 use crate::{Error, Result};
 
-/// What a body is made of: its weight where no mass is given.
+/// The material of a body, which gives its mass where none is stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Material {
@@ -51,19 +51,19 @@ pub struct Body {
     /// What it is made of, where no mass is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub material: Option<Material>,
-    /// N/mm of a body that gives, as a hollow ball does; rigid where it is left out. A tennis ball has some 25.
+    /// Stiffness of a body that deforms, as a hollow ball does, N/mm; rigid where it is left out. A tennis ball has some 25.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness_n_mm: Option<f64>,
-    /// Of sliding on the foam, as a share of the force. A guess.
+    /// Friction of sliding on the foam, as a share of the force. A guess.
     #[serde(default = "sliding", skip_serializing_if = "is_sliding")]
     pub friction: f64,
-    /// Of rolling, as a share of the force: the loss in foam that rises late. A guess.
+    /// Friction of rolling, as a share of the force: the loss in foam that recovers late. A guess.
     #[serde(default = "rolling", skip_serializing_if = "is_rolling")]
     pub rolling_friction: f64,
-    /// How long after the scene's beginning its own begins, ms.
+    /// How long after the scene's beginning its motion begins, ms.
     #[serde(default, skip_serializing_if = "is_at_once")]
     pub after_ms: f64,
-    /// What it does.
+    /// Its motion.
     pub motion: Move,
 }
 
@@ -90,7 +90,7 @@ fn is_at_once(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// What a body does.
+/// The motion of a body.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Move {

@@ -1,4 +1,4 @@
-//! A foam layer bonded to the board: which pressures hold bodies off it, and what of them arrives at its base.
+//! A foam layer bonded to the board: the pressures under bodies on its face, and the stress at its base.
 //!
 //! The layer's face is cut into cells, one or several along the pitch of taxels, over the array and beside it. Pressure on
 //! one cell moves the faces of all others. Where a body has sunk by `t` into the layer at rest, pressures `p` leave the gap
@@ -26,9 +26,9 @@ use spread::Spread;
 use sweep::{Influence, Sweep};
 
 /// More cells than these, times those along a pitch, are solved by waves: a sweep costs their square, a convolution the
-/// grid whatever is loaded. Up to these, sweeps hold the board's rate.
+/// grid whatever is loaded. Up to these, sweeps keep up with the board's rate.
 pub const MOST_SWEPT: usize = 600;
-/// Sweeps and iterations end here at the latest; what a frame misses, the next one, which begins there, catches up.
+/// The most sweeps or iterations of a frame; the next frame begins at its result, and so reduces an error that is left.
 const MOST_TURNS: usize = 400;
 
 /// The layer over an array, and around it as far as its influence reaches.
@@ -58,7 +58,7 @@ pub struct Bonded {
     /// Pressures of the last two touches that were solved, by cell.
     before: [Vec<f64>; 2],
     loaded: [Vec<u32>; 2],
-    /// How far from the solution a turn may end, as a share of the largest pressure.
+    /// How far from the solution an iteration may end, as a share of the largest pressure.
     tolerance: f64,
     /// How far a linear layer would have to give way at each cell of the latest touch, mm, and its pressures, MPa.
     wanted: Vec<f64>,

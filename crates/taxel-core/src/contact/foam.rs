@@ -20,17 +20,17 @@ pub struct Foam {
     pub modulus_kpa: f64,
     /// Of the layer, mm (thesis 4.3.1).
     pub thickness_mm: f64,
-    /// Poisson's ratio in compression; the columns are a fair picture only near 0.
+    /// Poisson's ratio in compression; independent columns are a good approximation only near 0.
     pub poisson: f64,
     /// Strain e_y at which cells collapse.
     pub yield_strain: f64,
     /// Strain e_D at which the walls all touch.
     pub densification_strain: f64,
-    /// Exponent m of the way there, between 1 and 2.
+    /// Exponent m of the stress between collapse and e_D, between 1 and 2.
     pub exponent: f64,
     /// chi, s/m: loss that grows with speed. 0.25 sends a ball back at about three quarters of its speed.
     pub damping_s_m: f64,
-    /// eta, ms: the dashpot's time. A guess, and one that carries the demo's delays.
+    /// eta, ms: the dashpot's time. A guess, on which the demo's delays depend.
     pub dashpot_ms: f64,
 }
 

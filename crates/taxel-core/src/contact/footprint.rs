@@ -11,7 +11,7 @@ use crate::Result;
 
 /// Distances at which the table is known are this far apart, mm.
 const RING_MM: f64 = 0.5;
-/// How far it reaches: past the widest contact by more than the three thicknesses in which the layer's influence dies.
+/// How far it reaches: past the widest contact by more than three thicknesses, the range of the layer's influence.
 const RINGS: usize = 121;
 /// Depths at which it is known, evenly spaced in the radius of contact.
 const DEPTHS: usize = 72;

@@ -1,4 +1,4 @@
-//! How hard foam pushes back at a body that sinks straight in.
+//! The force of foam on a body that sinks straight in.
 
 use super::body::Body;
 use super::bonded::{Bonded, Cell, MOST_SWEPT};
@@ -24,12 +24,12 @@ const PLACES: [(f64, f64); 9] = [
 
 /// Elastic force by how far a body's middle has come down since it touched.
 ///
-/// A body that gives (`stiffness_n_mm`) is a spring in series: it comes down by the foam's depth and what it is squeezed.
+/// A body that deforms (`stiffness_n_mm`) is a spring in series: it comes down by the foam's depth and its own compression.
 #[derive(Debug, Clone)]
 pub enum Push {
     /// A rigid ball on columns, in closed form.
     Columns {
-        /// What it sinks into.
+        /// The foam that it sinks into.
         foam: Foam,
         /// mm.
         radius_mm: f64,
@@ -60,8 +60,8 @@ impl Push {
             (None, _) => return Err(super::scene::columns_take_one_ball()),
             (Some(layer), shape) => {
                 let (mut sinking, shape, at) = (Sinking::default(), shape.clone(), (body.x_mm, body.y_mm));
-                // The rim of a touch passes from cell to cell in steps, which are the grid's and not the foam's: the mean
-                // over places within a cell has them no more.
+                // The rim of a touch moves from cell to cell, so that force has steps that come from the grid alone: the
+                // mean over places within a cell removes them.
                 Box::new(move |depth| {
                     // Of many cells the rim is a small part: one place does.
                     let many = {
@@ -88,7 +88,7 @@ impl Push {
             (0..DEPTHS).map(|k| if k == 0 { Ok(0.0) } else { forces(depth(k)) }).collect::<Result<Vec<f64>>>()?;
         let mut entries = vec![[0.0; 3]];
         for k in 1..DEPTHS {
-            // By power of the depth, which is nearly one and the same, so that a mean over neighbours bends nothing.
+            // Force is nearly a power of depth, so that the mean of its logarithm over neighbours adds little bias.
             let around = SMOOTH.min(k - 1).min(DEPTHS - 1 - k);
             let logs: f64 = (k - around..=k + around).map(|n| force[n].max(f64::MIN_POSITIVE).ln()).sum();
             let smooth = if force[k - around] > 0.0 { (logs / (2 * around + 1) as f64).exp() } else { force[k] };

@@ -11,7 +11,7 @@ use super::{Body, Ending, Foam, Move, Press, Shape, within};
 use crate::allowed::Range;
 use crate::{Array, Error, Result};
 
-/// How far from the array's edge drawn scenes stay, mm: within it the layer's influence would be cut off.
+/// How far from the array's edge drawn scenes stay, mm: nearer to it the layer's influence would be cut off.
 const MARGIN_MM: f64 = 36.0;
 
 /// The model of the foam under bodies.
@@ -65,7 +65,7 @@ fn is_one(value: &u16) -> bool {
     *value == 1
 }
 
-/// Foam widens when it is pressed; columns do not, and up to here that hardly shows.
+/// The largest Poisson ratio of foam modelled as columns: columns do not widen, and up to here foam hardly does.
 const WIDENS: f64 = 0.1;
 
 pub(super) fn columns_take_one_ball() -> Error {
@@ -84,7 +84,7 @@ impl Scene {
     /// `Scene` where the array is too small to keep 36 mm from its edge.
     pub fn draw(array: &Array, seed: u64, index: u32, left_to_rest: bool) -> Result<Self> {
         let mut draw = StdRng::seed_from_u64(seed);
-        // Each scene has a stretch of the stream for itself, so that it does not hang on how many are played.
+        // Each scene has its own part of the random stream, so that it does not depend on how many are played.
         for _ in 0..index {
             draw = StdRng::from_rng(&mut draw);
         }
@@ -140,7 +140,7 @@ impl Scene {
         })
     }
 
-    /// How long the scene lasts at least, ms: what is known before any body moves.
+    /// The least time that the scene lasts, ms, as known before its motion is computed.
     pub(super) fn least_ms(&self) -> f64 {
         let longest = self.bodies.iter().map(Body::least_ms).fold(0.0, f64::max);
         self.lead_ms + longest + self.tail_ms

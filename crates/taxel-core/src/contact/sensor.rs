@@ -14,7 +14,7 @@ use crate::{Error, Result};
 /// The ramp for which `noise_ticks` is stated.
 const STATED_RAMP: f64 = 150.0;
 
-/// What the sensor does with force; the same law for each taxel, and how far taxels differ.
+/// The sensor's response to force: one law for all taxels, and how far taxels differ.
 ///
 /// A taxel conducts `G = G0 + k F^n`; the amplifier gives `V = V_trans (1 + R_f G)` (thesis 4.3.2). The ramp is an RC
 /// curve towards 5 V that ends at 3 V: 0.02 N, which the thesis could detect at 1.3 V (4.4.1), is then 0.1 V and 4.5

@@ -177,7 +177,7 @@ impl Shape {
         }
     }
 
-    /// How readily it turns, along x and y turned by the angle that comes third: mass times radius squared over the moment
+    /// How easily it turns, along x and y turned by the angle that comes third: mass times radius squared over the moment
     /// of inertia. Of a solid body; 0 where it does not roll.
     #[must_use]
     pub fn turns(&self) -> (f64, f64, f64) {

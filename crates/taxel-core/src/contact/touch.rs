@@ -1,4 +1,4 @@
-//! What the ground truth holds of a touch: its kind, when it began and ended, its speed and peak force.
+//! The ground truth of a touch: its kind, when it began and ended, its speed and peak force.
 
 use serde::{Deserialize, Serialize};
 

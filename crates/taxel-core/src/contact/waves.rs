@@ -1,4 +1,4 @@
-//! What a kernel makes of pressures on a grid, by their waves.
+//! Convolution of pressures on a grid with a kernel, by Fourier transforms.
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -10,7 +10,7 @@ use rustfft::{Fft, FftPlanner};
 
 use crate::{Result, Stop};
 
-/// A real plane and its Fourier transform, with what it takes to go from one to the other.
+/// A real plane and its Fourier transform, with the plans to go from one to the other.
 pub(super) struct Waves {
     rows: usize,
     columns: usize,
@@ -85,7 +85,7 @@ impl Waves {
     ///
     /// # Errors
     ///
-    /// `Interrupted`: the plane then holds nothing of use.
+    /// `Interrupted`: the plane then holds no result.
     pub fn convolve(&mut self, kernel: &[f64], stop: Stop<'_>) -> Result<()> {
         let Self { rows, columns, .. } = *self;
         for (y, row) in self.plane.chunks_exact_mut(columns).enumerate() {
@@ -109,7 +109,7 @@ impl Waves {
             for (x, value) in self.line.iter_mut().enumerate() {
                 *value = self.spectrum[x * rows + y];
             }
-            // The first and, of an even length, the last wave of a real plane are real; what rounding left there goes.
+            // The first and, of an even length, the last wave of a real plane are real; rounding errors there are set to 0.
             self.line[0].im = 0.0;
             if columns.is_multiple_of(2) {
                 self.line[columns / 2].im = 0.0;

@@ -1,19 +1,19 @@
-//! When the host could first know: the end of the board's frame in which something happens.
+//! The earliest time at which the host can know of an event: the end of the board's frame in which the event happens.
 
 use crate::wire::STAMP_US;
 use crate::{Result, problem};
 
-/// How long frames last, and what their stamps count.
+/// The duration of frames, and the unit of their time stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameTime {
-    /// us.
+    /// The duration of a frame, us.
     pub period_us: f64,
-    /// Unit of a stamp, us: 100 with version 1 of the wire (Table 5.4), 1 with version 2.
+    /// The unit of a time stamp, us: 100 with version 1 of the wire (Table 5.4), 1 with version 2.
     pub stamp_us: i64,
 }
 
 impl FrameTime {
-    /// Frames of `period_us`, stamped as this version of the wire does.
+    /// Frames of `period_us`, with time stamps of this version of the wire.
     #[must_use]
     pub fn on_wire(period_us: f64, version: u8) -> Self {
         Self { period_us, stamp_us: if version == 2 { 1 } else { STAMP_US } }
@@ -21,31 +21,32 @@ impl FrameTime {
 }
 
 impl From<f64> for FrameTime {
-    /// Frames of so many us, stamped as version 1 of the wire does.
+    /// Frames of `period_us`, with time stamps of version 1 of the wire.
     fn from(period_us: f64) -> Self {
         Self::on_wire(period_us, 1)
     }
 }
 
-/// Which frame a time belongs to, and when that frame ends.
+/// Finds the frame of a time stamp, and the end of that frame.
 ///
-/// With frame sync all events of a frame carry the stamp of its start, cut down to whole units, which is up to
-/// one unit *before* the frame starts. So a time belongs to the frame whose stamp is the last at or before it, and not to
-/// the one that fills that moment. In version 1 frame `k` of 192 us has the stamp `floor(1.92 k)`.
+/// With frame sync all events of a frame carry the stamp of its start, rounded down to whole units, which is up to one
+/// unit *before* the start of the frame. A time therefore belongs to the frame with the last stamp at or before it,
+/// even if the previous frame still lasts at that time. In version 1, frame `k` of 192 us has the stamp
+/// `floor(1.92 k)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameClock {
     period_ns: i128,
     stamp_ns: i128,
-    /// The last picture's time where pictures come; the board's frames start at time 0.
+    /// The time of the last picture, if the input is pictures; without pictures the board's frames start at time 0.
     picture_ns: Option<i128>,
 }
 
 impl FrameClock {
-    /// A clock of such frames.
+    /// A clock for frames of this duration and stamp unit.
     ///
     /// # Errors
     ///
-    /// `Problem` where the period is not between 1 us and one hour.
+    /// `Problem` if the period is not between 1 us and one hour.
     pub fn new(frames: impl Into<FrameTime>) -> Result<Self> {
         let FrameTime { period_us, stamp_us } = frames.into();
         if !(1.0..=3.6e9).contains(&period_us) {
@@ -55,7 +56,7 @@ impl FrameClock {
         Ok(Self { period_ns: (period_us * 1000.0).round() as i128, stamp_ns, picture_ns: None })
     }
 
-    /// From now on frames count from the picture at `t` us, which is the start of its frame.
+    /// Aligns frames with the picture at `t` us, which is the start of its frame, from now on.
     pub fn picture(&mut self, t: i64) {
         self.picture_ns = Some(i128::from(t) * 1000);
     }
@@ -63,13 +64,13 @@ impl FrameClock {
     /// The end of the frame to which the time `t` ms belongs, us, rounded up.
     #[must_use]
     pub fn end_of(&self, t: f64) -> i64 {
-        // Whole ns: a time that is a stamp must not fall into the frame before by rounding.
+        // In whole ns, because rounding must not move a time that equals a stamp into the frame before.
         let t = (t * 1e6).round() as i128;
         let end = match self.picture_ns {
             Some(picture) => picture + ((t - picture).div_euclid(self.period_ns) + 1) * self.period_ns,
             None => {
                 let next_stamp = (t.div_euclid(self.stamp_ns) + 1) * self.stamp_ns;
-                // The last frame that starts before the next stamp; it ends where its successor starts.
+                // The last frame that starts before the next stamp; it ends at the start of its successor.
                 next_stamp.div_euclid(self.period_ns) * self.period_ns
                     + if next_stamp.rem_euclid(self.period_ns) == 0 { 0 } else { self.period_ns }
             }
@@ -88,7 +89,7 @@ mod tests {
         for k in 0..100_000_i64 {
             let stamp_us = 192 * k / 100 * 100;
             assert_eq!(clock.end_of(stamp_us as f64 / 1000.0), 192 * (k + 1), "frame {k}");
-            // ... and so do the grid of frames and the last moment before the next stamp.
+            // The frame's start and the last moment before the next stamp belong to the same frame.
             assert_eq!(clock.end_of(k as f64 * 0.192), 192 * (k + 1), "frame {k}");
             let next_us = 192 * (k + 1) / 100 * 100;
             assert_eq!(clock.end_of((next_us as f64 - 0.001) / 1000.0), 192 * (k + 1), "frame {k}");
@@ -101,7 +102,8 @@ mod tests {
             let clock = FrameClock::new(FrameTime::on_wire(period_ns as f64 / 1000.0, 2)).unwrap();
             for k in 0..20_000 {
                 let (start, end) = (k * period_ns, (k + 1) * period_ns);
-                // The stamp of its start, as the board cuts it down, its middle, and the last moment before the next stamp.
+                // The stamp of the frame's start as the board rounds it down, the frame's middle, and the last moment
+                // before the next stamp.
                 for t in [start / 1000 * 1000, start + period_ns / 2, end / 1000 * 1000 - 1] {
                     let known = clock.end_of(t as f64 / 1e6);
                     assert_eq!(known, (end + 999) / 1000, "frame {k} of {period_ns} ns, {t} ns");

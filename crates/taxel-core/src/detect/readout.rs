@@ -1,4 +1,4 @@
-//! Trained neurons with names, and the encoder that they were trained behind.
+//! A readout: trained neurons with labels, and the encoder with which they were trained.
 
 use std::collections::BTreeMap;
 
@@ -15,34 +15,36 @@ mod file;
 #[cfg(test)]
 mod tests;
 
-/// How long time moves on after the last event or picture of a recording, us: longer than the input can keep a potential
-/// rising (the slowest neuron of Table 6.2 peaks after 190 ms).
+/// The time that a recording is continued after its last event or picture, us: longer than any input can keep a
+/// potential rising (the slowest neuron of Table 6.2 peaks after 190 ms).
 const SILENCE_US: i64 = 1_000_000;
 
-/// Trained neurons with names, the encoder that they were trained behind, and how they were trained.
+/// Trained neurons with labels, the encoder with which they were trained, and the conditions of their training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Readout {
-    /// With its parameters. A tare belongs to a board and a day: where the encoder needs one it can be given later.
+    /// The encoder with its parameters. A tare belongs to a board and a day: an encoder that needs one gets it when a
+    /// stream starts.
     pub encoder: Encoder,
-    /// The sensor; `None` where any will do whose number of trains fits.
+    /// The sensor; `None` admits every array with the right number of trains.
     #[serde(default)]
     pub array: Option<Array>,
-    /// Grid or continuous, as the neurons were trained; neurons of another time are refused.
+    /// Grid or continuous time, as in training; neurons with another setting are refused.
     pub time: Time,
-    /// What remained after a spike, as the neurons were trained; others are refused.
+    /// The effect of a spike on earlier inputs, as in training; neurons with another setting are refused.
     pub after_spike: AfterSpike,
-    /// A factor on every threshold after training: below 1 the neurons fire on less.
+    /// A factor on every threshold after training: below 1 the neurons fire on weaker input.
     ///
-    /// Reading: the thesis has none. 6.3.2 objects that a threshold below the trained one is crossed earlier than
-    /// intended; that price is paid for inputs a little weaker than the weakest trained one, which only just touches it.
+    /// Reading: the thesis has no such factor. 6.3.2 objects that a threshold below the trained one is crossed earlier
+    /// than intended; this is the price for detecting inputs slightly weaker than the weakest trained one, which only
+    /// just reaches it.
     #[serde(default = "one")]
     pub run_threshold: f64,
-    /// Each train of the encoder enters the neurons once at each of these delays, ms, ascending: first all trains at the first
-    /// delay, then all at the second (`SpikeTrains.delayed`). One delay of 0 where left out.
+    /// The delays at which every train of the encoder enters the neurons, ms, ascending: first all trains at the first
+    /// delay, then all at the second (`SpikeTrains.delayed`). By default a single delay of 0.
     #[serde(default = "at_once", skip_serializing_if = "is_at_once")]
     pub delays_ms: Vec<f64>,
-    /// By label.
+    /// The neurons by label.
     pub neurons: BTreeMap<String, TrainedNeuron>,
 }
 
@@ -58,11 +60,11 @@ fn is_at_once(delays_ms: &[f64]) -> bool {
     delays_ms == [0.0]
 }
 
-/// The longest delay that is allowed, ms.
+/// The longest allowed delay, ms.
 const LONGEST_DELAY_MS: f64 = 60_000.0;
 
 impl Readout {
-    /// Checks that parts make sense and belong together.
+    /// Checks that each part is valid and that the parts fit together.
     ///
     /// # Errors
     ///
@@ -133,12 +135,12 @@ impl Readout {
         ))
     }
 
-    /// Starts a stream from an array with such frames.
+    /// Starts a stream for an array with frames of this duration.
     ///
     /// # Errors
     ///
-    /// `Problem` where the array is not the one that the readout was trained on, a tare is needed and not there, or the
-    /// period makes no sense.
+    /// `Problem` if the array is not the one that the readout was trained on, if a required tare is missing, or if the
+    /// period is not valid.
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
         self.check()?;
         if let Some(mine) = &self.array
@@ -165,17 +167,18 @@ impl Readout {
         Ok(ReadoutStream::new(encoder, array.clone(), clock, self.run_threshold, delays_ms, neurons))
     }
 
-    /// How long time moves on after the end of a recording, us.
+    /// The time that a recording is continued after its end, us.
     fn silence_us(&self) -> i64 {
         SILENCE_US + us(self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
     }
 
-    /// The detections of a whole recording of events in which a person zeroed some taxels, and of a second of silence after it.
+    /// The detections of a whole recording of events with taxels that a person zeroed, continued by a second of
+    /// silence.
     ///
     /// # Errors
     ///
-    /// As [`Readout::stream`], [`ReadoutStream::zero`], [`ReadoutStream::push_events`] and [`EventsView::check_order`];
-    /// `Interrupted` where asked to stop.
+    /// Those of [`Readout::stream`], [`ReadoutStream::zero`], [`ReadoutStream::push_events`] and
+    /// [`EventsView::check_order`]; `Interrupted` if asked to stop.
     pub fn run_events(
         &self,
         events: EventsView<'_>,
@@ -193,12 +196,12 @@ impl Readout {
         Ok(found)
     }
 
-    /// The detections of a whole recording of pictures, and of a second after them in which the last one stays. Frames last
-    /// `frame_us`, or the median distance of pictures.
+    /// The detections of a whole recording of pictures, continued for a second with the last picture. Frames last
+    /// `frame_us`, or by default the median distance between pictures.
     ///
     /// # Errors
     ///
-    /// As [`Readout::stream`] and [`ReadoutStream::push_frames`]; `Interrupted` where asked to stop.
+    /// Those of [`Readout::stream`] and [`ReadoutStream::push_frames`]; `Interrupted` if asked to stop.
     pub fn run_frames(
         &self,
         frames: FramesView<'_>,
@@ -218,7 +221,7 @@ impl Readout {
     }
 }
 
-/// The median distance of pictures, us.
+/// The median distance between pictures, us.
 fn usual_distance(t: &[i64]) -> Result<f64> {
     let mut apart: Vec<u64> = t.windows(2).map(|w| w[1].abs_diff(w[0])).collect();
     if apart.is_empty() {
@@ -232,7 +235,7 @@ fn at(label: &str, error: Error) -> Error {
     if let Error::Problem(text) = error { problem!("{label}: {text}") } else { error }
 }
 
-/// An option's word, as it stands in JSON.
+/// The name of an option in JSON.
 fn word(option: &impl Serialize) -> String {
     serde_json::to_string(option).unwrap_or_default()
 }

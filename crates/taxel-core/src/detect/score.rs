@@ -1,7 +1,7 @@
-//! Detections against reference events: found, missed, false, and how far off (thesis 6.5.2).
+//! Detections compared with reference events: found, missed, false, and timing errors (thesis 6.5.2).
 //!
-//! Reading: the thesis counts "additional/missing spikes within 50 ms of a gait event", which leaves spikes far from any
-//! event uncounted. Here every further spike is false, inside the window too; the thesis' count stands beside it.
+//! Reading: the thesis counts "additional/missing spikes within 50 ms of a gait event", which leaves out spikes far
+//! from any event. Here every unmatched spike is false, inside the window too; the thesis' count is given separately.
 
 use std::collections::BTreeMap;
 
@@ -9,25 +9,25 @@ use crate::detect::{Detection, Reference};
 use crate::metrics::matching::in_order;
 use crate::{Result, Stop, problem};
 
-/// The widest window that a score takes, us: one hour.
+/// The widest window that can be scored, us: one hour.
 pub const WIDEST_WINDOW_US: i64 = 3_600_000_000;
 
 /// How the detections of one label match the reference events of that label.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tally {
-    /// What happened.
+    /// The label of detections and reference events.
     pub label: String,
-    /// Detection and reference event that belong together, by their places in the input, ascending in time.
+    /// Each pair of a detection and its reference event, as indices into the input, ascending in time.
     pub pairs: Vec<(usize, usize)>,
-    /// Reference events without a detection, by their places in the input, ascending in time.
+    /// Reference events without a detection, as indices into the input, ascending in time.
     pub missed: Vec<usize>,
-    /// Detections of nothing, by their places in the input, ascending in time.
+    /// Detections without a reference event, as indices into the input, ascending in time.
     pub false_: Vec<usize>,
-    /// Those of the false ones that lie within the window of a reference event: the thesis' false positives.
+    /// The number of false detections within the window of a reference event: the thesis' false positives.
     pub false_near: usize,
-    /// Detection minus reference, one a pair, ms; negative is early.
+    /// Detection minus reference, one per pair, ms; negative is early.
     pub errors_ms: Vec<f64>,
-    /// `known` minus reference, one a pair, ms.
+    /// `known` minus reference, one per pair, ms.
     pub delays_ms: Vec<f64>,
 }
 
@@ -47,7 +47,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// The spread of `values`; all NaN where there are none.
+    /// The spread of `values`; all NaN if there are none.
     #[must_use]
     pub fn of(values: &[f64]) -> Self {
         let n = values.len();
@@ -75,13 +75,13 @@ impl Spread {
 
 /// Scores detections against reference events, label by label (6.5.2), in the order of their names.
 ///
-/// `windows` (us) holds for each reference event how far a detection may lie from it, either way, and still belong to
-/// it. Every detection that belongs to none is false, however near.
+/// `windows` (us) has the largest distance, in either direction, between each reference event and its detection. Every
+/// detection without a reference event is false, however near.
 ///
 /// # Errors
 ///
-/// `Problem` where there is not one window a reference event, a window is below 0 or above [`WIDEST_WINDOW_US`], or so
-/// many detections lie within the windows that matching them would not end; `Interrupted` where asked to stop.
+/// `Problem` if there is not one window for each reference event, if a window is below 0 or above [`WIDEST_WINDOW_US`],
+/// or if so many detections are within the windows that matching would take too long; `Interrupted` if asked to stop.
 pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: Stop<'_>) -> Result<Vec<Tally>> {
     if windows.len() != truth.len() {
         return Err(problem!("{} windows for {} reference events: must be one each", windows.len(), truth.len()));
@@ -125,7 +125,7 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
     Ok(tallies)
 }
 
-/// Whether each detection lies within the window of any reference event; times ascend.
+/// Whether each detection is within the window of any reference event; times ascend.
 fn near_any(found: &[i64], truth: &[i64], windows: &[i64]) -> Vec<bool> {
     let mut change = vec![0_i64; found.len() + 1];
     for (t, w) in truth.iter().zip(windows) {
@@ -142,7 +142,7 @@ fn near_any(found: &[i64], truth: &[i64], windows: &[i64]) -> Vec<bool> {
         .collect()
 }
 
-/// From one time to another, us to ms, without overflow.
+/// The time between two times, us to ms, without overflow.
 fn ms_between(from: i64, to: i64) -> f64 {
     (i128::from(to) - i128::from(from)) as f64 / 1000.0
 }

@@ -1,4 +1,4 @@
-//! From events to detections, piece by piece: the same detections live and from a recording.
+//! Detections from events, piece by piece: the same live and from a recording.
 
 use std::collections::VecDeque;
 
@@ -16,33 +16,33 @@ mod tests;
 use named_neuron::NamedNeuron;
 use repairs::Repairs;
 
-/// How many events go through the stream between two checks of [`Stop`].
+/// The number of events between two checks of [`Stop`].
 const PIECE: usize = 65_536;
 
-/// Times farther from 0 than this lose their whole us in a neuron's ms, us.
+/// Beyond this distance from 0, a time in ms no longer resolves whole us in a neuron.
 const FARTHEST_US: i64 = 1 << 52;
 
 /// A readout as a stream: events or pictures in, detections out.
 ///
-/// A crossing counts once nothing can come before it any more: when a later event has come, or the caller has moved time
-/// on with [`ReadoutStream::advance`]. Detections depend neither on where the input is cut nor on when time is moved.
+/// A crossing becomes a detection once no earlier input can follow: after a later event, or after the caller advanced
+/// time by [`ReadoutStream::advance`]. Detections depend neither on how the input is divided nor on when time is
+/// advanced.
 #[derive(Clone)]
 pub struct ReadoutStream {
     encoder: Box<dyn Stream>,
     array: Array,
     neurons: Vec<NamedNeuron>,
     clock: FrameClock,
-    /// No input comes before this time any more, us.
+    /// The time before which no input can follow, us.
     now: Option<i64>,
-    /// Each train enters the neurons once at each of these delays, ms.
+    /// The delays at which each train enters the neurons, ms.
     delays_ms: Vec<f64>,
-    /// Spikes that the encoder emitted and that are not sorted to inputs yet.
+    /// Spikes of the encoder that are not yet assigned to inputs.
     emitted: Vec<Spike>,
-    /// Spikes by the neurons' inputs that earlier ones may still precede, and whether each may rest on an event that a
-    /// state repaired.
+    /// Spikes assigned to inputs that wait for possibly earlier spikes, and whether each may rest on a repaired event.
     waiting: Vec<(Spike, bool)>,
     repairs: Repairs,
-    /// Taxels that are to be zeroed, by time, each after all events up to then.
+    /// Taxels to be zeroed, in order of time, each after all events up to its time.
     zeroings: VecDeque<Zeroing>,
     late: u64,
 }
@@ -63,14 +63,14 @@ impl ReadoutStream {
         Self { encoder, array, neurons, clock, now: None, delays_ms, emitted, waiting, repairs, zeroings, late: 0 }
     }
 
-    /// Processes the next events; appends the detections that are certain now to `out`.
+    /// Processes the next events and appends the detections that are final now to `out`.
     ///
-    /// An event that is earlier than what came before (or than where time was moved to) counts as coming now: it is
-    /// counted as [`late`](Self::late).
+    /// An event earlier than previous input, or than the time advanced to, is treated as arriving now and counted as
+    /// [`late`](Self::late).
     ///
     /// # Errors
     ///
-    /// `Problem` where events come from another array or lack what the encoder needs, or a time is beyond 2^52 us.
+    /// `Problem` if events are of another array or lack what the encoder needs, or a time is beyond 2^52 us.
     pub fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Detection>) -> Result<()> {
         self.check_shape(events.array)?;
         let Some((&first, rest)) = events.t.split_first() else { return Ok(()) };
@@ -93,12 +93,12 @@ impl ReadoutStream {
         self.settle(events.t[events.len() - 1].max(latest), out)
     }
 
-    /// Processes the next picture, row by row, at `t` us; appends the detections that are certain now to `out`.
+    /// Processes the next picture, row by row, at `t` us and appends the detections that are final now to `out`.
     ///
     /// # Errors
     ///
-    /// `Problem` where the picture has another size or comes out of order, the encoder reads events only, or the time is
-    /// beyond 2^52 us.
+    /// `Problem` if the picture has another size or is not in order of time, if the encoder reads events only, or if
+    /// the time is beyond 2^52 us.
     pub fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
         self.zero_before(t);
@@ -108,11 +108,11 @@ impl ReadoutStream {
         Ok(())
     }
 
-    /// Moves time on to `t` us: nothing will come before it any more. An earlier time changes nothing.
+    /// Advances time to `t` us, promising that no earlier input follows. An earlier time changes nothing.
     ///
     /// # Errors
     ///
-    /// `Problem` where the time is beyond 2^52 us.
+    /// `Problem` if the time is beyond 2^52 us.
     pub fn advance(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
         if self.now.is_none_or(|now| t > now) {
@@ -123,11 +123,11 @@ impl ReadoutStream {
         Ok(())
     }
 
-    /// Sets the rest of a taxel from a time on, after all events up to then; where that time is over, from now on.
+    /// Sets the rest of a taxel after all events up to the zeroing's time, or from now on if that time is past.
     ///
     /// # Errors
     ///
-    /// `Problem` where no such taxel exists, the rest is no number, or the time is beyond 2^52 us.
+    /// `Problem` if no such taxel exists, the rest is not a number, or the time is beyond 2^52 us.
     pub fn zero(&mut self, zeroing: &Zeroing) -> Result<()> {
         check_time(zeroing.t)?;
         zeroing.check(&self.array)?;
@@ -136,34 +136,34 @@ impl ReadoutStream {
         Ok(())
     }
 
-    /// The rest of each taxel, row by row; `None` where that is not known, or the encoder reads no tare.
+    /// The rest of each taxel, row by row; `None` if it is unknown, or if the encoder uses no tare.
     #[must_use]
     pub fn rest(&self) -> Vec<Option<f64>> {
         (0..self.array.len()).map(|place| self.encoder.rest(place)).collect()
     }
 
-    /// How many events came later than others with a later time, or later than time was moved on.
+    /// The number of events that arrived after later events, or after time was advanced beyond them.
     #[must_use]
     pub fn late(&self) -> u64 {
         self.late
     }
 
-    /// The time up to which all detections are out, us; `None` before any input.
+    /// The time up to which all detections are final, us; `None` before any input.
     #[must_use]
     pub fn now(&self) -> Option<i64> {
         self.now
     }
 
-    /// Each neuron's label and potential now, mV.
+    /// The label and present potential of each neuron, mV.
     pub fn potentials(&self) -> impl Iterator<Item = (&str, f64)> {
         self.neurons.iter().map(|one| (one.label.as_str(), one.stream.as_ref().map_or(0.0, NeuronStream::potential)))
     }
 
-    /// Processes many events, and checks `stop` between pieces of them.
+    /// Processes a recording of events, checking `stop` between pieces.
     ///
     /// # Errors
     ///
-    /// As [`push_events`](Self::push_events); `Interrupted` where asked to stop.
+    /// Those of [`push_events`](Self::push_events); `Interrupted` if asked to stop.
     pub fn push_recording(&mut self, events: EventsView<'_>, stop: Stop<'_>) -> Result<Vec<Detection>> {
         events.check()?;
         let mut out = Vec::new();
@@ -174,11 +174,12 @@ impl ReadoutStream {
         Ok(out)
     }
 
-    /// Processes many pictures, and checks `stop` between them.
+    /// Processes a recording of pictures, checking `stop` between them.
     ///
     /// # Errors
     ///
-    /// As [`push_frame`](Self::push_frame), and where they come from another array; `Interrupted` where asked to stop.
+    /// Those of [`push_frame`](Self::push_frame); `Problem` if the pictures are of another array; `Interrupted` if
+    /// asked to stop.
     pub fn push_frames(&mut self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<Vec<Detection>> {
         self.check_shape(frames.array)?;
         frames.check()?;
@@ -192,7 +193,7 @@ impl ReadoutStream {
         Ok(out)
     }
 
-    /// Passes events to the encoder in order of time, and between them the taxels that are to be zeroed.
+    /// Passes events to the encoder in order of time, and zeroes taxels at their times in between.
     fn encode(&mut self, events: EventsView<'_>) -> Result<()> {
         self.repairs.note(events);
         let mut from = 0;
@@ -210,7 +211,7 @@ impl ReadoutStream {
         self.encoder.push_events(events.piece(from..events.len()), &mut self.emitted)
     }
 
-    /// Sets the rests that are due before `t` us.
+    /// Sets the rests of zeroings before `t` us.
     fn zero_before(&mut self, t: i64) {
         let over = self.zeroings.partition_point(|zeroing| zeroing.t < t);
         for zeroing in self.zeroings.drain(..over) {
@@ -220,12 +221,12 @@ impl ReadoutStream {
         }
     }
 
-    /// Moves the neurons on to `until` us, before which every spike is known.
+    /// Advances the neurons to `until` us, before which every spike is known.
     fn settle(&mut self, until: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.now = Some(self.now.map_or(until, |now| now.max(until)));
         let until_ms = ms(until);
         self.sort_to_inputs();
-        // The encoder has emitted all spikes before `until`, so repairs that lie too far behind it no longer count.
+        // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
         self.repairs.forget_before(until_ms);
         self.waiting.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         let certain = self.waiting.partition_point(|(spike, _)| spike.t < until_ms);
@@ -256,10 +257,10 @@ impl ReadoutStream {
         Ok(())
     }
 
-    /// Sorts the encoder's spikes to the neurons' inputs.
+    /// Assigns the encoder's spikes to the neurons' inputs.
     ///
-    /// Trains come as the learner saw them: of signed ones all ON, then all OFF (`SpikeTrains::split_by_sign`), and all of
-    /// these once a delay.
+    /// The order of trains is that of training: of signed trains all ON, then all OFF (`SpikeTrains::split_by_sign`),
+    /// and all of these once for each delay.
     fn sort_to_inputs(&mut self) {
         let trains = u32::try_from(self.encoder.trains()).unwrap_or(u32::MAX);
         let signed = self.encoder.signed();

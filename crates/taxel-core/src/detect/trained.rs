@@ -1,4 +1,4 @@
-//! A neuron and what it learnt.
+//! A trained neuron.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,11 +8,11 @@ use crate::neuron::Neuron;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainedNeuron {
-    /// Its parameters.
+    /// The neuron's parameters.
     pub neuron: Neuron,
-    /// How much later than the event it was trained to fire, the encoder's latency apart, ms.
+    /// The delay after the event at which the neuron was trained to fire, in addition to the encoder's latency, ms.
     #[serde(default)]
     pub delay_ms: f64,
-    /// One a train of the encoder, mV; where its spikes are signed first all ON trains, then all OFF.
+    /// One weight per train of the encoder, mV; for signed spikes all ON trains first, then all OFF trains.
     pub weights: Vec<f64>,
 }

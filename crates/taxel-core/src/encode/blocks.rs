@@ -1,42 +1,42 @@
-//! Channels in blocks, over which the compiler's loops are vector instructions, and the prefetch of the next picture.
+//! Channels in blocks, over which the compiler vectorises loops, and the prefetch of the next picture.
 
 use crate::vectors::fetch;
 
-/// Channels that are looked at together; the compiler turns loops over a block into vector instructions.
+/// Number of channels in a block; the compiler turns loops over a block into vector instructions.
 pub(super) const BLOCK: usize = 64;
 
-/// One value a channel, for [`BLOCK`] channels.
+/// One value for each of [`BLOCK`] channels.
 pub(super) type Block = [f32; BLOCK];
 
-/// How many blocks hold `channels`.
+/// Number of blocks that hold `channels`.
 pub(super) fn blocks(channels: usize) -> usize {
     channels.div_ceil(BLOCK)
 }
 
-/// Values as blocks, of which they fill a whole number.
+/// Views values as blocks; their number must be a multiple of the block's length.
 pub(super) fn in_blocks(values: &[f32]) -> &[Block] {
     values.as_chunks().0
 }
 
-/// The next picture, where it follows in memory. It is prefetched a block at a time while this one is read or encoded, as the
-/// processor has few line fill buffers: more prefetches at once would be dropped.
+/// The next picture, if it follows in memory. It is prefetched a block at a time while the current picture is read or
+/// encoded: a processor has few line fill buffers, and would drop more prefetches at once.
 pub(super) struct Next {
     at: *const Block,
     left: usize,
 }
 
 impl Next {
-    /// The address of the next picture is not known.
+    /// No prefetch, because the address of the next picture is not known.
     pub(super) fn unknown() -> Self {
         Self { at: std::ptr::null(), left: 0 }
     }
 
-    /// What follows a picture.
+    /// The picture that follows this one in memory.
     pub(super) fn after(picture: &[f32]) -> Self {
         Self { at: picture.as_ptr_range().end.cast(), left: blocks(picture.len()) }
     }
 
-    /// Prefetches a block; gives whether there was one.
+    /// Prefetches a block; returns whether there was one left.
     #[inline(always)]
     pub(super) fn fetch(&mut self) -> bool {
         if self.left == 0 {

@@ -1,9 +1,9 @@
-//! Levels, and between which values a channel crosses none of them, so that most channels need no closer look.
+//! Brackets: for each channel the interval of values that crosses no level, so that most samples need one comparison.
 
 use super::blocks::{BLOCK, Block};
 use crate::{Result, problem};
 
-/// For each channel the values `low <= value < high` that change nothing.
+/// For each channel the values `low <= value < high` that cross no level.
 #[derive(Clone)]
 pub(super) struct Bracket {
     low: Vec<Block>,
@@ -11,7 +11,7 @@ pub(super) struct Bracket {
 }
 
 impl Bracket {
-    /// Brackets around everything.
+    /// Brackets that contain every value.
     pub(super) fn new(blocks: usize) -> Self {
         Self { low: vec![[f32::NEG_INFINITY; BLOCK]; blocks], high: vec![[f32::INFINITY; BLOCK]; blocks] }
     }
@@ -21,7 +21,7 @@ impl Bracket {
         self.high[channel / BLOCK][channel % BLOCK] = high;
     }
 
-    /// Whether a channel of this block left its bracket.
+    /// Whether the value of any channel in this block is outside its bracket.
     #[inline(always)]
     pub(super) fn left(&self, block: usize, values: &Block) -> bool {
         let (low, high) = (&self.low[block], &self.high[block]);
@@ -38,7 +38,7 @@ impl Bracket {
     }
 }
 
-/// Refuses levels that do not ascend.
+/// Checks that levels ascend.
 pub(super) fn check_levels(levels: &[f64]) -> Result<()> {
     if levels.is_empty() {
         return Err(problem!("levels: must hold one level or more"));

@@ -1,4 +1,4 @@
-//! Change events: how far a taxel moved since its last event, with 1 to 10 bits (equation 5.7).
+//! Change events: the difference of a taxel's value from that of its last event, with 1 to 10 bits (equation 5.7).
 
 use serde::{Deserialize, Serialize};
 
@@ -14,31 +14,27 @@ use crate::{Array, Result, Spike, problem};
 
 /// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).
 ///
-/// A spike's value is the quantised change. A value that a state of version 2 repaired moves the previous one with it and gives
-/// none. The first sample is the first previous value and gives none. Reckoned in
-/// f32. One signed train a taxel.
+/// A spike's value is the quantised change. A value that a state of version 2 repaired replaces the previous value
+/// without a spike. The first sample becomes the first previous value without a spike. Computed in f32. One signed
+/// train per taxel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct ChangeEvents {
-    /// The smallest change that counts, in the sensor's unit, above 0; theta_0 of equation 5.7. Default 3 ticks, the
+    /// The smallest change that causes an event, in the sensor's unit, above 0; theta_0 of equation 5.7. Default 3
+    /// ticks, the
     /// floor of the board's fast presets (wire.md, section 3).
-    #[serde(default = "three")]
     pub noise_floor: f64,
-    /// Bits an event, 1 to 10 (figure 5.7). Default 1: rise or fall.
-    #[serde(default = "one_bit")]
+    /// Bits of an event's value, 1 to 10 (figure 5.7). Default 1: rise or fall.
     pub bits: u32,
-    /// What a sample is compared with. Default the value last sent.
-    #[serde(default)]
+    /// The reference of a change. Default the value last sent.
     pub previous: Previous,
-    /// How U / theta_0 becomes whole. Default truncation.
-    #[serde(default)]
+    /// How U / theta_0 is rounded to a whole number. Default truncation.
     pub rounding: Rounding,
-    /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    #[serde(default = "super::periods::stamp_period")]
+    /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
     pub period_ms: f64,
 }
 
-/// How U / theta_0 becomes whole.
+/// How U / theta_0 is rounded to a whole number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rounding {
@@ -49,19 +45,11 @@ pub enum Rounding {
     Floor,
 }
 
-fn three() -> f64 {
-    3.0
-}
-
-fn one_bit() -> u32 {
-    1
-}
-
 impl Default for ChangeEvents {
     fn default() -> Self {
         Self {
-            noise_floor: three(),
-            bits: one_bit(),
+            noise_floor: 3.0,
+            bits: 1,
             previous: Previous::default(),
             rounding: Rounding::default(),
             period_ms: super::periods::stamp_period(),

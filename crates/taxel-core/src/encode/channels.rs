@@ -1,4 +1,5 @@
-//! The existing taxels of an array as the channels of an encoder, which of them a picture changes, and which events they take.
+//! The existing taxels of an array as an encoder's channels, which of them a picture changes, and which events are
+//! valid.
 
 use super::blocks::{BLOCK, Block, Next};
 use crate::held::Held;
@@ -9,7 +10,7 @@ use crate::{Array, EventsView, Result, problem};
 pub(super) const FARTHEST: u64 = 1 << 60;
 
 wide! {
-    /// Takes blocks of a picture where they differ from those held.
+    /// Copies the blocks of a picture that differ from the stored ones.
     fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool], next: &mut Next) -> Result<()> {
         /// All exponent bits: infinite or not a number.
         const NOT_FINITE: u32 = 0x7f80_0000;
@@ -33,15 +34,15 @@ wide! {
     }
 }
 
-/// Which taxels are channels.
+/// The mapping between taxels and channels.
 #[derive(Clone)]
 pub(super) struct Channels {
     rows: u16,
     columns: u16,
     name: String,
-    /// The place of each channel in a picture; `None` where every place is a channel.
+    /// The place of each channel in a picture; `None` if every place is a channel.
     places: Option<Vec<u32>>,
-    /// The channel of each place, [`NONE`] where no taxel exists; `None` as above.
+    /// The channel of each place, [`NONE`] if no taxel exists there; `None` if every place is a channel.
     of_place: Option<Vec<u32>>,
 }
 
@@ -61,7 +62,7 @@ impl Channels {
         Self { rows: array.rows, columns: array.columns, name: array.name.clone(), places, of_place }
     }
 
-    /// How many taxels exist.
+    /// Number of existing taxels.
     pub(super) fn len(&self) -> usize {
         self.places.as_ref().map_or(self.grid(), Vec::len)
     }
@@ -75,7 +76,7 @@ impl Channels {
         usize::from(y) * usize::from(self.columns) + usize::from(x)
     }
 
-    /// The channel of a place; `None` where no taxel exists.
+    /// The channel of a place; `None` if no taxel exists there.
     pub(super) fn of_place(&self, place: usize) -> Option<usize> {
         match &self.of_place {
             None => Some(place),
@@ -117,7 +118,7 @@ impl Channels {
         Ok(())
     }
 
-    /// Refuses events of another sensor, or columns that make no sense.
+    /// Refuses events of another sensor, and columns that are not valid.
     pub(super) fn check(&self, events: EventsView<'_>) -> Result<()> {
         let (rows, columns) = (events.array.rows, events.array.columns);
         if (rows, columns) != (self.rows, self.columns) {

@@ -1,4 +1,5 @@
-//! How many taxels are loaded, as crossings of 2, 4, 8, 16, 32: no place in it, so that what is learnt transfers.
+//! The number of loaded taxels, as crossings of 2, 4, 8, 16 and 32. It does not depend on position, so what is learnt
+//! at one position holds at others.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,35 +18,26 @@ use crate::{Array, EventsView, Result, Spike, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.
 ///
-/// A taxel is loaded while its held value stands above its tared rest by the board's noise floor and half a tick; it
-/// counts if one of its 8 neighbours is loaded too, so that noise does not. A taxel without any event, in the tare or
-/// since, is unloaded. Reckoned once a stamp, after its last event; spikes have the stamp's time. Trains, unsigned:
-/// rises through each level, then falls below each.
+/// A taxel is loaded while its value exceeds its rest by more than the board's noise floor and half a tick; it counts
+/// only if one of its 8 neighbours is loaded too, which rejects noise. A taxel without any event, in the tare or since,
+/// is unloaded. The area is computed once per stamp, after its last event; spikes have the stamp's time. Trains,
+/// unsigned: rises through each level, then falls below each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct ContactArea {
     /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
-    #[serde(default = "three")]
     pub noise_floor: f64,
     /// Numbers of taxels, ascending; default 2, 4, 8, 16, 32.
-    #[serde(default = "doubling")]
     pub levels: Vec<u32>,
-    /// The taxels' rest. It belongs to a board and a day: a saved readout has none and is given one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
+    /// used.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
-}
-
-fn three() -> f64 {
-    3.0
-}
-
-fn doubling() -> Vec<u32> {
-    vec![2, 4, 8, 16, 32]
 }
 
 impl Default for ContactArea {
     fn default() -> Self {
-        Self { noise_floor: three(), levels: doubling(), tare: None }
+        Self { noise_floor: 3.0, levels: vec![2, 4, 8, 16, 32], tare: None }
     }
 }
 
@@ -78,7 +70,7 @@ impl Law for ContactArea {
             reported: 0,
             held: Held::all(blocks(array.len()) * BLOCK, 0.0),
             changed: vec![false; blocks(array.len())],
-            // Place by place: which taxels exist is in `loaded`.
+            // Channels are all places here; `loaded` defines which taxels exist.
             channels: Channels::new(&Array { exists: None, ..array.clone() }),
             source: Source::Unknown,
         }))
@@ -110,7 +102,7 @@ struct Area {
 }
 
 impl Area {
-    /// Ends the stamp at `t` us: emits a spike of each level that the area passed since the last one.
+    /// Ends the stamp at `t` us: emits a spike for each level that the area has crossed since the previous stamp.
     fn say(&mut self, t: i64, out: &mut Vec<Spike>) {
         let (before, now) = (self.reported, self.loaded.area());
         if before == now {
@@ -176,7 +168,7 @@ impl Stream for Area {
         self.advance(t, out);
         self.loaded.set_rest(place, rest);
         match self.source {
-            // Marks the block as changed, so that the next frame is computed there with the new rest.
+            // Marks the block as changed, so that it is computed with the new rest in the next frame.
             Source::Frames { .. } => self.changed[place / BLOCK] = true,
             _ => self.loaded.take(place, self.held.values()[place]),
         }

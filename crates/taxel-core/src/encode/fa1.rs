@@ -1,17 +1,18 @@
-//! FA-1 encoder: pressure change to signed spikes (thesis 5.4.2, equations 5.1 to 5.5).
+//! FA-1 encoder: changes of pressure to signed spikes (thesis 5.4.2, equations 5.1 to 5.5).
 //!
-//! Each taxel integrates the change of its compressed pressure and fires where that passes a threshold, which a spike
-//! raises by `T A theta_0` and a quiet sample lowers by `B theta_0`. Order within a sample: the threshold moves by the
-//! last sample's spike, the change is added, both are compared, a spike resets the integral. (The threshold's move is
-//! computed at the end of a sample instead of at the start of the next: the same numbers, one array less.)
+//! Each taxel integrates the change of its compressed pressure and fires when the integral passes a threshold, which a
+//! spike raises by `T A theta_0` and a quiet sample lowers by `B theta_0`. Order within a sample: the threshold is
+//! updated for the last sample's spike, the change is added, both are compared, a spike resets the integral. (The
+//! threshold is updated at the end of a sample instead of at the start of the next, which gives the same numbers with
+//! one array less.)
 //!
-//! Few afferents fire at a sample, and a power is slow. So each afferent has a bound, in proportion to its threshold,
-//! within which its pressure may differ from the one at its last spike without a spike (`Afferents::reach`); only
-//! afferents beyond their bound are computed by 5.1 and 5.4. The bound is safe, so spikes are the same to the bit as if
-//! all were computed.
+//! Few afferents fire at a sample, and computing a power is slow. Therefore each afferent has a bound, proportional to
+//! its threshold: while its pressure differs by less from that at its last spike it cannot fire (`Afferents::reach`).
+//! Equations 5.1 and 5.4 are computed only for afferents beyond their bound. The bound is conservative, so the spikes
+//! equal to the bit those of computing every afferent.
 //!
-//! Reading: as printed, equation 5.5 lets the threshold sink below `theta_0` for one sample, by less than `B theta_0`,
-//! before its third case restores it. This code does so too, so that its spikes equal the thesis'.
+//! Reading: as printed, equation 5.5 lets the threshold fall below `theta_0` for one sample, by less than `B theta_0`,
+//! before its third case restores it. This code reproduces that, so that its spikes equal those of the thesis.
 
 use std::ops::RangeInclusive;
 
@@ -27,88 +28,60 @@ use crate::parameters::Described;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
-/// The FA-1 afferent exactly as equations 5.1 to 5.5, with the polarity.
+/// The FA-1 afferent by equations 5.1 to 5.5, with polarity.
 ///
-/// Reckoned in f64; pressure below 0 counts as 0 before 5.1. A value that a state of version 2 repaired is no change of 5.3.
-/// It begins as if the first sample had always been. One signed train a taxel.
+/// Computed in f64; pressure below 0 counts as 0 before 5.1. A value that a state of version 2 repaired is no change in
+/// 5.3. The initial state is that of a constant input equal to the first sample. One signed train per taxel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Fa1 {
     /// Power of the compression 5.1, above 0; default 0.7 (Table 5.3).
-    #[serde(default = "alpha")]
     pub alpha: f64,
     /// A, 1/ms: how much a spike raises the threshold; default 20 (Table 5.3).
-    #[serde(default = "twenty")]
     pub a: f64,
     /// B: how fast the threshold decays; default 0.05 (Table 5.3).
-    #[serde(default = "one_twentieth")]
     pub b: f64,
-    /// What B is reckoned by; default the sample.
-    #[serde(default)]
+    /// The unit of time of B; default the sample.
     pub decay: Decay,
-    /// The baseline threshold itself, 0 or more, in compressed units; left out, it is made from `range`. Table 5.3
-    /// prints 0: with it every change fires.
-    #[serde(default)]
+    /// The baseline threshold itself, 0 or more, in compressed units; by default it is computed from `range`. Table 5.3
+    /// prints 0, with which every change fires.
     pub theta_0: Option<f64>,
     /// The largest pressure, in the sensor's unit: theta_0 = range^alpha / 1024 (text to Table 5.3). Default 150 ticks,
     /// the ramp of the board's 5.2 kHz preset.
-    #[serde(default)]
     pub range: Option<f64>,
-    /// Bits an event, 1 to 10: by equation 5.7 a spike's value is U in units of theta_0, towards zero, from +-1 to
-    /// +-(2^bits - 1). When it fires stays that of 5.4. Default 1: rise or fall.
-    #[serde(default = "one_bit")]
+    /// Bits of a spike's value, 1 to 10: by equation 5.7 the value is U in units of theta_0, rounded towards zero, from
+    /// +-1 to +-(2^bits - 1). Spike times remain those of 5.4. Default 1: rise or fall.
     pub bits: u32,
-    /// T, ms: the sampling period, of events and of frames; default 1, where "about 100 Hz" holds. Frames must come at
-    /// this period, give or take half of it.
-    #[serde(default = "one")]
+    /// T, ms: the sampling period of events and frames; default 1, for which the thesis states "about 100 Hz". Frames
+    /// must arrive at this period, within half of it.
     pub period_ms: f64,
 }
 
-/// What the threshold's decay B is reckoned by.
+/// The unit of time of the threshold's decay B.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Decay {
-    /// By the sample, B theta_0 each, as 5.5 is printed.
+    /// The sample: the threshold decays by B theta_0 per sample, as 5.5 is printed.
     #[default]
     Sample,
-    /// By the ms, B T theta_0 a sample: then the sampling period does not change the decay.
+    /// The ms: it decays by B T theta_0 per sample, so that the decay does not depend on the sampling period.
     Ms,
 }
 
-fn alpha() -> f64 {
-    0.7
-}
-
-fn twenty() -> f64 {
-    20.0
-}
-
-fn one_twentieth() -> f64 {
-    0.05
-}
-
-fn one_bit() -> u32 {
-    1
-}
-
-fn one() -> f64 {
-    1.0
-}
-
-/// Ticks of the ramp of the preset 5.2 kHz (wire.md, section 3).
+/// Length of the ramp of the preset 5.2 kHz, ticks (wire.md, section 3).
 const RAMP: f64 = 150.0;
 
 impl Default for Fa1 {
     fn default() -> Self {
         Self {
-            alpha: alpha(),
-            a: twenty(),
-            b: one_twentieth(),
+            alpha: 0.7,
+            a: 20.0,
+            b: 0.05,
             decay: Decay::default(),
             theta_0: None,
             range: None,
-            bits: one_bit(),
-            period_ms: one(),
+            bits: 1,
+            period_ms: 1.0,
         }
     }
 }
@@ -150,19 +123,19 @@ impl Law for Fa1 {
     }
 }
 
-/// The state of the afferents of one block; on cache lines' borders, so that no vector straddles two.
+/// The state of the afferents of one block, aligned to cache lines so that no vector crosses a boundary.
 #[derive(Clone)]
 #[repr(align(64))]
 struct Afferent {
-    /// rho (5.1) where U was last reset: U, the sum of changes since then (5.3), is rho less this.
+    /// rho (5.1) when U was last reset: U, the sum of changes since then (5.3), is rho minus this value.
     base: [f64; BLOCK],
     /// theta (5.5) of the next sample.
     theta: [f64; BLOCK],
-    /// The pressure whose rho is `base`; NaN where there is none such.
+    /// The pressure whose rho is `base`; NaN if there is none.
     reference: Block,
     /// No pressure within `reach * theta` of `reference` fires.
     reach: Block,
-    /// Whether a sample without change would leave all this as it is.
+    /// Whether a sample without change would leave this state unchanged.
     still: bool,
 }
 
@@ -180,25 +153,25 @@ pub(super) struct Afferents {
     jump: f64,
     decay: f64,
     theta_0: f64,
-    /// What no theta lies below; 0 where that is nothing or beyond f32.
+    /// Lower bound of theta; 0 if there is none, or if it is beyond the range of f32.
     least: f64,
-    /// The pressure whose rho is the least theta; 0 where alpha is above 1.
+    /// The pressure whose rho is the lower bound of theta; 0 if alpha is above 1.
     lowest_pressure: f64,
-    /// One over the least theta.
+    /// Reciprocal of the lower bound of theta.
     per_least: f64,
     /// The largest value of a spike.
     most: f64,
     blocks: Vec<Afferent>,
-    /// Room for those that may fire at a sample.
+    /// Buffer for the afferents that may fire at a sample.
     near: Vec<Near>,
-    /// 5.1 of every tick up to the largest so far.
+    /// Equation 5.1 for every tick up to the largest so far.
     table: Vec<[f64; BLOCK]>,
 }
 
-/// What f32 holds to seven digits, and products of two.
+/// Range in which f32 is precise to seven digits, also for products of two values.
 const SOUND: RangeInclusive<f64> = 1e-18..=1e18;
 
-/// How many different ticks a word of the wire can hold.
+/// Number of different ticks that a word of the wire can hold.
 const TICKS: usize = 65_536;
 
 impl Afferents {
@@ -224,10 +197,10 @@ impl Afferents {
         }
     }
 
-    /// 5.1, from the table where all values are ticks.
+    /// Equation 5.1, from the table if all values are whole ticks.
     #[inline(always)]
     fn compress(alpha: f64, table: &mut Vec<[f64; BLOCK]>, values: &Block, rho: &mut [f64; BLOCK]) {
-        /// Added to a whole number below 2^23, it shows that number in the lowest bits.
+        /// Added to a whole number below 2^23, it leaves that number in the sum's lowest bits.
         const SHIFT: f32 = 8_388_608.0; // 2^23
         let (mut odd, mut all) = (0, 0);
         for &v in values {
@@ -251,26 +224,26 @@ impl Afferents {
         }
     }
 
-    /// How far a pressure may go from `reference`, whose rho is `base`, in proportion to theta, without a spike.
+    /// How far a pressure may move from `reference`, whose rho is `base`, without a spike, in proportion to theta.
     ///
-    /// theta is at most `most` until the next one. With `m = theta / base` the pressure may go by `r` of `reference`, where
-    /// `(1 + r)^alpha <= 1 + m` and `(1 - r)^alpha >= 1 - m`. Both hold for `r = m / (alpha + |1 - alpha| m)`: with alpha
-    /// below 1 by `(1 - m)^(1 / alpha - 1) <= 1 / (1 + (1 / alpha - 1) m)`, above 1 by Bernoulli's inequality; and for less, so
-    /// that m may be the largest in the divisor. Where alpha is at most 1 and neither pressure is above
-    /// `theta lowest_pressure / least <= theta^(1 / alpha)`, neither rho is above theta. A ten-thousandth is left for rounding: values
-    /// of f32 that differ do so by 6e-8 of `reference`, so theta is at least 6e-8 alpha base where this is of use, and 5.1 errs
-    /// by less than 1e-13 of base.
+    /// Until the next spike theta is at most `most`. With `m = theta / base` the pressure may differ by a fraction `r`
+    /// of `reference` if `(1 + r)^alpha <= 1 + m` and `(1 - r)^alpha >= 1 - m`. Both hold for `r = m / (alpha + |1 -
+    /// alpha| m)`: for alpha below 1 by `(1 - m)^(1 / alpha - 1) <= 1 / (1 + (1 / alpha - 1) m)`, above 1 by
+    /// Bernoulli's inequality. They hold for smaller r too, so the divisor may use the largest m. If alpha is at most 1
+    /// and neither pressure exceeds `theta lowest_pressure / least <= theta^(1 / alpha)`, neither rho exceeds theta. A
+    /// margin of 1e-4 covers rounding: different f32 values differ by at least 6e-8 of `reference`, so the bound is
+    /// only useful if theta is at least 6e-8 alpha base, and 5.1 has an error below 1e-13 of base.
     fn reach(&self, reference: f32, base: f64, theta: f64) -> f32 {
         let (reference, most) = (f64::from(reference), theta.max(self.theta_0));
         let near = reference / (self.alpha * base + (1.0 - self.alpha).abs() * most);
         let low = (self.lowest_pressure - reference) * self.per_least;
         let reach = 0.9999 * near.max(low);
         let sound = [reach, reach * self.least, most].iter().all(|x| SOUND.contains(x));
-        // With 0 whatever changes is reckoned.
+        // With a reach of 0 every change is computed in full.
         if sound && self.alpha > 0.01 { reach as f32 } else { 0.0 }
     }
 
-    /// Has an afferent begin again at a pressure whose rho is `base`.
+    /// Resets an afferent at a pressure whose rho is `base`.
     fn reset(&mut self, channel: usize, pressure: f32, base: f64, theta: f64) {
         let reference = pressure.max(0.0);
         let reach = self.reach(reference, base, theta);
@@ -279,7 +252,7 @@ impl Afferents {
         (afferent.reference[lane], afferent.reach[lane]) = (reference, reach);
     }
 
-    /// Reckons those that may fire.
+    /// Computes equations 5.1 to 5.5 for the afferents that may fire.
     #[inline(always)]
     fn reckon(&mut self, t: i64, held: &[Block], near: &[Near], out: &mut Vec<Spike>) {
         let (mut values, mut rho, mut base) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
@@ -289,17 +262,17 @@ impl Afferents {
                 (values[k], base[k]) = (held[block][lane], self.blocks[block].base[lane]);
             }
             Self::compress(self.alpha, &mut self.table, &values, &mut rho);
-            // Firing lanes are collected first, without a branch that the processor could not predict.
+            // Collects the firing lanes first, without a branch, which the processor could not predict.
             let (mut firing, mut n) = ([0; BLOCK], 0);
             for (k, near) in some.iter().enumerate() {
                 let u = rho[k] - base[k];
                 firing[n] = k;
-                // With theta below 0 both comparisons hold for a small U, which fires neither way.
+                // If theta is negative, both comparisons hold for a small U, which fires in neither direction.
                 n += usize::from((u > near.theta) != (u < -near.theta));
             }
             for &k in &firing[..n] {
                 let (Near { channel, theta }, u) = (some[k], rho[k] - base[k]);
-                // A baseline of 0 makes every change as large as a spike's value can be.
+                // With a baseline of 0 every change has the largest possible value.
                 let size = if self.most > 1.0 { (u.abs() / self.theta_0).trunc().clamp(1.0, self.most) } else { 1.0 };
                 let signed = if u > theta { size } else { -size };
                 out.push(Spike { t: ms(t), train: channel, value: signed as f32 });
@@ -311,7 +284,7 @@ impl Afferents {
 }
 
 impl Afferent {
-    /// Which of a block may fire, a bit each.
+    /// The afferents of a block that may fire, as a bit mask.
     #[inline(always)]
     fn near(&self, held: &Block) -> u64 {
         let theta = self.theta.map(|theta| theta as f32);
@@ -327,7 +300,7 @@ impl Afferent {
         u64::from(halves[1]) << 32 | u64::from(halves[0])
     }
 
-    /// Lowers the thresholds as 5.5 does where none fires.
+    /// Lowers the thresholds as 5.5 does for a sample without spikes.
     #[inline(always)]
     fn quieten(&mut self, decay: f64, theta_0: f64) {
         let mut moved = 0;
@@ -364,7 +337,7 @@ impl Rule for Afferents {
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
-        /// Written at once, needed or not, as a guess of how many there are costs more.
+        /// Number of entries that are always written, needed or not: a branch on the count would cost more.
         const AT_ONCE: usize = 4;
         let (mut near, mut n) = (std::mem::take(&mut self.near), 0);
         for (block, afferent) in self.blocks.iter_mut().enumerate() {
@@ -397,7 +370,7 @@ impl Rule for Afferents {
         (values[0], values[1]) = (from, to);
         Self::compress(self.alpha, &mut self.table, &values, &mut rho);
         let (afferent, lane) = (&mut self.blocks[channel / BLOCK], channel % BLOCK);
-        // Exactly where nothing was summed up: with a threshold of 0 a rounding would fire.
+        // U is exactly 0 if nothing was added: with a threshold of 0 a rounding error would fire.
         if afferent.base[lane] == rho[0] {
             let theta = afferent.theta[lane];
             self.reset(channel, to, rho[1], theta);
@@ -419,7 +392,7 @@ mod tests {
 
     use super::*;
 
-    /// Equations 5.1 to 5.5 for every afferent at every sample, whatever it may do.
+    /// Reference for the tests: equations 5.1 to 5.5 for every afferent at every sample.
     fn plainly(parameters: &Fa1, pictures: &[Block]) -> Vec<Spike> {
         let afferents = Afferents::new(parameters);
         let Afferents { alpha, jump, decay, theta_0, .. } = afferents;
@@ -446,7 +419,8 @@ mod tests {
     fn afferents_that_are_not_reckoned_are_those_that_say_nothing() {
         let mut rng = StdRng::seed_from_u64(5);
         for round in 0..400 {
-            // From what f32 hardly holds to far beyond any sensor; noise from a last place to all there is.
+            // Magnitudes from the smallest that f32 represents to far beyond any sensor; noise from one last place to
+            // the full range.
             let exponent = |rng: &mut StdRng, most: f64| 10_f64.powf(rng.random_range(-most..most));
             let most = if round % 4 == 0 { 36.0 } else { 4.0 };
             let (size, noise) = (exponent(&mut rng, most), 10_f64.powf(rng.random_range(-7.5..0.5)));

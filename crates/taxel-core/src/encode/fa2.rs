@@ -12,32 +12,34 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result};
 
-/// The FA-2 afferent (Pacini): silent while pressure is held or moves slowly, a spike a cycle at 200 to 250 Hz.
+/// The FA-2 afferent (Pacini): silent while pressure is constant or changes slowly; one spike per cycle at 200 to 250
+/// Hz.
 ///
-/// Two high passes of `corner_ms`, a low pass of `membrane_ms`: `u = lowpass(highpass(highpass(x)))`, x the pressure as a
-/// share of `range`. So thresholds fall by 12 dB an octave up to the best frequency, as those of the channel that it
-/// carries do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). The threshold moves as [`Sa1`](super::Sa1)'s. `corner_ms`, `membrane_ms`, `jump` and `recovery_ms` are fitted by
-/// us to a threshold of one spike a cycle that is least between 200 and 250 Hz. `threshold` is what a sensor allows: a
-/// step of one tick in 150 stays below it; a finger is far more sensitive. Pressure below 0 counts as 0. One unsigned
-/// train a taxel, at most one spike a sample. Begins as if the first sample had always been.
+/// Two high-pass filters with `corner_ms` and a low-pass filter with `membrane_ms`, for x the pressure as a fraction of
+/// `range`: `u = lowpass(highpass(highpass(x)))`. Thresholds therefore fall by 12 dB per octave up to the best
+/// frequency, as those of the Pacinian channel do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). The threshold
+/// adapts as that of [`Sa1`](super::Sa1). We fitted `corner_ms`, `membrane_ms`, `jump` and `recovery_ms` so that the
+/// amplitude for one spike per cycle is least between 200 and 250 Hz. `threshold` is limited by the sensor: a step of
+/// one tick in 150 stays below it; a finger is far more sensitive. Negative pressure counts as 0. One unsigned train
+/// per taxel, at most one spike per sample. The initial state is that of a constant input equal to the first sample.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fa2 {
     /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
     pub range: f64,
-    /// Where it begins to fire, a share of `range`.
+    /// Threshold of the potential for a spike, as a fraction of `range`.
     pub threshold: f64,
-    /// The time constant of the two high passes, ms.
+    /// Time constant of the two high-pass filters, ms.
     pub corner_ms: f64,
-    /// The membrane's time constant, ms.
+    /// Time constant of the membrane, ms.
     pub membrane_ms: f64,
-    /// By how much a spike raises the threshold, a share of `range`.
+    /// Amount by which a spike raises the threshold, as a fraction of `range`.
     pub jump: f64,
-    /// The time constant with which it sinks again, ms.
+    /// Time constant with which the threshold decays again, ms.
     pub recovery_ms: f64,
-    /// How long after a spike none can come, ms.
+    /// Refractory time after a spike, ms.
     pub refractory_ms: f64,
-    /// How often events are sampled, ms, at most 1; frames must come at it, give or take half.
+    /// Sampling period of events, ms, at most 1; frames must arrive at this period, within half of it.
     pub period_ms: f64,
 }
 
@@ -103,7 +105,7 @@ impl Law for Fa2 {
     }
 }
 
-/// Two high passes and a low pass.
+/// The coefficients of two high-pass filters and a low-pass filter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fast {
     corner: LowPass,
@@ -113,10 +115,10 @@ pub(super) struct Fast {
 #[derive(Clone)]
 pub(super) struct FastState {
     x: Lanes,
-    /// The low pass that the first high pass subtracts, and the difference.
+    /// Output of the low-pass filter that the first high-pass filter subtracts, and the difference.
     first: Lanes,
     once: Lanes,
-    /// The same of the second.
+    /// The same for the second high-pass filter.
     second: Lanes,
     twice: Lanes,
 }

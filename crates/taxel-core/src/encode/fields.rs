@@ -1,40 +1,43 @@
-//! Receptive fields: what afferents feel of an array, each the weighed mean of the taxels in its field.
+//! Receptive fields: the input of each afferent is the weighted mean of the taxels in its field.
 //!
-//! Row by row of the array a field's channels follow each other, so a field is a few short windows of channels. Those of
-//! a group of afferents are read first; what each weighs is then reckoned for all of them at once. Sums run from a
-//! field's first channel to its last whatever the vectors, as what fills a window up weighs 0: all machines feel the same.
+//! A field's channels are consecutive within a row of the array, so a field is a few short windows of channels. The
+//! channels of a group of afferents are read first and weighted together. Sums run from a field's first channel to its
+//! last, whatever the vector width, and channels that pad a window have weight 0, so all machines compute the same
+//! sums.
 
 use std::ops::Range;
 
 use super::blocks::{BLOCK, Block, blocks};
 use crate::vectors::{Instructions, OnLine, ROW, WIDE, Windows, by_width};
 
-/// Channels that a window of a small field holds: what weighs nothing need not come from memory for every sample.
+/// Number of channels in a window of a small field: padding channels need not be loaded for every sample.
 const NARROW: usize = 2;
 
-/// The fields of afferents, a block of them at a time.
+/// The fields of afferents, in blocks of afferents.
 ///
-/// Within a block those with the most windows stand first, so that few rows of windows hold them all.
+/// Within a block the afferents with the most windows come first, so that few rows of windows contain them all.
 #[derive(Clone)]
 pub(super) struct Fields {
     /// The afferent in each lane.
     afferents: Vec<u32>,
-    /// Where the rows of a block's windows begin in what follows, and where the last block's end.
+    /// Index of the first row of each block's windows, and at the end the number of rows.
     rows: Vec<usize>,
-    /// To which group of lanes each row belongs, groups counted within a block.
+    /// The group of lanes of each row; groups are numbered within a block.
     groups: Vec<usize>,
-    /// A window a lane in each row.
+    /// One window per lane in each row.
     windows: Windows,
-    /// What the channels of these windows weigh: of a row the first of each window, then the second, and so on.
+    /// The weights of these windows' channels: for each row the first channel of each window, then the second, and so
+    /// on.
     weights: Vec<OnLine<[f32; ROW]>>,
-    /// Where the weights of a row begin, and where the last row's end: [`NARROW`] where no window holds more.
+    /// Offset of each row's weights, and at the end their number; a row has [`NARROW`] weights per lane if no window
+    /// has more.
     weighed: Vec<usize>,
-    /// The blocks of channels that each block of afferents feels, from one to before another.
+    /// The range of channel blocks on which each block of afferents depends: start and exclusive end.
     feels: Vec<[usize; 2]>,
 }
 
 impl Fields {
-    /// Fields of channels with their weights, in ascending order; of `channels` channels in all.
+    /// Builds fields from channels in ascending order with their weights; the array has `channels` channels.
     pub(super) fn new(fields: &[Vec<(u32, f32)>], channels: usize) -> Self {
         let last = (blocks(channels) * BLOCK).saturating_sub(WIDE);
         let (windows, weights, feels) = (Windows::default(), vec![], vec![]);
@@ -44,7 +47,7 @@ impl Fields {
             let mut cut: Vec<(usize, Vec<Window>)> = fields.iter().map(|field| cut(field, last)).enumerate().collect();
             cut.sort_by_key(|(_, windows)| std::cmp::Reverse(windows.len()));
             new.afferents.extend(cut.iter().map(|(lane, _)| (block * BLOCK + lane) as u32));
-            // The next row is another group's, so that no sum waits for the one before.
+            // Successive rows belong to different groups, so that no sum waits for the previous one.
             for row in 0..cut[0].1.len() {
                 for (number, group) in cut.chunks(ROW).enumerate().filter(|(_, group)| row < group[0].1.len()) {
                     let (mut starts, mut weights) = ([0; ROW], [[0.0; ROW]; WIDE]);
@@ -68,19 +71,19 @@ impl Fields {
         new
     }
 
-    /// The afferent in a lane, lanes counted through all blocks.
+    /// The afferent in a lane; lanes are numbered across all blocks.
     pub(super) fn afferent(&self, lane: usize) -> u32 {
         self.afferents[lane]
     }
 
-    /// Whether a block of afferents feels any of the blocks of channels that `changed`.
+    /// Whether the input of a block of afferents depends on any of the channel blocks that `changed`.
     #[inline(always)]
     pub(super) fn any(&self, block: usize, changed: &[bool]) -> bool {
         let [from, to] = self.feels[block];
         changed[from..to].contains(&true)
     }
 
-    /// What a block of afferents feels of these pressures, by lane.
+    /// The inputs of a block of afferents for these pressures, by lane.
     pub(super) fn feel(&self, block: usize, held: &[Block]) -> Block {
         #[inline(always)]
         fn by(fields: &Fields, block: usize, read: impl Fn(usize) -> [[f32; ROW]; WIDE]) -> Block {
@@ -119,7 +122,7 @@ impl Fields {
         self.weighed[row]..self.weighed[row + 1]
     }
 
-    /// The lanes of the afferents that feel a channel, with what it weighs to each.
+    /// The lanes of the afferents whose fields contain a channel, with the channel's weight in each.
     pub(super) fn feeling(&self, channel: usize) -> impl Iterator<Item = (usize, f32)> {
         let near = move |block: &usize| (self.feels[*block][0]..self.feels[*block][1]).contains(&(channel / BLOCK));
         (0..self.feels.len()).filter(near).flat_map(|block| block * BLOCK..(block + 1) * BLOCK).filter_map(
@@ -136,7 +139,7 @@ impl Fields {
     }
 }
 
-/// Adds what was read, weighed.
+/// Adds the weighted values of channels to the sums.
 #[inline(always)]
 fn add<const N: usize>(
     mut sum: [f32; ROW],
@@ -151,10 +154,10 @@ fn add<const N: usize>(
     sum
 }
 
-/// Where a window begins, and what its channels weigh.
+/// A window's first channel, and the weights of its channels.
 type Window = (u32, [f32; WIDE]);
 
-/// Cuts a field into windows, none of which begins behind `last`.
+/// Cuts a field into windows, none of which begins after `last`.
 fn cut(field: &[(u32, f32)], last: usize) -> Vec<Window> {
     let mut windows: Vec<Window> = vec![];
     let mut end = 0;
@@ -182,7 +185,7 @@ mod tests {
         let mut rng = StdRng::seed_from_u64(3);
         for _ in 0..300 {
             let channels = rng.random_range(1..400);
-            // From one channel to all of them, in runs or scattered, some at the array's very end.
+            // Fields of one channel up to all of them, in runs or scattered, some at the very end of the array.
             let (share, longest) = (rng.random_range(0.01..1.0), rng.random_range(1..60));
             let fields: Vec<Vec<(u32, f32)>> = (0..rng.random_range(1..200))
                 .map(|_| {

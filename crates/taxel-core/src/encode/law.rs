@@ -6,9 +6,9 @@ use super::tare::Tare;
 use crate::parameters::Described;
 use crate::{Array, Result};
 
-/// An encoder's parameters, checks, stream and trains.
+/// An encoder's parameters, checks, stream and number of trains.
 pub(super) trait Law {
-    /// Its parameters, with their defaults and ranges.
+    /// The encoder's parameters, with their defaults and ranges.
     fn described() -> Described
     where
         Self: Sized;
@@ -16,24 +16,24 @@ pub(super) trait Law {
     /// Checks every parameter.
     fn check(&self) -> Result<()>;
 
-    /// Begins a stream from an array; the parameters are checked.
+    /// Starts a stream for an array; the parameters must have been checked.
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>>;
 
-    /// The number of spike trains that it makes of an array.
+    /// The number of spike trains for an array.
     fn trains(&self, array: &Array) -> usize {
         Channels::new(array).len()
     }
 
-    /// Whether its spikes carry a signed value.
+    /// Whether spikes carry a signed value.
     fn signed(&self) -> bool {
         true
     }
 
-    /// How much later than the touch itself a spike comes, ms: what its own rule costs.
+    /// The latency that the encoder's own algorithm adds between a touch and its spike, ms.
     fn latency_ms(&self) -> f64 {
         0.0
     }
 
-    /// Takes the taxels' rest; most read none.
+    /// Sets the taxels' rest; most encoders use none.
     fn set_tare(&mut self, _tare: &Tare) {}
 }

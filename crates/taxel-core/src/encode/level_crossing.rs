@@ -1,4 +1,4 @@
-//! Plain crossings of levels, with release below the level, a time that a crossing must hold, and tonic spikes.
+//! Crossings of levels, with hysteresis, a minimum duration, and tonic spikes.
 
 use std::collections::VecDeque;
 
@@ -17,36 +17,36 @@ use crate::parameters::Described;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
-/// Crossings of levels: +1 where a taxel comes to a level, -1 where it falls below its release.
+/// Crossings of levels: +1 when a taxel's value reaches a level, -1 when it falls below the level's release.
 ///
-/// A taxel is above a level from the sample that reaches it until one below the release. Trains: taxel times levels
-/// (`taxel * levels + level`), signed; with `tonic_ms` one more a taxel behind them. Values and levels are compared in
-/// f32. An encoder begins settled: the first sample makes no crossing.
+/// A taxel is above a level from the sample that reaches the level until one that is below the release. Trains: taxel
+/// times levels (`taxel * levels + level`), signed; with `tonic_ms` followed by one more per taxel. Values and levels
+/// are compared in f32. The first sample causes no crossing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LevelCrossing {
-    /// Levels in the sensor's unit, or in shares of the running range where there is one; ascending.
+    /// Levels in the sensor's unit, or as fractions of the running range if there is one; ascending.
     pub levels: Vec<f64>,
-    /// Release as a share of each level, above 0 and up to 1; 1 (plain crossings) where neither release is given.
+    /// Release as a fraction of each level, above 0 and up to 1; 1 (no hysteresis) if neither release is given.
     #[serde(default)]
     pub release_share: Option<f64>,
-    /// Release as a distance below each level, 0 or more; instead of the share.
+    /// Release as a distance below each level, 0 or more; instead of the fraction.
     #[serde(default)]
     pub release_by: Option<f64>,
-    /// How long a crossing must last before it gives a spike, ms, which is also the encoder's latency. Default 0.
+    /// Minimum duration of a crossing, ms, which is also the encoder's latency. Default 0.
     #[serde(default)]
     pub hold_ms: f64,
-    /// Tonic spikes, the slowly adapting part: one at the crossing and then every so many ms while above; none by
-    /// default.
+    /// Period of tonic spikes, ms, the slowly adapting part: one at the crossing, then one per period while above; by
+    /// default there are none.
     #[serde(default)]
     pub tonic_ms: Option<f64>,
-    /// The level while above which tonic spikes come, one of `levels`; the first where it is left out.
+    /// The level above which tonic spikes are emitted, one of `levels`; by default the first.
     #[serde(default)]
     pub tonic_level: Option<f64>,
-    /// Levels on the channel's own running range instead of the sensor's unit.
+    /// Measures levels on the channel's own running range instead of in the sensor's unit.
     #[serde(default)]
     pub running_range: Option<RunningRange>,
-    /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+    /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
     #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
 }
@@ -60,7 +60,7 @@ impl LevelCrossing {
         period_ms: "ms", Range::WHOLE_US;
     }
 
-    /// Plain crossings of these levels.
+    /// An encoder with these levels, without hysteresis.
     #[must_use]
     pub fn at(levels: Vec<f64>) -> Self {
         Self {
@@ -130,16 +130,16 @@ impl Law for LevelCrossing {
     }
 }
 
-/// One level at one channel.
+/// State of one level on one channel.
 #[derive(Clone, Copy)]
 struct ChannelLevel {
-    /// At or above this the taxel is above ...
+    /// From this value on, the taxel is above.
     on_at: f32,
-    /// ... until it reads less than this.
+    /// Below this value, the taxel is no longer above.
     off_at: f32,
-    /// Whether the latest sample is above.
+    /// Whether the value of the latest sample is above.
     above: bool,
-    /// The state of the latest spike: follows `above` once that has lasted.
+    /// The state at the latest spike; follows `above` after the minimum duration.
     reported: bool,
     /// When `above` last changed, us.
     since: i64,
@@ -151,10 +151,11 @@ struct Crossings {
     levels: Vec<f64>,
     releases: Vec<f64>,
     hold: i64,
-    /// `channel * levels + level`.
+    /// Indexed by `channel * levels + level`.
     states: Vec<ChannelLevel>,
     bracket: Bracket,
-    /// Crossings on trial: when they will have held, and which; all hold equally long, so this is in order.
+    /// Crossings that have not lasted for the minimum duration: the time when they will have, and their index. The
+    /// duration is the same for all, so the queue is ordered by time.
     trials: VecDeque<(i64, usize)>,
     tonic: Option<Tonic>,
     window: Option<Window>,
@@ -164,9 +165,10 @@ struct Crossings {
 struct Tonic {
     every: i64,
     level: usize,
-    /// The time of each channel's next tonic spike, with its crossing; all periods are equal, so in order.
+    /// The time of each channel's next tonic spike, the channel, and its crossing's time; the period is the same for
+    /// all, so the queue is ordered by time.
     next: VecDeque<(i64, usize, i64)>,
-    /// When the spike came of the crossing by which a channel is above; `None` while below.
+    /// Time of the spike of the crossing since which a channel is above; `None` while it is below.
     above_since: Vec<Option<i64>>,
 }
 
@@ -205,7 +207,7 @@ impl Crossings {
         })
     }
 
-    /// Puts the levels on the running range; a channel without any range stays below all of them.
+    /// Rescales the levels to the running ranges; a channel whose range is empty stays below all levels.
     fn scale(&mut self, ranges: &[(f64, f64)]) {
         for (states, &(low, high)) in self.states.chunks_mut(self.levels.len()).zip(ranges) {
             for ((state, level), release) in states.iter_mut().zip(&self.levels).zip(&self.releases) {
@@ -232,7 +234,7 @@ impl Crossings {
         self.bracket.set(channel, low, high);
     }
 
-    /// The first sample that counts: no crossing, but tonic spikes where it is above.
+    /// Processes the first sample: no crossings, but tonic spikes if the value is above the level.
     fn settle(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
         let levels = self.levels.len();
         for channel in 0..self.channels {
@@ -293,7 +295,7 @@ impl Crossings {
         self.speak_tonic(t, train / self.levels.len(), train % self.levels.len(), on, out);
     }
 
-    /// Begins or ends a channel's tonic spikes, where `level` is theirs.
+    /// Starts or stops a channel's tonic spikes, if `level` is the tonic level.
     fn speak_tonic(&mut self, t: i64, channel: usize, level: usize, on: bool, out: &mut Vec<Spike>) {
         let first = self.states.len();
         let Some(tonic) = self.tonic.as_mut().filter(|tonic| tonic.level == level) else { return };
@@ -304,7 +306,8 @@ impl Crossings {
         }
     }
 
-    /// Says the crossings that will have held before `t`, or at `t` too, with the tonic spikes before each.
+    /// Emits the crossings whose minimum duration ends before `t` (with `at_too` also at `t`), and the tonic spikes
+    /// before each.
     fn say_trials(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         while let Some(&(due, train)) = self.trials.front()
             && (due < t || (at_too && due == t))
@@ -318,7 +321,7 @@ impl Crossings {
         }
     }
 
-    /// Says the tonic spikes before `t`, or at `t` too.
+    /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
     fn say_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         let first = self.states.len();
         let Some(tonic) = &mut self.tonic else { return };

@@ -1,4 +1,4 @@
-//! Which taxels are loaded, and how many: what encoders without a place in them read.
+//! Determines which taxels are loaded, and their number, for encoders that do not depend on position.
 
 use super::blocks::{BLOCK, Block, blocks};
 use super::tare::Tare;
@@ -25,26 +25,26 @@ wide! {
 
 /// The loaded places of an array.
 ///
-/// A place is loaded while its held value stands above its rest by the noise floor and half a tick; it counts if one of
-/// its 8 neighbours is loaded too, so that noise does not.
+/// A place is loaded while its value exceeds its rest by more than the noise floor and half a tick; it counts only if
+/// one of its 8 neighbours is loaded too, which rejects noise.
 #[derive(Clone)]
 pub(super) struct Loaded {
     rows: usize,
     columns: usize,
-    /// From which value on each place is loaded; infinite where it has no rest.
+    /// Smallest value at which each place is loaded; infinite if its rest is not known.
     from: Vec<Block>,
     noise_floor: f64,
     rest: Rest<f64>,
-    /// 1 where a place is loaded.
+    /// 1 for each loaded place, otherwise 0.
     loaded: Vec<[u32; BLOCK]>,
-    /// How many neighbours of each place are loaded.
+    /// Number of loaded neighbours of each place.
     neighbours: Vec<u8>,
-    /// How many loaded places have a loaded neighbour.
+    /// Number of loaded places with a loaded neighbour.
     area: u32,
 }
 
 impl Loaded {
-    /// Begins with no taxel loaded; `what` names the encoder in an error.
+    /// Starts with no taxel loaded; `what` names the encoder in an error.
     pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
         let Some(tare) = tare else {
             return Err(problem!("{what} without a tare: take one at rest and give it to the encoder"));
@@ -64,7 +64,7 @@ impl Loaded {
         Ok(fresh)
     }
 
-    /// Gives a place another rest; its value above rest must be computed again.
+    /// Changes the rest of a place; the caller must pass its value again.
     pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
         self.rest.set(place, rest);
         self.rest_changed(place);
@@ -75,17 +75,17 @@ impl Loaded {
         self.from[place / BLOCK][place % BLOCK] = round_up(from);
     }
 
-    /// What a place rests at; `None` where that is not known.
+    /// The rest of a place; `None` if it is not known.
     pub(super) fn rest(&self, place: usize) -> Option<f64> {
         Some(self.rest.values()[place]).filter(|rest| rest.is_finite())
     }
 
-    /// How far a value stands above a place's rest.
+    /// Difference between a value and a place's rest.
     pub(super) fn above(&self, place: usize, value: f32) -> f64 {
         self.rest.above(place, f64::from(value))
     }
 
-    /// How many taxels count.
+    /// Number of taxels that count.
     pub(super) fn area(&self) -> u32 {
         self.area
     }
@@ -95,19 +95,19 @@ impl Loaded {
         self.loaded[block].iter().any(|&l| l != 0)
     }
 
-    /// Whether a place counts.
+    /// Whether a place counts: it and one of its neighbours are loaded.
     pub(super) fn counts(&self, place: usize) -> bool {
         self.is_loaded(place) && self.neighbours[place] > 0
     }
 
-    /// Takes the value of a place.
+    /// Updates the value of a place.
     pub(super) fn take(&mut self, place: usize, value: f32) {
         if (value >= self.from[place / BLOCK][place % BLOCK]) != self.is_loaded(place) {
             self.toggle(place);
         }
     }
 
-    /// Takes the values of a block of places.
+    /// Updates the values of a block of places.
     pub(super) fn take_block(&mut self, block: usize, values: &Block) {
         if !as_loaded(values, &self.from[block], &self.loaded[block]) {
             let last = self.neighbours.len();
@@ -121,7 +121,7 @@ impl Loaded {
         self.loaded[place / BLOCK][place % BLOCK] != 0
     }
 
-    /// Loads or unloads a place, and keeps the counts of its neighbours and the area in step.
+    /// Toggles whether a place is loaded, and updates its neighbours' counts and the area.
     fn toggle(&mut self, place: usize) {
         let loaded = !self.is_loaded(place);
         self.loaded[place / BLOCK][place % BLOCK] = u32::from(loaded);

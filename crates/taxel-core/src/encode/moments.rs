@@ -1,5 +1,5 @@
-//! A touch's area, force, and the displacement of its centre since it began. None of them depends on where the touch began,
-//! so what is learnt at one place holds at others.
+//! Area, force and displacement of a touch. None of them depends on where the touch began, so what is learnt at one
+//! position holds at others.
 
 use std::collections::VecDeque;
 
@@ -17,86 +17,53 @@ use crate::parameters::Described;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
-/// Moments of the held picture above rest, each through levels in equal ratios.
+/// Moments of the current values above rest, each with levels in a geometric series.
 ///
-/// Of the taxels that count as [`ContactArea`](super::ContactArea) counts them: how many (area), the sum and the largest
-/// of their values above rest (total, peak), and how far their centre, weighted by these values, has moved to the right
-/// and downwards since the present touch began, mm. A touch begins where area rises above 0 and ends where it is 0;
-/// between touches all are 0. A level of the displacement stands on both sides of 0 and is passed outwards.
+/// The moments are computed over the taxels that count for [`ContactArea`](super::ContactArea): their number (area),
+/// the sum and the largest of their values above rest (total, peak), and the displacement of their centre, weighted by
+/// these values, to the right and downwards since the current touch began, mm. A touch begins when the area rises above
+/// 0 and ends when it is 0; between touches all moments are 0. Each level of the displacement exists on both sides of 0
+/// and is crossed outwards.
 ///
-/// Trains, unsigned, levels in the order area, total, peak, x right, x left, y down, y up, from the least on: where each
-/// is reached, then where each is left, then, with `tonic_ms`, one that spikes while the level is passed. Begins settled.
+/// Trains, unsigned; levels in the order area, total, peak, x right, x left, y down, y up, ascending within each. First
+/// a train per level that spikes when the level is reached, then one per level that spikes when it is left, then, with
+/// `tonic_ms`, one that spikes while the level is exceeded. The first sample causes no spike of the first two kinds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Moments {
     /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
-    #[serde(default = "three")]
     pub noise_floor: f64,
-    /// How many levels each moment has, on each side of 0 for a displacement. Default 20.
-    #[serde(default = "twenty")]
+    /// Number of levels of each moment, for a displacement on each side of 0. Default 20.
     pub levels: usize,
-    /// Least and largest level of the number of taxels; `None` leaves the moment out.
-    #[serde(default = "areas")]
+    /// Smallest and largest level of the number of taxels; `None` omits the moment.
     pub area: Option<[f64; 2]>,
-    /// The same of the sum above rest, in the sensor's unit.
-    #[serde(default = "totals")]
+    /// Smallest and largest level of the sum above rest, in the sensor's unit.
     pub total: Option<[f64; 2]>,
-    /// The same of the largest value above rest, in the sensor's unit.
-    #[serde(default = "peaks")]
+    /// Smallest and largest level of the largest value above rest, in the sensor's unit.
     pub peak: Option<[f64; 2]>,
-    /// The same of the centre's way in x and in y, mm.
-    #[serde(default = "ways")]
+    /// Smallest and largest level of the centre's displacement in x and in y, mm.
     pub displacement_mm: Option<[f64; 2]>,
-    /// While beyond a level: one spike when it is reached, and one every so often, ms; `None` for none. Default 0.5.
-    #[serde(default = "half")]
+    /// Period of the tonic spikes while a level is exceeded, ms, the first when it is reached; `None` for none. Default
+    /// 0.5.
     pub tonic_ms: Option<f64>,
-    /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    #[serde(default = "super::periods::stamp_period")]
+    /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
     pub period_ms: f64,
-    /// The taxels' rest. It belongs to a board and a day: a saved readout has none and is given one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
+    /// used.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
-}
-
-fn three() -> f64 {
-    3.0
-}
-
-fn twenty() -> usize {
-    20
-}
-
-fn areas() -> Option<[f64; 2]> {
-    Some([2.0, 500.0])
-}
-
-fn totals() -> Option<[f64; 2]> {
-    Some([8.0, 20_000.0])
-}
-
-fn peaks() -> Option<[f64; 2]> {
-    Some([4.0, 120.0])
-}
-
-fn ways() -> Option<[f64; 2]> {
-    Some([0.2, 20.0])
-}
-
-#[allow(clippy::unnecessary_wraps)] // None is a value of its own: no tonic spikes
-fn half() -> Option<f64> {
-    Some(0.5)
 }
 
 impl Default for Moments {
     fn default() -> Self {
         Self {
-            noise_floor: three(),
-            levels: twenty(),
-            area: areas(),
-            total: totals(),
-            peak: peaks(),
-            displacement_mm: ways(),
-            tonic_ms: half(),
+            noise_floor: 3.0,
+            levels: 20,
+            area: Some([2.0, 500.0]),
+            total: Some([8.0, 20_000.0]),
+            peak: Some([4.0, 120.0]),
+            displacement_mm: Some([0.2, 20.0]),
+            tonic_ms: Some(0.5),
             period_ms: super::periods::stamp_period(),
             tare: None,
         }
@@ -119,7 +86,7 @@ impl Moments {
         [("area", self.area), ("total", self.total), ("peak", self.peak), ("displacement_mm", self.displacement_mm)]
     }
 
-    /// All levels, each with the moment that it is of: area, total, peak, x, y.
+    /// All levels, each with its moment: area, total, peak, x, y.
     fn all_levels(&self) -> Vec<Level> {
         let mut all = vec![];
         let [area, total, peak, way] = self.ranges().map(|(_, range)| range);
@@ -170,7 +137,7 @@ impl Law for Moments {
             every: self.tonic_ms.map(|every| micros("tonic_ms", every)).transpose()?,
             due: VecDeque::new(),
         };
-        // Place by place: which taxels exist is in `loaded`.
+        // Channels are all places here; `loaded` defines which taxels exist.
         let places = Array { exists: None, ..array.clone() };
         Ok(Box::new(Sampled::new(self, passing, &places, self.period_ms)?))
     }
@@ -188,7 +155,8 @@ impl Law for Moments {
     }
 }
 
-/// `n` levels from the least to the largest, to 12 digits, so that no machine's power puts one beside a whole number.
+/// `n` levels in a geometric series, rounded to 12 digits, so that differences between machines' `powf` do not move a
+/// level off a whole number.
 fn in_equal_ratios(least: f64, most: f64, n: usize) -> Vec<f64> {
     let level = |k: usize| {
         let exact = least * (most / least).powf(k as f64 / (n.max(2) - 1) as f64);
@@ -197,7 +165,7 @@ fn in_equal_ratios(least: f64, most: f64, n: usize) -> Vec<f64> {
     (0..n).map(level).collect()
 }
 
-/// A level of one moment; one below 0 is passed downwards.
+/// A level of one moment; a negative level is crossed downwards.
 #[derive(Clone, Copy)]
 struct Level {
     moment: usize,
@@ -214,23 +182,24 @@ impl Level {
 #[derive(Clone)]
 struct Passing {
     loaded: Loaded,
-    /// How many there are.
+    /// Number of places of the array.
     places: usize,
     columns: usize,
     pitch_mm: f64,
-    /// The centre as the present touch began, in taxels.
+    /// The centre when the current touch began, in taxels.
     origin: Option<[f64; 2]>,
     levels: Vec<Level>,
-    /// Since when each level is reached, us.
+    /// The time at which each level was reached, us; `None` below it.
     since: Vec<Option<i64>>,
-    /// How often tonic spikes come, us.
+    /// Period of the tonic spikes, us.
     every: Option<i64>,
-    /// The time of a level's next tonic spike, the level, and since when it was reached; all periods are equal, so in order.
+    /// The time of a level's next tonic spike, the level, and when it was reached; the period is the same for all, so
+    /// the queue is ordered by time.
     due: VecDeque<(i64, usize, i64)>,
 }
 
 impl Passing {
-    /// Area, total, peak, and the way of the centre in x and y, mm.
+    /// Area, total, peak, and the displacement of the centre in x and y, mm.
     fn moments(&mut self, held: &[Block]) -> [f64; 5] {
         if self.loaded.area() == 0 {
             self.origin = None;
@@ -254,7 +223,7 @@ impl Passing {
         [f64::from(self.loaded.area()), total, peak, way(0), way(1)]
     }
 
-    /// A level is reached: its tonic spikes begin.
+    /// Notes that a level is reached: its tonic spikes begin.
     fn reach(&mut self, t: i64, level: usize, out: &mut Vec<Spike>) {
         self.since[level] = Some(t);
         if let Some(every) = self.every {
@@ -263,7 +232,7 @@ impl Passing {
         }
     }
 
-    /// Says the tonic spikes before `t`, or at `t` too.
+    /// Emits the tonic spikes before `t` (with `at_too` also at `t`).
     fn speak(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         let Some(every) = self.every else { return };
         while let Some(&(due, level, since)) = self.due.front()

@@ -1,20 +1,20 @@
-//! An encoder at work whose spikes are handed on as trains, a piece at a time.
+//! An encoder that returns its spikes as trains, a piece at a time.
 
 use super::{Encoder, Stream};
 use crate::spikes::ms;
 use crate::{Array, EventsView, FramesView, Result, Spike, SpikeTrains, problem};
 
-/// Takes a recording piece by piece; each gives the spikes that are certain then, in a window that begins where the last
-/// one ended.
+/// Encodes a recording piece by piece; each call returns the spikes that are certain by then, in a window that begins
+/// where the previous one ended.
 pub struct Pieces {
     array: Array,
     stream: Box<dyn Stream>,
-    /// Up to where spikes were handed on, ms.
+    /// End of the last window, ms.
     known: Option<f64>,
 }
 
 impl Pieces {
-    /// Begins to encode what an array feels.
+    /// Starts to encode the input of an array.
     ///
     /// # Errors
     ///
@@ -23,7 +23,7 @@ impl Pieces {
         Ok(Self { stream: encoder.stream(&array)?, array, known: None })
     }
 
-    /// Takes the next events.
+    /// Encodes the next events.
     ///
     /// # Errors
     ///
@@ -34,11 +34,11 @@ impl Pieces {
         self.piece(&out, events.t.first().copied(), events.t.iter().max().map(|&t| ms(t)))
     }
 
-    /// Takes the next pictures.
+    /// Encodes the next pictures.
     ///
     /// # Errors
     ///
-    /// As [`FramesView::check`] and [`Stream::push_frame`]; `Problem` where they are another array's.
+    /// As [`FramesView::check`] and [`Stream::push_frame`]; `Problem` if they are another array's.
     pub fn push_frames(&mut self, frames: FramesView<'_>) -> Result<SpikeTrains> {
         let (own, given) = ((self.array.rows, self.array.columns), (frames.array.rows, frames.array.columns));
         if given != own {
@@ -58,35 +58,35 @@ impl Pieces {
         self.piece(&out, frames.t.first().copied(), frames.t.last().map(|&t| ms(t)))
     }
 
-    /// Says that nothing will come any more before `t` us (exclusive).
+    /// Advances the time: no input before `t` us (exclusive) will follow.
     ///
     /// # Errors
     ///
-    /// None that pushing had not.
+    /// Those of pushing input.
     pub fn advance(&mut self, t: i64) -> Result<SpikeTrains> {
         let mut out = vec![];
         self.stream.advance(t, &mut out);
         self.piece(&out, None, Some(ms(t)))
     }
 
-    /// Says that nothing more will come, as [`Stream::finish`].
+    /// Ends the input, as [`Stream::finish`].
     ///
     /// # Errors
     ///
-    /// None that pushing had not.
+    /// Those of pushing input.
     pub fn finish(&mut self) -> Result<SpikeTrains> {
         let mut out = vec![];
         let end = self.stream.finish(&mut out);
         self.piece(&out, None, end)
     }
 
-    /// How many events came too far behind the stream's time.
+    /// Number of events that were too far behind the stream's time.
     #[must_use]
     pub fn late(&self) -> u64 {
         self.stream.late()
     }
 
-    /// The spikes of a piece, with the window from where the last piece ended to `until` ms.
+    /// The spikes of a piece, in the window from the end of the last piece to `until` ms.
     fn piece(&mut self, out: &[Spike], first: Option<i64>, until: Option<f64>) -> Result<SpikeTrains> {
         let start = self.known.or(first.map(ms)).unwrap_or(0.0);
         let stop = until.map_or(start, |until| until.max(start));

@@ -1,17 +1,17 @@
-//! x^alpha for a block of channels at once (equation 5.1).
+//! Computes x^alpha for a block of channels at once (equation 5.1).
 //!
-//! The standard library's `powf` takes one value at a time and differs between machines in the last place. This is
-//! 2^(alpha log2 x) by series, in f64 with plain additions, multiplications and one division: the same everywhere,
-//! within 4e-15 of the true value, and in vectors.
+//! The standard library's `powf` takes one value at a time and differs between machines in the last place. This
+//! function computes 2^(alpha log2 x) by series, in f64 with additions, multiplications and one division: it
+//! vectorises, returns the same bits on every machine, and is within 4e-15 of the true value.
 
 use std::f64::consts::{LN_2, SQRT_2};
 
 use super::blocks::{BLOCK, Block};
 
-/// A number to which this one is added, and then subtracted, is rounded to a whole number.
+/// Adding this constant and subtracting it again rounds a number to a whole number.
 const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
 
-/// Its lowest bits show a whole number from 0 that is added to it.
+/// Adding a whole number from 0 on to this constant stores the number in the lowest bits of the sum.
 const WHOLE: f64 = 4_503_599_627_370_496.0; // 2^52
 
 /// x^alpha for alpha > 0; values below 0 count as 0.
@@ -37,7 +37,7 @@ fn power_of(x: f64, alpha: f64) -> f64 {
         series = series * q + 1.0 / k;
     }
     let small = alpha * (2.0 / LN_2) * s * series;
-    // The exponent as f64, by way of its bits: few machines have a vector instruction for i64 to f64.
+    // Converts the exponent to f64 through its bits: few machines have a vector instruction for i64 to f64.
     let whole = f64::from_bits(WHOLE.to_bits() | biased) - (WHOLE + 1023.0);
     // 2^y = 2^n * e^(f ln 2) with |f| <= 1/2.
     let large = alpha * whole;

@@ -1,22 +1,22 @@
-//! What the afferents of touch share: a linear filter of pressure, and a threshold that each spike raises.
+//! The common part of the afferents of touch: a linear filter of pressure, and a threshold that each spike raises.
 //!
-//! A filter makes the potential `u` of what is felt; a spike comes where `u` reaches `threshold + a`, raises `a` by
-//! `jump` and forbids another for the refractory time; `a` decays. Nothing is reset (the neuron with a moving threshold
-//! of Kobayashi, Tsubota and Shinomoto 2009, Front. Comput. Neurosci. 3:9, with one time constant).
+//! A filter computes the potential `u` from the input. A spike is emitted when `u` reaches `threshold + a`; it raises
+//! `a` by `jump` and prevents another for the refractory time; `a` decays. The potential is not reset (the neuron with
+//! a moving threshold of Kobayashi, Tsubota and Shinomoto 2009, Front. Comput. Neurosci. 3:9, with one time constant).
 //!
-//! Between samples pressure counts as a straight line, on which each stage of a filter is exact; where within a sample
-//! the threshold was reached is found on a straight line as well, and what the spike leaves behind decays from there. So
-//! rates do not depend on the sampling period as long as it is short beside the filter.
+//! Between samples the pressure is taken as linear, for which each stage of a filter is exact. The time of a spike
+//! within a sample is found by linear interpolation of `u` as well, and the threshold's rise decays from that time.
+//! Therefore rates do not depend on the sampling period as long as it is short compared with the filter.
 
 use super::blocks::{BLOCK, Block, Next, blocks};
 use super::sampled::Rule;
 use crate::Spike;
 use crate::spikes::ms;
 
-/// One number a channel of a block.
+/// One number per channel of a block.
 pub(super) type Lanes = [f64; BLOCK];
 
-/// A first-order low pass over one sample, exact for an input that is a straight line between samples.
+/// A first-order low-pass filter over one sample, exact for an input that is linear between samples.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LowPass {
     keep: f64,
@@ -31,33 +31,34 @@ impl LowPass {
         Self { keep, before: mean - keep, now: 1.0 - mean }
     }
 
-    /// The next output, of the last one and the inputs before and now.
+    /// The next output, from the previous output and the inputs before and now.
     #[inline(always)]
     pub(super) fn step(self, last: f64, before: f64, now: f64) -> f64 {
         self.keep * last + self.before * before + self.now * now
     }
 }
 
-/// How an afferent turns pressure, in shares of the range, into the potential that is compared with its threshold.
+/// Filter from pressure, as a fraction of the range, to the potential that is compared with the threshold.
 pub(super) trait Filter: Send + Clone + 'static {
-    /// Of the channels of one block.
+    /// The state of the channels of one block.
     type State: Send + Clone + 'static;
 
-    /// The state in which `x` has always been, and the potential then.
+    /// The state after a constant input `x`, and the potential in it.
     fn settled(&self, x: &Lanes) -> (Self::State, Lanes);
 
-    /// Takes the next sample of a channel whose potential was `u`; gives the potential. With `SEE`, sets bits of `moved`
-    /// where anything that it holds did.
+    /// Processes the next sample of a channel whose potential was `u`; returns the potential. With `SEE`, sets the bits
+    /// of `moved` for the lanes whose state changed.
     fn step<const SEE: bool>(&self, state: &mut Self::State, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64;
 
-    /// Whether its spikes depend on values, and not on changes alone: then a value that a state repaired counts as any other.
+    /// Whether the afferent encodes values, and not only changes; if so, a value that a state repaired counts as any
+    /// other.
     const SIGNALS_VALUES: bool = false;
 
-    /// Moves what it holds of one channel by a difference that was there before, so that it is no change.
+    /// Shifts the state of one channel by a difference that existed before, so that it does not count as a change.
     fn shift(&self, _state: &mut Self::State, _lane: usize, _by: f64) {}
 }
 
-/// When an afferent fires; potentials in shares of the range, times in ms.
+/// The firing rule of an afferent; potentials are fractions of the range, times are in ms.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Firing {
     pub(super) threshold: f64,
@@ -67,29 +68,29 @@ pub(super) struct Firing {
     pub(super) period_ms: f64,
 }
 
-/// Below this share of the range a raised threshold counts as recovered.
+/// Below this fraction of the range a raised threshold counts as recovered.
 const RECOVERED: f64 = 1e-12;
 
-/// The afferents of one block; on cache lines' borders, so that no vector straddles two.
+/// The afferents of one block, aligned to cache lines so that no vector crosses a boundary.
 #[derive(Clone)]
 #[repr(align(64))]
 struct Afferent<S> {
     state: S,
     u: Lanes,
-    /// How much the threshold is raised.
+    /// The current rise of the threshold.
     raised: Lanes,
-    /// The time for which no spike may follow yet, ms.
+    /// The remaining refractory time, ms.
     wait: Lanes,
-    /// Whether a sample without change would leave all this as it is, and fire nothing.
+    /// Whether a sample without change would leave this state unchanged and emit no spike.
     still: bool,
 }
 
-/// The afferents of one type, a block at a time.
+/// The afferents of one type, in blocks.
 #[derive(Clone)]
 pub(super) struct Afferents<F: Filter> {
     filter: F,
     firing: Firing,
-    /// The factor by which the raise of the threshold decays in one sample.
+    /// The factor by which the rise of the threshold decays in one sample.
     keep: f64,
     blocks: Vec<Afferent<F::State>>,
 }
@@ -99,7 +100,7 @@ impl<F: Filter> Afferents<F> {
         Self { filter, firing, keep: (-firing.period_ms / firing.recovery_ms).exp(), blocks: vec![] }
     }
 
-    /// Begins as if these pressures had always been: whatever fires by them is about to.
+    /// Sets the state after constant input of these pressures; afferents above their threshold fire at the next sample.
     pub(super) fn begin<'a>(&mut self, x: impl Iterator<Item = &'a Lanes>) {
         let threshold = self.firing.threshold;
         self.blocks = x
@@ -111,13 +112,13 @@ impl<F: Filter> Afferents<F> {
             .collect();
     }
 
-    /// Whether a block would stay as it is where its pressures do.
+    /// Whether a block's state stays unchanged while its pressures do.
     #[inline(always)]
     pub(super) fn is_still(&self, block: usize) -> bool {
         self.blocks[block].still
     }
 
-    /// Moves what a channel holds by a difference that was there before.
+    /// Shifts the state of a channel by a difference that existed before.
     fn shift(&mut self, channel: usize, by: f64) {
         if !F::SIGNALS_VALUES {
             self.filter.shift(&mut self.blocks[channel / BLOCK].state, channel % BLOCK, by);
@@ -128,8 +129,9 @@ impl<F: Filter> Afferents<F> {
         self.blocks.iter().all(|b| b.still)
     }
 
-    /// Processes a block's next sample, `x` of each lane; calls `fired` with the lanes that fire. With `SEE`, determines whether
-    /// the block is still from here on; else the block counts as moved, which is safe.
+    /// Processes a block's next sample, `x` for each lane; calls `fired` with the lanes that fire. With `SEE`,
+    /// determines whether the block is still from here on; otherwise the block counts as moving, which is always
+    /// correct but slower.
     #[inline(always)]
     pub(super) fn sample<const SEE: bool>(
         &mut self,
@@ -165,7 +167,8 @@ impl<F: Filter> Afferents<F> {
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
-            // Where on the straight line from below to above the threshold, or as soon as it may fire again.
+            // The time of the spike: where linear interpolation reaches the threshold, or the end of the refractory
+            // time if that is later.
             let above = afferent.u[lane] - threshold - afferent.raised[lane];
             let crossed = if below[lane] > 0.0 { period_ms * below[lane] / (below[lane] + above) } else { 0.0 };
             let since = period_ms - crossed.max(waited[lane]);
@@ -176,11 +179,11 @@ impl<F: Filter> Afferents<F> {
     }
 }
 
-/// Afferents of one type, one a taxel.
+/// Afferents of one type, one per taxel.
 #[derive(Clone)]
 pub(super) struct ByTaxel<F: Filter> {
     afferents: Afferents<F>,
-    /// Shares of the range a unit of pressure.
+    /// Factor from the sensor's unit to fractions of the range.
     scale: f64,
     channels: usize,
 }
@@ -191,7 +194,7 @@ impl<F: Filter> ByTaxel<F> {
     }
 }
 
-/// A pressure in shares of the range; what lies below 0 counts as 0.
+/// Converts a pressure to a fraction of the range; negative values count as 0.
 #[inline(always)]
 fn share(scale: f64, pressure: f32) -> f64 {
     f64::from(pressure.max(0.0)) * scale
@@ -241,7 +244,7 @@ mod tests {
     use crate::encode::fa2::Fa2;
     use crate::encode::slow::Slow;
 
-    /// Each channel by itself, at every sample, whether anything changed or not.
+    /// Reference for the tests: computes each channel alone, at every sample, whether it changed or not.
     fn plainly<F: Filter>(filter: &F, firing: Firing, pictures: &[Vec<f64>]) -> Vec<Spike> {
         let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms } = firing;
         let mut out = vec![];
@@ -269,8 +272,8 @@ mod tests {
         out
     }
 
-    /// Compares blocks, of which only those that move are computed, with channels one by one; gives how many spikes came, and
-    /// how often a block was left out.
+    /// Compares blocks, of which only those that move are computed, with channels computed one by one; returns the
+    /// number of spikes, and the number of blocks that were skipped.
     fn holds<F: Filter>(filter: &F, firing: Firing, rng: &mut StdRng) -> [usize; 2] {
         let (channels, range) = (rng.random_range(1..150), 150.0);
         let (noise, changing) = (10_f64.powf(rng.random_range(-6.0..2.5)), rng.random_range(0.0..1.0));
@@ -278,7 +281,7 @@ mod tests {
         let (mut left, mut moving) = (0, true);
         let pictures: Vec<Vec<Block>> = (0..800)
             .map(|_| {
-                // Stretches in which all, some or none of the channels move.
+                // Starts a new stretch, in which all, some or none of the channels move.
                 if left == 0 {
                     (left, moving) = (rng.random_range(1..500), rng.random_bool(0.5));
                 }

@@ -1,4 +1,4 @@
-//! A channel's own range: percentiles of a past window, renewed now and then.
+//! The running range of a channel: percentiles of a past window, updated periodically.
 
 use std::collections::VecDeque;
 
@@ -10,56 +10,41 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};
 
-/// Levels as shares of a channel's running range, y = (x - low) / (high - low), against drift and unknown gain.
+/// Levels as fractions of a channel's running range, y = (x - low) / (high - low), which compensates drift and unknown
+/// gain.
 ///
-/// `low` and `high` are percentiles (linear between ranks) of the samples of the window that ends, exclusive, at the
-/// last renewal. Renewals stand at the first sample plus the window plus whole `renew_s`.
+/// `low` and `high` are percentiles (linear between ranks) of the samples in the window that ends, exclusive, at the
+/// last update. Updates take place at the time of the first sample plus the window plus multiples of `renew_s`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct RunningRange {
-    /// The percentile that reads 0, from 0; default 10.
-    #[serde(default = "ten")]
+    /// The percentile that maps to 0, from 0; default 10.
     pub low: f64,
-    /// The percentile that reads 1, to 100; default 95.
-    #[serde(default = "ninety_five")]
+    /// The percentile that maps to 1, to 100; default 95.
     pub high: f64,
-    /// How long the window is, s; default 10.
-    #[serde(default = "ten")]
+    /// Length of the window, s; default 10.
     pub window_s: f64,
-    /// How often the percentiles are renewed, s; default 1.
-    #[serde(default = "one")]
+    /// Interval between updates of the percentiles, s; default 1.
     pub renew_s: f64,
-    /// What happens until the first window is full.
-    #[serde(default)]
+    /// How samples before the end of the first window are treated.
     pub first_window: FirstWindow,
 }
 
-/// What a running range does until its first window is full.
+/// How a running range treats the samples before the end of its first window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FirstWindow {
-    /// Says nothing; the encoder begins, settled, with the first sample after it.
+    /// Emits nothing; the encoder starts with the first sample after the window, without a crossing.
     #[default]
     Silent,
-    /// Is read by its own percentiles once it is full: for recordings, as its spikes come late by up to the window.
+    /// Encodes the window by its own percentiles once it is complete: for recordings, because spikes are late by up to
+    /// the window.
     Itself,
-}
-
-fn ten() -> f64 {
-    10.0
-}
-
-fn ninety_five() -> f64 {
-    95.0
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 impl Default for RunningRange {
     fn default() -> Self {
-        Self { low: ten(), high: ninety_five(), window_s: ten(), renew_s: one(), first_window: FirstWindow::default() }
+        Self { low: 10.0, high: 95.0, window_s: 10.0, renew_s: 1.0, first_window: FirstWindow::default() }
     }
 }
 
@@ -71,7 +56,7 @@ impl RunningRange {
         renew_s: "s", Range::WHOLE_US_IN_S;
     }
 
-    /// Its parameters, with their defaults and ranges.
+    /// The parameters, with their defaults and ranges.
     #[must_use]
     pub fn described() -> Described {
         Described::by(&Self::default(), &[], Self::RANGES)
@@ -81,7 +66,7 @@ impl RunningRange {
     ///
     /// # Errors
     ///
-    /// `Problem`, naming the parameter, its value and what would be right.
+    /// `Problem`, naming the parameter, its value and what is valid.
     pub fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.low >= self.high {
@@ -92,7 +77,7 @@ impl RunningRange {
     }
 }
 
-/// The samples of the last window.
+/// The samples of the last window, and the time of the next update.
 #[derive(Clone)]
 pub(super) struct Window {
     low: f64,
@@ -101,18 +86,18 @@ pub(super) struct Window {
     renew: i64,
     replay: bool,
     samples: VecDeque<(i64, Vec<Block>)>,
-    /// When the percentiles are next reckoned; `None` before the first sample.
+    /// When the percentiles are next computed; `None` before the first sample.
     next: Option<i64>,
     full: bool,
     blocks: usize,
 }
 
-/// The first window, once it is full.
+/// The first window, once it is complete.
 #[derive(Clone)]
 pub(super) struct First {
-    /// Low and high by channel.
+    /// Low and high of each channel.
     pub(super) ranges: Vec<(f64, f64)>,
-    /// Its samples, where it is to be read by its own percentiles.
+    /// The window's samples, if they are to be encoded by its own percentiles.
     pub(super) samples: Vec<(i64, Vec<Block>)>,
 }
 
@@ -135,7 +120,7 @@ impl Window {
         self.full
     }
 
-    /// Takes a sample, after it was read.
+    /// Adds a sample to the window, after it was encoded.
     pub(super) fn take(&mut self, t: i64, held: &[Block]) {
         self.next.get_or_insert(t + self.length);
         self.samples.push_back((t, held.to_vec()));
@@ -150,7 +135,7 @@ impl Window {
         Some(First { ranges: self.percentiles(), samples })
     }
 
-    /// New low and high by channel, if a renewal fell due up to `t` and its window is not empty.
+    /// The new low and high of each channel, if an update was due by `t` and its window is not empty.
     pub(super) fn renewed(&mut self, t: i64) -> Option<Vec<(f64, f64)>> {
         let due = self.next.filter(|&due| self.full && t >= due)?;
         let latest = due + (t - due) / self.renew * self.renew;

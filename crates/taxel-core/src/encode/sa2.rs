@@ -1,14 +1,14 @@
-//! SA-2: the slowly adapting afferent of large fields, which fires steadily under a held load.
+//! SA-2: the slowly adapting afferent with large fields, which fires steadily under a constant load.
 
 use super::slow::slowly_adapting;
 
 slowly_adapting! {
-    /// The SA-2 afferent (Ruffini): less sensitive than SA-1, steadier, and hardly faster when pressed anew.
+    /// The SA-2 afferent (Ruffini): less sensitive than SA-1, with a steadier rate and a small onset response.
     ///
-    /// It feels the stretch of skin above all, and an array of pressure has none to give: what is here is its answer to
-    /// load. Filter and threshold are SA-1's. It is four times less sensitive (Table 1 of Weiss et al. 2009,
-    /// J. Neurophysiol. 101:1033); that it answers more steadily and with less of an onset than SA-1 (Johansson and Vallbo
-    /// 1983, Trends Neurosci. 6:27) has no number there: `onset` and `loss` are half of SA-1's and less, our choice.
-    /// One unsigned train a taxel.
+    /// SA-2 responds mainly to stretch of the skin, which an array of pressure sensors does not measure: this model is
+    /// its response to load. Filter and threshold are those of SA-1. It is four times less sensitive (Table 1 of Weiss
+    /// et al. 2009, J. Neurophysiol. 101:1033). Johansson and Vallbo (1983, Trends Neurosci. 6:27) describe a steadier
+    /// response with less of an onset than SA-1's, without numbers: `onset` and `loss` are half of SA-1's or less, our
+    /// choice. One unsigned train per taxel.
     Sa2, threshold: 0.16, onset: 0.25, loss: 0.2
 }

@@ -1,7 +1,7 @@
-//! Encoders that read pressure: pictures as they come, or held intensities sampled at a fixed period.
+//! Encoders of pressure: they read each picture, or current intensities sampled at a fixed period.
 //!
-//! A [`Rule`] computes one encoder's law and reads neither events nor pieces; [`Sampled`] passes it the samples, and
-//! the blocks that did not change since the last sample, which a rule can skip.
+//! A [`Rule`] implements one encoder and does not depend on events or pieces; [`Sampled`] passes it the samples and
+//! marks the blocks that did not change since the last sample, which a rule can skip.
 
 use super::blocks::{BLOCK, Block, Next, blocks, in_blocks};
 use super::channels::{Channels, FARTHEST};
@@ -16,38 +16,41 @@ use crate::spikes::{ms, us};
 use crate::vectors::wide;
 use crate::{Array, EventsView, Result, Spike, problem};
 
-/// What an encoder does with samples; `sample` and `pass` are `#[inline(always)]`, to be compiled for wider vectors.
+/// How an encoder processes samples; `sample` and `pass` are `#[inline(always)]`, so that they are compiled for wider
+/// vectors.
 ///
-/// Channels are the existing taxels in the order of their index. The last block is filled up with channels that always read 0 and must never spike.
+/// Channels are the existing taxels in the order of their index. Padding channels of the last block always read 0 and
+/// must never spike.
 pub(super) trait Rule: Send + Clone + 'static {
-    /// The first sample: the encoder begins as if the array had always read it.
+    /// Processes the first sample: the state is that of a constant input equal to it.
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
 
-    /// A later sample; only blocks that `changed` differ from the last one. Everything before `t` was passed.
+    /// Processes a later sample; only blocks that `changed` differ from the last one. `pass` was called up to `t`.
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>);
 
     /// Whether a block takes so long to compute that the rule prefetches parts of the `next` picture between blocks.
     const ASKS: bool = false;
 
-    /// Emits the spikes that fall due before `t` (exclusive) while the last sample holds.
+    /// Emits the spikes that are due before `t` (exclusive) while the last sample holds.
     fn pass(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
 
-    /// Whether a value that a state repaired gives spikes. In a rule of changes it does not, as the time of the change is not
-    /// known: the rule's reference moves with the value ([`Rule::repair`]).
+    /// Whether a value that a state repaired causes spikes. A rule that encodes changes sets it to false, because the
+    /// time of the change is not known: its reference then moves with the value ([`Rule::repair`]).
     const SPIKES_OF_REPAIRED: bool = true;
 
-    /// A state reports that a channel which read `from` reads `to`, and did so before: that gives no spike.
+    /// Notes that a state reports the value `to` for a channel whose value was `from`, with the change in the past;
+    /// causes no spike.
     fn repair(&mut self, _channel: usize, _from: f32, _to: f32) {}
 
-    /// A channel, whose block counts as changed in the next sample, rests at `rest` from there on.
+    /// Sets a channel's rest from now on; the channel's block counts as changed in the next sample.
     fn set_rest(&mut self, _channel: usize, _rest: f64) {}
 
-    /// The rest of a channel; `None` where that is not known, or the rule reads no tare.
+    /// The rest of a channel; `None` if it is not known, or if the rule uses no tare.
     fn rest(&self, _channel: usize) -> Option<f64> {
         None
     }
 
-    /// Whether the last sample, if it holds, gives no spike any more, so that samples without change may be left out.
+    /// Whether the last sample causes no further spikes while it holds, so that unchanged samples can be skipped.
     fn idle(&self) -> bool;
 }
 
@@ -77,19 +80,19 @@ wide! {
 pub(super) enum Source {
     Unknown,
     Events {
-        /// The time come to: nothing counts as of before it any more.
+        /// Current time of the stream: later input counts as of this time or later.
         present: i64,
-        /// How many came too far behind it.
+        /// Number of events that were too far behind the current time.
         late: u64,
     },
     Frames {
-        /// The first time at which a frame may still come.
+        /// The earliest time that the next frame may have.
         open: i64,
     },
 }
 
 impl Source {
-    /// Takes the times of events; gives the time come to before them, `None` where there is no event.
+    /// Advances the time by events; returns the time before them, `None` if there is no event.
     pub(super) fn events(&mut self, times: &[i64]) -> Result<Option<i64>> {
         let Some(&first) = times.first() else { return Ok(None) };
         let (before, mut late) = match *self {
@@ -106,12 +109,12 @@ impl Source {
         Ok(Some(before))
     }
 
-    /// How many events came too far behind the time come to.
+    /// Number of events that were too far behind the current time.
     pub(super) fn late(&self) -> u64 {
         if let Source::Events { late, .. } = self { *late } else { 0 }
     }
 
-    /// Takes the time of a frame.
+    /// Advances the time by a frame.
     pub(super) fn frame(&mut self, t: i64) -> Result<()> {
         match *self {
             Source::Events { .. } => return Err(problem!("frame at {t} us: this stream was begun with events")),
@@ -126,10 +129,10 @@ impl Source {
     }
 }
 
-/// A rule fed with samples: each frame is one; events are read as held intensities every `period`.
+/// Feeds a rule with samples: each frame is one; events are sampled as current intensities every `period`.
 ///
-/// The samples of events stand at the first stamp plus whole periods, and each holds what came up to and at its time.
-/// A taxel reads 0 until its first event. An event behind the latest stamp (reordered datagrams) counts as of that stamp.
+/// Samples of events are at the first stamp plus whole periods, and each includes the events up to and at its time. A
+/// taxel reads 0 until its first event. An event behind the latest stamp (reordered datagrams) counts as of that stamp.
 #[derive(Clone)]
 pub(super) struct Sampled<R> {
     rule: R,
@@ -151,13 +154,14 @@ pub(super) struct Sampled<R> {
     above: Option<Above>,
 }
 
-/// What stands above rest, for a rule that feels held pressure: 0 where a taxel reads less, or where its rest is not known.
+/// Values above rest, for a rule that encodes sustained pressure: 0 if a taxel's value is below its rest, or if the
+/// rest is not known.
 #[derive(Clone)]
 struct Above {
     rest: Rest<f64>,
-    /// What each place reads.
+    /// The current value of each place.
     held: Held<f32>,
-    /// A picture of what stands above.
+    /// A picture of the values above rest.
     picture: Vec<f32>,
 }
 
@@ -168,7 +172,7 @@ impl Above {
 }
 
 impl<R: Rule> Sampled<R> {
-    /// Samples for a rule, whose law says how many trains it has, whether they are signed, and how late they come.
+    /// Feeds a rule with samples; `law` defines the number of trains, whether they are signed, and the latency.
     pub(super) fn new(law: &impl Law, rule: R, array: &Array, period_ms: f64) -> Result<Self> {
         let channels = Channels::new(array);
         let n = blocks(channels.len());
@@ -191,7 +195,7 @@ impl<R: Rule> Sampled<R> {
         })
     }
 
-    /// Gives the rule values above rest, where there is a tare.
+    /// Passes the rule values above rest, if there is a tare.
     pub(super) fn above(mut self, tare: Option<&Tare>, array: &Array) -> Result<Self> {
         if let Some(tare) = tare {
             let (rest, n) = (tare.rest_of(array)?, array.len());
@@ -200,7 +204,7 @@ impl<R: Rule> Sampled<R> {
         Ok(self)
     }
 
-    /// Frames must come at the period, give or take half of it.
+    /// Requires frames to arrive at the period, within half of it.
     pub(super) fn steady(mut self) -> Self {
         self.steady = true;
         self
@@ -219,7 +223,7 @@ impl<R: Rule> Sampled<R> {
         self.quiet = true;
     }
 
-    /// Takes all samples of events before `t`.
+    /// Processes all samples of events before `t`.
     fn sample_until(&mut self, t: i64, out: &mut Vec<Spike>) {
         while self.next < t {
             if self.quiet && self.begun && self.rule.idle() {
@@ -334,7 +338,7 @@ impl<R: Rule> Stream for Sampled<R> {
             Some(above) if values.len() == above.picture.len() => {
                 above.held.values_mut().copy_from_slice(values);
                 for (place, &read) in values.iter().enumerate() {
-                    // What is not finite stays so, and is refused.
+                    // Infinite values and NaN stay, so that they are refused below.
                     above.picture[place] = if read.is_finite() { above.of(place) } else { read };
                 }
                 &above.picture
@@ -362,7 +366,7 @@ impl<R: Rule> Stream for Sampled<R> {
     }
 
     fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64> {
-        // Rounded up, so that a spike that is due exactly after the latency is in.
+        // Rounded up, to include a spike that is due exactly after the latency.
         let latency = us(self.latency_ms).ceil() as i64;
         let end = match self.source {
             Source::Unknown => return None,

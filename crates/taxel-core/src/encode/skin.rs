@@ -1,4 +1,4 @@
-//! A skin: afferents of all four types, each in a place of its own, on one array.
+//! A skin: afferents of all four types at drawn positions on one array.
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -21,44 +21,45 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};
 
-/// SA-1, FA-1, SA-2 and FA-2 afferents at given densities, in places that a seed draws; each feels a field of taxels.
+/// SA-1, FA-1, SA-2 and FA-2 afferents with given densities, at positions drawn by a seed; each has a field of taxels.
 ///
-/// Densities are those of a fingertip: 70, 140 and 25 a cm^2 of SA-1, FA-1 and FA-2, and for SA-2 what these leave of 241
-/// in all (Johansson and Vallbo 1979, J. Physiol. 286:283; the three as Saal et al. 2017, PNAS 114:E5693, use them). Field
-/// areas: medians of 11.0 mm^2 for SA-1 and 12.6 for FA-1, some 5 times as much for SA-2 and 10 times for FA-2 (Johansson
-/// and Vallbo 1980, Brain Res. 184:353). Within its field, a disc, an afferent feels the mean of the taxels, weighed by a
-/// Gaussian whose second standard deviation is the field's edge: that shape is our choice. Where no taxel's centre lies
-/// in its field it feels the taxel on which it stands. Each type is the encoder of its name with its defaults and this
-/// `range`; FA-1's threshold decays by the ms, so that the sampling period matters as little as it can.
+/// The densities are those of a fingertip: 70, 140 and 25 per cm^2 for SA-1, FA-1 and FA-2, and for SA-2 the remainder
+/// of a total of 241 (Johansson and Vallbo 1979, J. Physiol. 286:283; the three as used by Saal et al. 2017, PNAS
+/// 114:E5693). Field areas: medians of 11.0 mm^2 for SA-1 and 12.6 for FA-1, some 5 times as much for SA-2 and 10 times
+/// for FA-2 (Johansson and Vallbo 1980, Brain Res. 184:353). The input of an afferent is the mean of the taxels in its
+/// field, a disc, weighted by a Gaussian whose second standard deviation is the field's edge; this shape is our choice.
+/// If the field contains no taxel's centre, the input is the taxel at the afferent's position. Each type is the encoder
+/// of its name with its defaults and this `range`; FA-1's threshold decays per ms, so that the sampling period matters
+/// as little as possible.
 ///
-/// Trains, unsigned as a nerve's spikes are: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to the last.
+/// Trains, unsigned as a nerve's spikes: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to the last.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skin {
-    /// SA-1 afferents a cm^2 of taxels.
+    /// Density of SA-1 afferents, per cm^2 of taxels.
     pub sa1_per_cm2: f64,
-    /// FA-1 afferents a cm^2.
+    /// Density of FA-1 afferents, per cm^2.
     pub fa1_per_cm2: f64,
-    /// SA-2 afferents a cm^2.
+    /// Density of SA-2 afferents, per cm^2.
     pub sa2_per_cm2: f64,
-    /// FA-2 afferents a cm^2.
+    /// Density of FA-2 afferents, per cm^2.
     pub fa2_per_cm2: f64,
-    /// The field of an SA-1 afferent, mm^2.
+    /// Area of an SA-1 afferent's field, mm^2.
     pub sa1_field_mm2: f64,
-    /// The field of an FA-1 afferent, mm^2.
+    /// Area of an FA-1 afferent's field, mm^2.
     pub fa1_field_mm2: f64,
-    /// The field of an SA-2 afferent, mm^2.
+    /// Area of an SA-2 afferent's field, mm^2.
     pub sa2_field_mm2: f64,
-    /// The field of an FA-2 afferent, mm^2.
+    /// Area of an FA-2 afferent's field, mm^2.
     pub fa2_field_mm2: f64,
     /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
     pub range: f64,
-    /// What draws the places.
+    /// Seed of the positions.
     pub seed: u64,
-    /// How often events are sampled, ms, at most 1; frames must come at it, give or take half.
+    /// Sampling period of events, ms, at most 1; frames must arrive at this period, within half of it.
     pub period_ms: f64,
-    /// The taxels' rest, from which pressure counts; from 0 where there is none. It belongs to a board and a day: a saved
-    /// readout has none and is given one.
+    /// The taxels' rest, from which pressure is measured; 0 if there is none. It is valid for one board on one day: a
+    /// saved readout has none and receives one when it is used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tare: Option<Tare>,
 }
@@ -100,7 +101,7 @@ pub enum ReceptorKind {
 }
 
 impl ReceptorKind {
-    /// As people write it.
+    /// The type's name in the literature.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -112,18 +113,18 @@ impl ReceptorKind {
     }
 }
 
-/// An afferent of a skin: its type, and where it stands, mm from the middle of the first taxel.
+/// An afferent of a skin: its type, and its position, mm from the centre of the first taxel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
-    /// Its type.
+    /// Type of the afferent.
     pub kind: ReceptorKind,
-    /// To the right.
+    /// Distance to the right.
     pub x_mm: f64,
-    /// Downwards.
+    /// Distance downwards.
     pub y_mm: f64,
 }
 
-/// As many afferents as a skin may have.
+/// Most afferents of a skin.
 const MOST: usize = 1_000_000;
 
 impl Skin {
@@ -140,7 +141,7 @@ impl Skin {
         period_ms: "ms", Range::WHOLE_US.at_most(1.0);
     }
 
-    /// Type, density a cm^2 and field in mm^2, in the order of the trains.
+    /// Type, density per cm^2 and field in mm^2, in the order of the trains.
     fn types(&self) -> [(ReceptorKind, f64, f64); 4] {
         [
             (ReceptorKind::Sa1, self.sa1_per_cm2, self.sa1_field_mm2),
@@ -150,17 +151,17 @@ impl Skin {
         ]
     }
 
-    /// How many afferents of a density an array bears.
+    /// Number of afferents on an array at this density.
     fn count(array: &Array, density: f64) -> usize {
         let area_cm2 = Channels::new(array).len() as f64 * array.pitch_mm * array.pitch_mm / 100.0;
         (density * area_cm2).round() as usize
     }
 
-    /// All afferents on an array, a train each.
+    /// All afferents on an array, one per train.
     ///
     /// # Errors
     ///
-    /// `Problem` where a parameter makes no sense, or there would be more than a million.
+    /// `Problem` if a parameter is out of range, or if there would be more than a million afferents.
     pub fn afferents(&self, array: &Array) -> Result<Vec<Placed>> {
         self.check()?;
         let count = Law::trains(self, array);
@@ -171,10 +172,11 @@ impl Skin {
         let (mut all, taxels) = (vec![], places(array));
         for (kind, density, _) in self.types() {
             let count = Self::count(array, density);
-            // The types are drawn apart, so that a density changes no other type's places.
+            // Each type has its own random generator, so that a density changes no other type's positions.
             let mut draw = StdRng::seed_from_u64(self.seed.wrapping_mul(4).wrapping_add(kind as u64));
             for k in 0..count {
-                // One in each of as many equal parts of the taxels in their order: even, and from the first to the last.
+                // Splits the taxels, in their order, into as many equal parts and draws one position in each: an even
+                // distribution.
                 let at: f64 = draw.random();
                 let within = [draw.random::<f64>() - 0.5, draw.random::<f64>() - 0.5];
                 let part = ((k as f64 + at) / count as f64 * taxels.len() as f64) as usize;
@@ -225,11 +227,11 @@ impl Law for Skin {
     }
 }
 
-/// The channels that each afferent feels, with their weights.
+/// The channels in each afferent's field, with their weights.
 fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Vec<Vec<(u32, f32)>> {
     let taxels = places(array);
     let (pitch, edge) = (array.pitch_mm, (field_mm2 / std::f64::consts::PI).sqrt());
-    // Rows of the array are runs of channels: a field is looked for only in those that it can reach.
+    // Channels are consecutive within a row of the array; only the rows that a field can reach are searched.
     let rows: Vec<usize> =
         (0..=usize::from(array.rows)).map(|row| taxels.partition_point(|at| at[1] < row as f64)).collect();
     let of = |at: &&Placed| {
@@ -242,7 +244,7 @@ fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Vec<Vec<(u32, f32)
             let [column, line] = taxels[channel];
             let away = ((column - x).powi(2) + (line - y).powi(2)) * pitch * pitch;
             if away <= edge * edge {
-                // The edge is the second standard deviation.
+                // The edge is at the second standard deviation.
                 let weight = (-2.0 * away / (edge * edge)).exp();
                 field.push((channel as u32, weight as f32));
                 sum += weight;
@@ -260,14 +262,14 @@ fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Vec<Vec<(u32, f32)
     placed.iter().map(of).collect()
 }
 
-/// The afferents of one type with their fields.
+/// The afferents of one type, with their fields.
 #[derive(Clone)]
 struct Type<R> {
     rule: R,
-    /// Number of its first train.
+    /// Index of its first train.
     first: usize,
     fields: Fields,
-    /// What the afferent in each lane feels.
+    /// Input of the afferent in each lane.
     held: Vec<Block>,
     changed: Vec<bool>,
 }
@@ -306,7 +308,7 @@ impl<R: Rule> Type<R> {
         }
     }
 
-    /// A channel reads something else, and did so before.
+    /// Changes a channel's value as if the change were in the past.
     fn repair(&mut self, channel: usize, from: f32, to: f32) {
         if R::SPIKES_OF_REPAIRED {
             return;

@@ -1,9 +1,9 @@
-//! The filter of slowly adapting afferents, and how SA-1 and SA-2 are declared by it.
+//! The filter of slowly adapting afferents, and the macro that declares SA-1 and SA-2.
 
 use super::receptor::{Filter, Lanes, LowPass};
 
-/// `u = lowpass((1 + onset) x - onset y - loss z)`: pressure x, what it was within the last `onset_ms` (y) and within the
-/// last `loss_ms` (z), all low passes; the outer one has `membrane_ms`.
+/// `u = lowpass((1 + onset) x - onset y - loss z)`: x is the pressure, y and z are x filtered by low passes with
+/// `onset_ms` and `loss_ms`; the outer low pass has `membrane_ms`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slow {
     onset: f64,
@@ -63,7 +63,7 @@ impl Filter for Slow {
     }
 }
 
-/// Declares a slowly adapting afferent: its words, its name, and the defaults of what differs.
+/// Declares a slowly adapting afferent: its documentation, its name, and the defaults of the parameters that differ.
 macro_rules! slowly_adapting {
     ($(#[$about:meta])* $Kind:ident, threshold: $threshold:expr, onset: $onset:expr, loss: $loss:expr) => {
         use super::channels::Channels;
@@ -83,28 +83,28 @@ macro_rules! slowly_adapting {
         pub struct $Kind {
             /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
             pub range: f64,
-            /// Where it begins to fire, a share of `range`.
+            /// Threshold of the potential for a spike, as a fraction of `range`.
             pub threshold: f64,
-            /// How much more a pressure counts while it is new.
+            /// Additional weight of a pressure while it is new.
             pub onset: f64,
-            /// How long it counts as new, ms.
+            /// Time constant with which a pressure stops counting as new, ms.
             pub onset_ms: f64,
-            /// Which share of a pressure that lasts is lost in the end.
+            /// Fraction of a lasting pressure that adaptation removes in the end.
             pub loss: f64,
-            /// How long that takes, ms.
+            /// Time constant of this adaptation, ms.
             pub loss_ms: f64,
-            /// The membrane's time constant, ms.
+            /// Time constant of the membrane, ms.
             pub membrane_ms: f64,
-            /// By how much a spike raises the threshold, a share of `range`.
+            /// Amount by which a spike raises the threshold, as a fraction of `range`.
             pub jump: f64,
-            /// The time constant with which it sinks again, ms.
+            /// Time constant with which the threshold decays again, ms.
             pub recovery_ms: f64,
-            /// How long after a spike none can come, ms.
+            /// Refractory time after a spike, ms.
             pub refractory_ms: f64,
-            /// How often events are sampled, ms; frames must come at it, give or take half.
+            /// Sampling period of events, ms; frames must arrive at this period, within half of it.
             pub period_ms: f64,
-            /// The taxels' rest, from which pressure counts; from 0 where there is none. It belongs to a board and a day: a
-            /// saved readout has none and is given one.
+            /// The taxels' rest, from which pressure is measured; 0 if there is none. It is valid for one board on one
+            /// day: a saved readout has none and receives one when it is used.
             #[serde(skip_serializing_if = "Option::is_none")]
             pub tare: Option<Tare>,
         }

@@ -1,40 +1,41 @@
-//! An encoder at work, piece by piece.
+//! The interface of a running encoder.
 
 use crate::{EventsView, Result, Spike};
 
-/// An encoder that runs: it reads events or frames in order of time and passes spikes on as soon as they are certain.
+/// A running encoder: it reads events or frames in order of time and emits spikes as soon as they are certain.
 ///
-/// A stamp is over when a later one comes or when the caller moves time on with [`Stream::advance`]; what depends on a
-/// whole stamp is computed then, and its spikes have the stamp's time. So pieces and the whole give the same spikes,
-/// in the same order: by time, then by train.
+/// A stamp is complete when a later one arrives or when the caller advances time with [`Stream::advance`]. Values that
+/// depend on a whole stamp are computed then, and their spikes have the stamp's time. Therefore pieces and the whole
+/// recording give the same spikes in the same order: by time, then by train.
 pub trait Stream: Send {
     /// The number of the encoder's spike trains.
     fn trains(&self) -> usize;
 
-    /// Whether spikes carry a signed value (polarity, bits), to be split into ON and OFF for a neuron.
+    /// Whether spikes carry a signed value (polarity, bits), which a neuron receives as ON and OFF.
     fn signed(&self) -> bool;
 
-    /// How much later than the touch itself a spike comes, ms: what the encoder's own rule costs.
+    /// The latency that the encoder's own algorithm adds between a touch and its spike, ms.
     fn latency_ms(&self) -> f64;
 
-    /// Encodes the next events; one behind the time come to counts as of that time, far behind it also as [`Stream::late`].
+    /// Encodes the next events. An event behind the current time counts as of that time; one far behind it also counts
+    /// in [`Stream::late`].
     ///
     /// # Errors
     ///
-    /// `Problem` where the encoder needs intensities that are not there, or the stream was begun with frames.
+    /// `Problem` if the encoder needs intensities that are not there, or the stream was begun with frames.
     fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()>;
 
-    /// How long after an event that a state repaired its spikes come at the latest, ms; none of an encoder of changes, which
-    /// moves its reference with such an event and emits no spike.
+    /// The longest delay between an event that a state repaired and its spikes, ms; none for an encoder of changes,
+    /// which moves its reference with such an event and emits no spike.
     fn hears_repaired_ms(&self) -> Option<f64> {
         Some(self.latency_ms())
     }
 
-    /// From `t` us on the taxel at `place` (row by row) rests at `rest`. Comes after the events up to `t` and before later
-    /// ones; an encoder that reads no tare ignores it.
+    /// Sets the rest of the taxel at `place` (row by row) from `t` us on. To be called after the events up to `t` and
+    /// before later ones; an encoder that uses no tare ignores it.
     fn set_rest(&mut self, _t: i64, _place: usize, _rest: f64, _out: &mut Vec<Spike>) {}
 
-    /// The rest of the taxel at `place`; `None` where that is not known, or the encoder reads no tare.
+    /// The rest of the taxel at `place`; `None` if it is not known, or if the encoder uses no tare.
     fn rest(&self, _place: usize) -> Option<f64> {
         None
     }
@@ -43,20 +44,21 @@ pub trait Stream: Send {
     ///
     /// # Errors
     ///
-    /// `Problem` where the picture has another size, holds NaN, comes out of order, or the stream was begun with events.
+    /// `Problem` if the picture has another size, contains NaN or is out of order, or if the stream was begun with
+    /// events.
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()>;
 
-    /// Ends the input before `t` us (exclusive): nothing will come any more up to then.
+    /// Advances the time: no input before `t` us (exclusive) will follow.
     fn advance(&mut self, t: i64, out: &mut Vec<Spike>);
 
-    /// Ends the input: holds the latest values for one period and the latency, so that all spikes that are due come out.
-    /// Gives the end of that, ms, or `None` without any input.
+    /// Ends the input: holds the latest values for one period and the latency, so that all spikes that are due are
+    /// emitted. Returns the end of that time, ms, or `None` without any input.
     fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64>;
 
-    /// A copy that goes on by itself, to compute the spikes that would follow without further input.
+    /// An independent copy, to compute the spikes that would follow without further input.
     fn fork(&self) -> Box<dyn Stream>;
 
-    /// How many events came farther than [`FARTHEST_BACK_US`](crate::events::FARTHEST_BACK_US) behind the time come to.
+    /// Number of events more than [`FARTHEST_BACK_US`](crate::events::FARTHEST_BACK_US) behind the current time.
     fn late(&self) -> u64;
 }
 
@@ -66,7 +68,7 @@ impl Clone for Box<dyn Stream> {
     }
 }
 
-/// Spikes from place `from` on by time, then by train.
+/// Sorts the spikes from index `from` on by time, then by train.
 pub(super) fn sort_from(out: &mut [Spike], from: usize) {
     out[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
 }

@@ -1,4 +1,4 @@
-//! What taxels read at rest: of one board, on one day.
+//! The values of taxels at rest, for one board on one day.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,27 +6,27 @@ use crate::held::Held;
 use crate::rest::{Rest, Value};
 use crate::{Array, EventsView, FramesView, Result, problem, reading};
 
-/// The rest of each taxel: the mean by time of its held values over a stretch at rest.
+/// The rest of each taxel: the time average of its value over an interval without contact.
 ///
-/// Take it with the board's noise floor at 0, else a taxel's rest is known no better than the floor.
+/// Record it with the board's noise floor at 0; otherwise a taxel's rest is known only to within the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tare {
     /// The sensor.
     pub array: Array,
-    /// By place (`row * columns + column`), in the sensor's unit; `None` for a taxel without any event.
+    /// Rest by place (`row * columns + column`), in the sensor's unit; `None` for a taxel without any event.
     pub rest: Vec<Option<f64>>,
-    /// The stretch at rest begins, us.
+    /// Start of the interval at rest, us.
     pub start_us: i64,
-    /// It ends, us.
+    /// End of the interval, us.
     pub stop_us: i64,
-    /// Which board, which day.
+    /// A note, for example the board and the day.
     #[serde(default)]
     pub note: String,
 }
 
 impl Tare {
-    /// Checks that there is one rest a place, all finite.
+    /// Checks that there is one finite rest per place.
     ///
     /// # Errors
     ///
@@ -49,11 +49,11 @@ impl Tare {
         }
     }
 
-    /// What each taxel of an array rests at; not known where it does not exist.
+    /// The rest of each taxel of an array; unknown if the taxel does not exist.
     ///
     /// # Errors
     ///
-    /// `Problem` where the tare is of an array of another shape.
+    /// `Problem` if the tare is of an array of another shape.
     pub(super) fn rest_of(&self, array: &Array) -> Result<Rest<f64>> {
         let (of, to) = (&self.array, array);
         if (of.rows, of.columns) != (to.rows, to.columns) {
@@ -70,7 +70,7 @@ impl Tare {
         Ok(Rest::measured(self.rest.iter().enumerate().map(of_place).collect()))
     }
 
-    /// Takes a tare from events in order of time: of `start` to `stop` us, or of all of them.
+    /// Computes a tare from events in order of time, from `start` to `stop` us, or from all of them.
     ///
     /// # Errors
     ///
@@ -85,7 +85,7 @@ impl Tare {
         tare.finish(stop.unwrap_or_default(), note)
     }
 
-    /// Takes a tare from pictures: of `start` to `stop` us, or of all of them.
+    /// Computes a tare from pictures, from `start` to `stop` us, or from all of them.
     ///
     /// # Errors
     ///
@@ -104,7 +104,7 @@ impl Tare {
     ///
     /// # Errors
     ///
-    /// `Format` where it is no tare, `Problem` where its parts do not fit.
+    /// `Format` if the JSON is not a tare, `Problem` if its parts do not match.
     pub fn from_json(json: &str) -> Result<Self> {
         let tare: Self = reading::from_text(json).map_err(|unfit| crate::Error::Format(unfit.of("tare")))?;
         tare.check()?;
@@ -114,24 +114,24 @@ impl Tare {
     /// The tare as JSON.
     #[must_use]
     pub fn to_json(&self) -> String {
-        // Rests were checked to be finite, and nothing else in here can fail to be written.
+        // `check` guarantees finite rests, and nothing else here can fail to serialise.
         serde_json::to_string(self).unwrap_or_default()
     }
 }
 
-/// A taxel that a person zeroed: from then on it rests at what it held. Only a person zeroes taxels: done automatically, it would take standing
-/// contact for rest.
+/// A taxel that a person zeroed: from then on its rest is the value that it had. Taxels are never zeroed automatically,
+/// because sustained contact would be mistaken for rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Zeroing {
-    /// When, us: after all events up to then, before later ones.
+    /// Time, us: after all events up to it, before later ones.
     pub t: i64,
     /// The taxel's column.
     pub x: u16,
-    /// Its row.
+    /// The taxel's row.
     pub y: u16,
-    /// What it rests at from then on, in the sensor's unit.
+    /// The new rest, in the sensor's unit.
     pub rest: f64,
-    /// What it rested at before; `None` where that was not known.
+    /// The rest before; `None` if it was not known.
     pub before: Option<f64>,
 }
 
@@ -151,7 +151,7 @@ impl Zeroing {
     }
 }
 
-/// Takes a tare from what comes.
+/// Computes a tare from events or pictures as they arrive.
 pub struct TareBuilder {
     array: Array,
     start: Option<i64>,
@@ -163,16 +163,16 @@ pub struct TareBuilder {
 /// The integral of one taxel's held value over time since the start.
 #[derive(Clone, Copy, Default)]
 struct Integral {
-    /// Up to when it goes, us; `None` before the taxel's first event.
+    /// End of the integral, us; `None` before the taxel's first event.
     until: Option<i64>,
-    /// value times us.
+    /// Integral of the value over time, in the sensor's unit times us.
     area: f64,
-    /// us.
+    /// Duration of the integral, us.
     time: f64,
 }
 
 impl Integral {
-    /// Goes on to `t` us, up to which the taxel held `value`.
+    /// Extends the integral to `t` us; the taxel's value was `value` until then.
     fn extend(&mut self, t: i64, value: f64) {
         if let Some(until) = self.until {
             let time = (t - until).max(0) as f64;
@@ -184,24 +184,24 @@ impl Integral {
 }
 
 impl TareBuilder {
-    /// Begins at `start` us, or with what comes first; values that came before still hold at the start.
+    /// Starts at `start` us, or at the first input; values from before still hold at the start.
     #[must_use]
     pub fn new(array: &Array, start: Option<i64>) -> Self {
         let (held, integrals) = (Held::all(array.len(), 0.0), vec![Integral::default(); array.len()]);
         Self { array: array.clone(), start, present: i64::MIN, held, integrals }
     }
 
-    /// When the stretch begins, us; `None` while nothing came and no start was given.
+    /// Start of the interval, us; `None` before the first input if no start was given.
     #[must_use]
     pub fn start(&self) -> Option<i64> {
         self.start
     }
 
-    /// Takes the next events.
+    /// Adds the next events.
     ///
     /// # Errors
     ///
-    /// `Problem` where events have no intensities or are another sensor's.
+    /// `Problem` if the events have no intensities or are of another sensor.
     pub fn push_events(&mut self, events: EventsView<'_>) -> Result<()> {
         let (rows, columns) = (events.array.rows, events.array.columns);
         if (rows, columns) != (self.array.rows, self.array.columns) {
@@ -224,11 +224,11 @@ impl TareBuilder {
         Ok(())
     }
 
-    /// Takes the next picture, at `t` us.
+    /// Adds the next picture, at `t` us.
     ///
     /// # Errors
     ///
-    /// `Problem` where the picture has another size, holds NaN or comes out of order.
+    /// `Problem` if the picture has another size, contains NaN or is out of order.
     pub fn push_frame(&mut self, t: i64, values: &[f32]) -> Result<()> {
         if values.len() != self.integrals.len() {
             return Err(problem!("frame at {t} us: {} values, must be {}", values.len(), self.integrals.len()));
@@ -248,11 +248,11 @@ impl TareBuilder {
         Ok(())
     }
 
-    /// The tare up to `stop` us; nothing later than that may have come.
+    /// The tare up to `stop` us; no later input may have arrived.
     ///
     /// # Errors
     ///
-    /// `Problem` where no event came, the stretch is empty, or a later event came.
+    /// `Problem` if there was no event, the interval is empty, or an event was later.
     pub fn finish(mut self, stop: i64, note: &str) -> Result<Tare> {
         let Some(start) = self.start else { return Err(problem!("tare: no event came")) };
         if stop <= start {

@@ -1,4 +1,5 @@
-//! A threshold and two phasic Izhikevich neurons: one receives the thresholded signal, one its inverse (thesis 3.4.3, 6.5.1).
+//! A threshold and two phasic Izhikevich neurons: one receives the thresholded signal, the other its inverse (thesis
+//! 3.4.3, 6.5.1).
 
 use serde::{Deserialize, Serialize};
 
@@ -13,26 +14,27 @@ use crate::parameters::Described;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike};
 
-/// A threshold and a pair of Izhikevich neurons: +1 about 16 or 20 ms after a taxel came to a level, -1 after it left.
+/// A threshold and a pair of Izhikevich neurons: +1 about 16 or 20 ms after a taxel reaches a level, -1 after it falls
+/// below.
 ///
-/// `v' = 0.04 v^2 + 5 v + 140 - u + I`, `u' = a (b v - u)`; from 30 mV `v` goes to `c` and `u` up by `d` (Izhikevich
-/// 2003). Forward Euler in f64, both equations from the old state, in steps of 0.1 ms: the step is part of the
-/// definition, as latency depends on it. Steps count from the first sample; a spike has the time of its step's end.
-/// The ON neuron's input is on while value >= level (f32), the OFF neuron's while not; samples are held. Chatter
-/// within some 10 ms vanishes, a gap in the signal delays the next spike: both belong to the phasic model.
-/// Trains: `taxel * levels + level`, signed.
+/// `v' = 0.04 v^2 + 5 v + 140 - u + I`, `u' = a (b v - u)`; at 30 mV `v` is set to `c` and `u` raised by `d`
+/// (Izhikevich 2003). Forward Euler in f64, both equations from the old state, in steps of 0.1 ms: the step is part of
+/// the definition, because the latency depends on it. Steps count from the first sample; a spike has the time of its
+/// step's end. The ON neuron's input is on while value >= level (f32), the OFF neuron's otherwise; samples are held.
+/// Chatter within some 10 ms is suppressed, and a gap in the signal delays the next spike: both are properties of the
+/// phasic model. Trains: `taxel * levels + level`, signed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ThresholdIzhikevich {
     /// Levels in the sensor's unit, ascending.
     pub levels: Vec<f64>,
-    /// Which of the two published parameter sets; default that of 6.5.1.
+    /// One of the two published parameter sets; default that of 6.5.1.
     #[serde(default)]
     pub published: Published,
-    /// The state in which the neurons begin; default settled.
+    /// The initial state of the neurons; default settled.
     #[serde(default)]
     pub begin: Begin,
-    /// How often events are sampled, ms; default 0.1, the step.
+    /// Sampling period of events, ms; default 0.1, the step.
     #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
 }
@@ -50,7 +52,7 @@ pub enum Published {
 }
 
 impl Published {
-    /// From the input's step to the spike of a settled neuron, ms.
+    /// Latency from the input's step to the spike of a settled neuron, ms.
     #[must_use]
     pub fn latency_ms(self) -> f64 {
         match self {
@@ -60,14 +62,15 @@ impl Published {
     }
 }
 
-/// How Izhikevich neurons begin.
+/// The initial state of Izhikevich neurons.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Begin {
-    /// As if the first sample had always been: silent until something changes.
+    /// The state after a constant input equal to the first sample: silent until a value changes.
     #[default]
     Settled,
-    /// At rest without input: what is on at the first sample fires once, as does the OFF neuron of each idle channel.
+    /// The resting state without input: each channel fires once at the start, the ON neuron if it is above the level,
+    /// otherwise the OFF neuron.
     Rest,
 }
 
@@ -76,7 +79,7 @@ impl ThresholdIzhikevich {
         period_ms: "ms", Range::WHOLE_US;
     }
 
-    /// The neurons of 6.5.1 at these levels.
+    /// An encoder with the neurons of 6.5.1 and these levels.
     #[must_use]
     pub fn at(levels: Vec<f64>) -> Self {
         let (published, begin) = (Published::default(), Begin::default());
@@ -109,19 +112,19 @@ impl Law for ThresholdIzhikevich {
     }
 }
 
-/// One step, us.
+/// Duration of a step, us.
 const STEP: i64 = 100;
 const B: f64 = 0.25;
 const C: f64 = -65.0;
 const D: f64 = 6.0;
 const PEAK: f64 = 30.0;
 
-/// One of the two models.
+/// One of the two models with its parameters.
 #[derive(Clone, Copy)]
 struct Model {
     a: f64,
     gain: f64,
-    /// Step, ms.
+    /// Duration of a step, ms.
     dt: f64,
 }
 
@@ -134,7 +137,7 @@ impl Model {
         Self { a, gain, dt: 0.1 }
     }
 
-    /// Where v and u come to rest without input: the lower root of 0.04 v^2 + (5 - b) v + 140.
+    /// v and u at rest without input: the lower root of 0.04 v^2 + (5 - b) v + 140.
     fn rest() -> (f64, f64) {
         let linear = 5.0 - B;
         let v = (-linear - (linear * linear - 4.0 * 0.04 * 140.0).sqrt()) / (2.0 * 0.04);
@@ -146,7 +149,7 @@ impl Model {
         (v + self.dt * (0.04 * v * v + 5.0 * v + 140.0 - u + input), u + self.dt * self.a * (B * v - u))
     }
 
-    /// The state that steps with this input do not change any more, or the last of 10^6 steps.
+    /// The fixed point for this input, or the state after 10^6 steps.
     fn settled(self, input: f64) -> (f64, f64) {
         let (mut v, mut u) = Self::rest();
         for _ in 0..1_000_000 {
@@ -160,7 +163,7 @@ impl Model {
     }
 }
 
-/// Neurons that are stepped together.
+/// Number of neurons that are stepped together.
 const LANES: usize = 8;
 
 #[derive(Clone)]
@@ -168,12 +171,12 @@ struct Neurons {
     v: [f64; LANES],
     u: [f64; LANES],
     input: [f64; LANES],
-    /// Whether a step with this input changes nothing at all: then it is left out.
+    /// Whether a step with this input leaves the state unchanged; such steps are skipped.
     still: bool,
 }
 
 impl Neurons {
-    /// Computes `steps` steps; calls `fired` with each spike's step and lane.
+    /// Computes `steps` steps; calls `fired` with the step and lane of each spike.
     #[inline(always)]
     fn run(&mut self, model: Model, steps: i64, mut fired: impl FnMut(i64, usize)) {
         if self.still || steps <= 0 {
@@ -221,13 +224,13 @@ struct Pairs {
     channels: usize,
     levels: Vec<f32>,
     bracket: Bracket,
-    /// Whether each train's taxel is at its level; the last eight are filled up.
+    /// Whether each train's taxel is at or above its level; padded to a multiple of eight.
     on: Vec<[bool; LANES]>,
     rises: Vec<Neurons>,
     falls: Vec<Neurons>,
     /// The start of the next step, us.
     next: i64,
-    /// Spikes of steps that began before the present and end after it.
+    /// Spikes of steps that began before the current time and end after it.
     ahead: Vec<Spike>,
 }
 
@@ -271,7 +274,7 @@ impl Pairs {
         self.bracket.set(channel, low, high);
     }
 
-    /// Takes all steps that begin before `t`.
+    /// Computes all steps that begin before `t`.
     #[inline(always)]
     fn step_until(&mut self, t: i64) {
         let steps = (t - self.next + STEP - 1).div_euclid(STEP);
@@ -291,7 +294,7 @@ impl Pairs {
         self.next += steps * STEP;
     }
 
-    /// Hands on what is due by `t`, inclusive or not.
+    /// Emits the spikes that are due before `t` (with `at_too` also at `t`).
     fn hand_on(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
         let (from, end) = (out.len(), ms(t));
         self.ahead.retain(|&spike| {
@@ -314,7 +317,7 @@ impl Rule for Pairs {
         for channel in 0..self.channels {
             self.read(channel, held[channel / BLOCK][channel % BLOCK]);
         }
-        // Lanes beyond the last train receive no input and stay at rest.
+        // Padding lanes after the last train receive no input and stay at rest.
         let used = self.channels * self.levels.len() % LANES;
         if used > 0
             && let Some(last) = self.falls.last_mut()
@@ -364,7 +367,7 @@ impl Rule for Pairs {
 mod tests {
     use super::*;
 
-    /// Time from an input that comes to the resting neuron to its spike, ms.
+    /// Time from the onset of an input to the resting neuron's first spike, ms.
     fn latency(which: Published, gain: Option<f64>, dt: f64) -> Option<f64> {
         let published = Model::published(which);
         let model = Model { dt, gain: gain.unwrap_or(published.gain), ..published };

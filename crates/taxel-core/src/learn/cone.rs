@@ -1,4 +1,5 @@
-//! The thesis' learners: CONE-X, which meets every row or proves that none do, and CONE-R, which misses as little as it can.
+//! The thesis' learners: CONE-X, which satisfies every row or proves that no weights do, and CONE-R, which minimises
+//! violations.
 
 mod cone_r;
 mod cone_x;

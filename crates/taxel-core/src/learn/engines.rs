@@ -1,4 +1,4 @@
-//! What minimises over rows that it is handed, whatever they mean.
+//! Solvers that minimise over given rows, whatever these rows mean.
 
 mod augmented;
 mod cone_program;

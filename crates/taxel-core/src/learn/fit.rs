@@ -8,18 +8,18 @@ use super::statement::Parts;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// CONE-X: the weights meet all rows, and in continuous time the neuron, run on the patterns, fires at its targets alone;
-    /// `gap` bounds the objective. CONE-R, which has no rows that must be met: the objective is proven to lie within
+    /// CONE-X: the weights satisfy all rows, and in continuous time the neuron, run on the patterns, fires at its
+    /// targets only; `gap` bounds the objective. CONE-R, which has no hard rows: the objective is proven to be within
     /// `tolerance` of its least value.
     Solved,
-    /// No weights meet all rows of CONE-X; a certificate proves it.
+    /// No weights satisfy all rows of CONE-X; a certificate proves it.
     Infeasible,
-    /// Neither is known: the weights are the best so far.
+    /// Neither is known; the weights are the best so far.
     Stopped,
 }
 
 impl Status {
-    /// The word for it.
+    /// The status as a word.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -33,7 +33,7 @@ impl Status {
 /// The engine that found the least objective.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Engine {
-    /// taxel's own; where its result cannot be proven, the cone solver goes on from it.
+    /// taxel's own solver; if its result cannot be proven, the cone solver continues from it.
     #[default]
     #[serde(rename = "native")]
     Native,
@@ -43,7 +43,7 @@ pub enum Engine {
 }
 
 impl Engine {
-    /// The words for it.
+    /// The engine as words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -56,11 +56,11 @@ impl Engine {
 /// Progress after a round of row generation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Round {
-    /// Counted from 1.
+    /// The number of the round, from 1.
     pub round: usize,
-    /// Rows of the working problem.
+    /// The number of rows in the working problem.
     pub rows: usize,
-    /// The objective: of CONE-X that of this round, of CONE-R the best so far.
+    /// The objective: that of this round for CONE-X, the best so far for CONE-R.
     pub objective: f64,
     /// The distance to the end.
     pub left: Left,
@@ -69,27 +69,27 @@ pub struct Round {
 /// The distance to the end after a round.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Left {
-    /// CONE-X: silence is violated in so many stretches of time.
+    /// CONE-X: the number of intervals in which silence is violated.
     Broken(usize),
-    /// The best objective's relative distance to the best bound so far.
+    /// CONE-R: the relative distance between the best objective and the best bound so far.
     Gap(f64),
 }
 
-/// A fit.
+/// The result of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// How it ended.
+    /// How the fit ended.
     pub status: Status,
-    /// mV, one a train; NaN where there are none.
+    /// The weights, mV, one per train; NaN if there are none.
     pub weights: Vec<f64>,
-    /// 6.14 (6.11 of CONE-X) at these weights; infinite where there are none.
+    /// The value of 6.14 (of 6.11 for CONE-X) at these weights; infinite if there are none.
     pub objective: f64,
-    /// Its terms.
+    /// The terms of the objective.
     pub parts: Parts,
-    /// Proven relative distance to the least objective.
+    /// The proven relative distance to the least objective.
     pub gap: f64,
-    /// Rounds of row generation.
+    /// The number of rounds of row generation.
     pub rounds: usize,
-    /// The engine that found it.
+    /// The engine that found the weights.
     pub engine: Engine,
 }

@@ -1,7 +1,8 @@
-//! The stated problem, equations 6.9 to 6.14, once for all learners: its rows, their times, and its objective.
+//! The problem statement, equations 6.9 to 6.14, for all learners: its rows, their times, and its objective.
 //!
-//! `rows` names and states any row (6.9, 6.10), `targets` writes out those at the targets, `silence` sweeps over all others,
-//! `objective` is 6.14 (6.11 is a part of it), `relaxed` its value, `certificate` the proof that nothing meets the rows.
+//! `rows` names and computes any row (6.9, 6.10), `targets` stores those of the targets, `silence` evaluates all
+//! others, `objective` has the terms of 6.14 (6.11 is a part of it), `relaxed` its value, `certificate` proofs of
+//! infeasibility.
 
 mod bounds;
 mod certificate;

@@ -1,15 +1,16 @@
-//! Spike-timing-dependent plasticity: a neuron that finds a pattern which repeats in its inputs, without labels.
+//! Spike-timing-dependent plasticity: a neuron that finds a repeating pattern in its inputs without labels.
 //!
-//! After Masquelier, Guyonneau and Thorpe (2008), PLoS ONE 3:e1377. Since its last spike the neuron's potential is
+//! After Masquelier, Guyonneau and Thorpe (2008), PLoS ONE 3:e1377. The neuron's potential since its last spike is
 //!
 //! `p = T (k1 exp(-s/tau_m) - k2 (exp(-s/tau_m) - exp(-s/tau_s))) + sum w K (exp(-u/tau_m) - exp(-u/tau_s))`,
 //!
-//! s the time since that spike, u the time since each input spike after it, K such that one input adds its weight at
-//! most. It fires where p rises to T. Both parts are sums of the same two exponentials, so two numbers are the state, and
-//! crossings are found between inputs as well as at them. A spike at time t changes the weight of each input whose last
-//! spike came d before it by `a_plus exp(-d/tau_plus)`; the first input spike that comes d after it by
-//! `-a_minus exp(-d/tau_minus)`; weights stay from 0 to 1. Each pair of neighbours counts once, as in the authors'
-//! program (so Hathway and Goodman 2018, ReScience 4(1):6, who found that other pairings do not learn).
+//! where s is the time since that spike, u the time since each later input spike, and K scales the effect of an input
+//! to a maximum of its weight. The neuron fires when p rises to T. Both parts are sums of the same two exponentials, so
+//! the state is two numbers, and crossings are found between inputs as well as at them. A spike at time t increases the
+//! weight of each input whose last spike was d before t by `a_plus exp(-d/tau_plus)`; the first input spike d after t
+//! decreases it by `a_minus exp(-d/tau_minus)`; weights stay between 0 and 1. Each pair of neighbours counts once, as
+//! in the authors' program (according to Hathway and Goodman 2018, ReScience 4(1):6, who found that other pairings do
+//! not learn).
 
 use serde::{Deserialize, Serialize};
 
@@ -17,29 +18,29 @@ use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// Parameters of the rule and its neuron; defaults are the published ones, for some 2000 inputs of 64 spikes/s.
+/// Parameters of the rule and its neuron; the defaults are the published ones, for about 2000 inputs of 64 spikes/s.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Stdp {
-    /// T, in weights.
+    /// The threshold T, in units of weights.
     pub threshold: f64,
-    /// The membrane's time constant, ms.
+    /// The membrane time constant, ms.
     pub tau_m: f64,
-    /// The synapses' time constant, ms.
+    /// The synaptic time constant, ms.
     pub tau_s: f64,
-    /// Height of the spike, thresholds.
+    /// Amplitude of the spike itself (the factor k1), in thresholds.
     pub k1: f64,
-    /// Depth of what follows it, thresholds.
+    /// Amplitude of the after-potential (the factor k2), in thresholds.
     pub k2: f64,
-    /// The most that a weight gains at once.
+    /// The largest increase of a weight by one pair of spikes.
     pub a_plus: f64,
-    /// The most that a weight loses at once.
+    /// The largest decrease of a weight by one pair of spikes.
     pub a_minus: f64,
-    /// Time constant of gains, ms.
+    /// Time constant of increases, ms.
     pub tau_plus: f64,
-    /// Time constant of losses, ms.
+    /// Time constant of decreases, ms.
     pub tau_minus: f64,
-    /// All weights at first.
+    /// The initial value of all weights.
     pub initial: f64,
 }
 
@@ -81,7 +82,7 @@ impl Stdp {
         Described::by(&Self::default(), &[], Self::RANGES)
     }
 
-    /// Checks every parameter.
+    /// Checks the range of every parameter, and that `tau_s` is below `tau_m`.
     ///
     /// # Errors
     ///
@@ -94,7 +95,7 @@ impl Stdp {
         Ok(())
     }
 
-    /// K: by how much the difference of the exponentials of one input is scaled to a height of 1.
+    /// The factor K, which scales the effect of one input of weight 1 to a maximum of 1.
     fn scale(&self) -> f64 {
         let ratio = self.tau_m / self.tau_s;
         let peak = ratio.ln() / (ratio - 1.0);
@@ -102,31 +103,31 @@ impl Stdp {
     }
 }
 
-/// The state of the neuron in one stream of time.
+/// The state of the neuron in a stream of spikes.
 #[derive(Debug, Clone)]
 pub struct StdpNeuron {
     parameters: Stdp,
     scale: f64,
     weights: Vec<f64>,
-    /// When each input last spiked, ms.
+    /// The last spike of each input, ms.
     last: Vec<f64>,
-    /// When the neuron last fired, ms.
+    /// The neuron's last spike, ms.
     fired: f64,
-    /// Since when `slow` and `fast` have decayed, ms.
+    /// The time of the state in `slow` and `fast`, ms.
     now: f64,
-    /// What decays by tau_m, and by tau_s: the potential is their sum.
+    /// The parts of the potential that decay with `tau_m` and with `tau_s`; the potential is their sum.
     slow: f64,
     fast: f64,
-    /// Whether the potential came below the threshold since the last spike.
+    /// Whether the potential has been below the threshold since the last spike.
     armed: bool,
 }
 
 impl StdpNeuron {
-    /// A neuron at rest, all weights as they are at first.
+    /// A neuron at rest with all weights at their initial value.
     ///
     /// # Errors
     ///
-    /// `Problem` where a parameter makes no sense.
+    /// `Problem` if a parameter is not valid.
     pub fn new(parameters: &Stdp, trains: usize) -> Result<Self> {
         parameters.check()?;
         Ok(Self {
@@ -142,17 +143,17 @@ impl StdpNeuron {
         })
     }
 
-    /// The weights, one a train.
+    /// The weights, one per train.
     #[must_use]
     pub fn weights(&self) -> &[f64] {
         &self.weights
     }
 
-    /// Begins anew with these weights, at rest.
+    /// Sets the weights and resets the neuron to rest.
     ///
     /// # Errors
     ///
-    /// `Problem` where they are not one a train, from 0 to 1.
+    /// `Problem` if the weights are not one per train, from 0 to 1.
     pub fn set_weights(&mut self, weights: &[f64]) -> Result<()> {
         one_weight_a_train(weights, self.weights.len())?;
         if let Some(n) = weights.iter().position(|w| !(0.0..=1.0).contains(w)) {
@@ -170,12 +171,13 @@ impl StdpNeuron {
         (self.slow, self.fast, self.armed) = (0.0, 0.0, true);
     }
 
-    /// Runs the neuron on the next piece of the stream; returns its spikes, ms. Without `learn` the weights stay.
+    /// Runs the neuron on the next piece of the stream; returns its spikes, ms. Without `learn` the weights do not
+    /// change.
     ///
     /// # Errors
     ///
-    /// `Problem` for another number of trains or a piece that begins before the last one's end (nothing changes then),
-    /// `Interrupted` where the caller stops it (weights stay as they are then).
+    /// `Problem` for another number of trains or a piece that begins before the previous one's end (nothing changes
+    /// then), `Interrupted` if the caller stops it (the weights learnt so far remain).
     pub fn push(&mut self, piece: &SpikeTrains, learn: bool, stop: Stop<'_>) -> Result<Vec<f64>> {
         if piece.len() != self.weights.len() {
             return Err(problem!("piece of {} trains: must be {}, as before", piece.len(), self.weights.len()));
@@ -196,7 +198,7 @@ impl StdpNeuron {
         Ok(out)
     }
 
-    /// Advances to `t`, firing where the potential rises to the threshold.
+    /// Advances to `t`, firing whenever the potential rises to the threshold.
     fn advance(&mut self, t: f64, learn: bool, out: &mut Vec<f64>) {
         let Stdp { threshold, tau_m, tau_s, .. } = self.parameters;
         loop {
@@ -215,15 +217,15 @@ impl StdpNeuron {
         }
     }
 
-    /// How long after `now` the potential rises to the threshold, where it does within `since`, at whose end its parts are
-    /// `slow` and `fast`. It is below the threshold now, and has one turning point at most.
+    /// The time from `now` to the crossing of the threshold, if there is one within `since`; `slow` and `fast` are the
+    /// parts at the end of `since`. The potential is below the threshold now and has at most one extremum.
     #[inline]
     fn crossing(&self, since: f64, slow: f64, fast: f64) -> Option<f64> {
         let Stdp { threshold, tau_m, tau_s, .. } = self.parameters;
         let falls = |slow: f64, fast: f64| slow / tau_m + fast / tau_s >= 0.0;
         let mut until = since;
         if slow + fast < threshold {
-            // Between two values below it may pass the threshold only where it first rises and then falls.
+            // Between two values below the threshold the potential can reach it only if it first rises and then falls.
             if falls(self.slow, self.fast) || !falls(slow, fast) {
                 return None;
             }
@@ -242,7 +244,7 @@ impl StdpNeuron {
         }
     }
 
-    /// The potential so long after `now`.
+    /// The potential `since` ms after `now`.
     fn at(&self, since: f64) -> f64 {
         self.slow * (-since / self.parameters.tau_m).exp() + self.fast * (-since / self.parameters.tau_s).exp()
     }
@@ -304,7 +306,8 @@ mod tests {
 
     #[test]
     fn it_fires_between_inputs_where_the_potential_peaks_above_the_threshold() {
-        // Ten inputs at once peak at 10 x 0.475 = 4.75, tau_m tau_s / (tau_m - tau_s) ln(tau_m / tau_s) = 4.62 ms later.
+        // Ten simultaneous inputs have a peak of 10 x 0.475 = 4.75, tau_m tau_s / (tau_m - tau_s) ln(tau_m / tau_s) =
+        // 4.62 ms later.
         let inputs: Vec<&[f64]> = vec![&[5.0]; 10];
         for (threshold, fires) in [(4.74, true), (4.76, false)] {
             let parameters = Stdp { threshold, ..Stdp::default() };

@@ -1,16 +1,16 @@
-//! The window of ISI and SPIKE distances, and the intervals before the first and after the last spike.
+//! The window of the ISI and SPIKE distances, and the intervals before the first and after the last spike.
 
 use super::patterns::Patterns;
 use crate::{Result, problem};
 
-/// From when to when, ms.
+/// The start and end of the time that counts, ms.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     pub(super) start: f64,
     pub(super) stop: f64,
 }
 
-/// The given window, or the widest of the patterns' own; every spike must lie in it.
+/// The given window, or by default the widest of the patterns' own; every spike must be inside.
 pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Window> {
     let sides = || std::iter::once(a).chain(b);
     let widest = || {
@@ -36,7 +36,7 @@ pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Pat
     Ok(Window { start, stop })
 }
 
-/// A train as these distances see it: no two spikes at the same time, and a spike at either end where there is none.
+/// The spikes as these distances use them: without duplicates; an empty train gets a spike at each end of the window.
 pub(super) fn distinct(train: &[f64], window: Window) -> Vec<f64> {
     if train.is_empty() {
         return vec![window.start, window.stop];
@@ -46,10 +46,10 @@ pub(super) fn distinct(train: &[f64], window: Window) -> Vec<f64> {
     spikes
 }
 
-/// The interval around the times after spike `k - 1` and before spike `k`, of a train with at least one spike.
+/// The interval between spikes `k - 1` and `k` of a train with at least one spike.
 ///
-/// Outside the first and the last spike it is as far as the window's edge, or as the neighbouring interval if that is
-/// longer.
+/// Before the first and after the last spike the interval extends to the window's edge, or is as long as the
+/// neighbouring interval if that is longer.
 pub(super) fn interval(spikes: &[f64], k: usize, window: Window) -> f64 {
     let n = spikes.len();
     let beside = |j: usize| if n > 1 { spikes[j + 1] - spikes[j] } else { 0.0 };
@@ -62,7 +62,7 @@ pub(super) fn interval(spikes: &[f64], k: usize, window: Window) -> f64 {
     }
 }
 
-/// How many spikes lie at the window's start already.
+/// The number of spikes at the window's start: 0 or 1.
 pub(super) fn begun(spikes: &[f64], window: Window) -> usize {
     usize::from(spikes[0] <= window.start)
 }

@@ -1,4 +1,4 @@
-//! ISI distance: how much the intervals between spikes differ, moment by moment.
+//! ISI distance: the difference between the trains' interspike intervals, averaged over time.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,14 +9,15 @@ use super::van_rossum_absolute::Exposure;
 use crate::parameters::Described;
 use crate::{Result, Stop};
 
-/// The mean over the window of `|x - y| / max(x, y)`, where x and y are the two trains' intervals at that moment.
+/// The mean over the window of `|x - y| / max(x, y)`, where x and y are the two trains' interspike intervals at each
+/// time.
 ///
 /// Kreuz et al. (2007), J. Neurosci. Methods 165:151. The profile is constant between spikes and integrated exactly.
-/// Edges and empty trains as in `PySpike`. Time O(n + m).
+/// Edges and empty trains are treated as in `PySpike`. Time O(n + m).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IsiDistance {
-    /// From when to when, ms; the patterns' own window where it is left out.
+    /// Start and end of the window, ms; by default the patterns' own window.
     #[serde(default)]
     pub window: Option<(f64, f64)>,
 }
@@ -43,7 +44,7 @@ impl Ready for Within {
     }
 }
 
-/// The distance of two ascending trains inside the window.
+/// The distance between two ascending trains inside the window.
 pub(super) fn between(a: &[f64], b: &[f64], window: Window) -> f64 {
     let (a, b) = (distinct(a, window), distinct(b, window));
     let (mut i, mut j) = (begun(&a, window), begun(&b, window));
@@ -52,7 +53,7 @@ pub(super) fn between(a: &[f64], b: &[f64], window: Window) -> f64 {
     loop {
         let (next_a, next_b) = (a.get(i).copied(), b.get(j).copied());
         let next = next_a.unwrap_or(window.stop).min(next_b.unwrap_or(window.stop));
-        // Two intervals of no length: spikes at the window's end alone, and no time left for them to differ in.
+        // At the window's end both intervals can have length 0, but then no time is left to integrate.
         if next > last {
             sum += (x - y).abs() / x.max(y) * (next - last);
             last = next;
@@ -72,7 +73,7 @@ pub(super) fn between(a: &[f64], b: &[f64], window: Window) -> f64 {
     mean(sum, window)
 }
 
-/// A profile's integral over the window as its mean; 0 where the window is a moment.
+/// The mean of a profile over the window, from its integral; 0 if the window has no duration.
 pub(super) fn mean(sum: f64, window: Window) -> f64 {
     if window.stop > window.start { sum / (window.stop - window.start) } else { 0.0 }
 }

@@ -1,4 +1,4 @@
-//! The interface of the metrics of the registry.
+//! The interface of the metrics in the registry.
 
 use serde::Deserialize;
 
@@ -7,9 +7,9 @@ use super::patterns::Patterns;
 use crate::parameters::Described;
 use crate::{Result, Stop};
 
-/// The properties of a metric.
+/// The operations that every metric implements.
 pub(super) trait Law {
-    /// Its parameters, with their defaults and ranges.
+    /// The metric's parameters with their defaults and ranges.
     fn described() -> Described
     where
         Self: Sized;
@@ -17,16 +17,16 @@ pub(super) trait Law {
     /// Checks every parameter.
     fn check(&self) -> Result<()>;
 
-    /// Works out what all pairs of these patterns share.
+    /// Computes what all pairs of these patterns share.
     fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>>;
 }
 
-/// A metric with what all pairs share.
+/// A metric with the data that all pairs share.
 pub(super) trait Ready: Sync {
     /// The distance between two patterns.
     fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64>;
 
-    /// Fills a whole matrix, where there is a quicker way than pair by pair.
+    /// Fills a whole matrix; metrics with a faster method than pair by pair override it.
     fn fill(
         &self,
         _matrix: &Matrix,
@@ -38,7 +38,7 @@ pub(super) trait Ready: Sync {
     }
 }
 
-/// A pattern: which of several.
+/// One of several patterns, by its index.
 pub(super) type One<'p> = (&'p Patterns<'p>, usize);
 
 /// The sum over trains of a distance between trains.
@@ -56,7 +56,7 @@ pub(super) fn summed(
     Ok(sum)
 }
 
-/// Reads a cost that may be infinite, which JSON has no number for: a number, or its name as text.
+/// Reads a cost that may be infinite: a number, or its name as text because JSON has no infinity.
 pub(super) fn number_or_name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<f64, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged, expecting = "must be a number")]

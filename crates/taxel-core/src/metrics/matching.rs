@@ -1,27 +1,27 @@
-//! Spikes against targets: which belong together, how many were found, missed and false.
+//! Matching of spikes to targets: which belong together, and which are missed or false.
 
 use crate::allowed::{Parameter, Range};
 use crate::parameters::Described;
 use crate::{Result, Stop, problem};
 
-/// The most pairs within the windows: a byte each while they are matched.
+/// The largest number of pairs within the windows: matching takes one byte for each.
 const MOST_PAIRS: usize = 200_000_000;
 
-/// How far a spike may lie from its target, up to an hour.
+/// The largest distance between a spike and its target, at most an hour.
 const WINDOW: Parameter = Parameter { name: "window_ms", unit: "ms", range: Range::within(0.0, 3_600_000.0) };
 
-/// What the matching of spikes to targets takes; 50 ms as in 6.5.2.
+/// The parameters of the matching of spikes to targets; 50 ms as in 6.5.2.
 #[must_use]
 pub fn described() -> Described {
     Described::by(&serde_json::json!({}), &[], &[]).with(WINDOW, 50.0)
 }
 
-/// Pairs the spikes of a pattern with its targets (ms), to the ns: `(spike, target)`, ascending.
+/// Pairs the spikes of a pattern with its targets (ms), at a resolution of 1 ns: `(spike, target)`, ascending.
 ///
 /// # Errors
 ///
-/// `Problem` for times that do not ascend or make no sense (names `what` they are of), or a window that makes none; as
-/// [`in_order`].
+/// `Problem` for times that do not ascend or are not valid (names the list, `what`), or for a window that is not valid;
+/// those of [`in_order`].
 pub fn matched(
     (what, spikes): (&str, &[f64]),
     (wanted, targets): (&str, &[f64]),
@@ -33,7 +33,7 @@ pub fn matched(
     in_order(&nanoseconds(what, spikes)?, &nanoseconds(wanted, targets)?, &windows, stop)
 }
 
-/// Times in ns, so that what lies at the edge of a window to rounding lies in it.
+/// Times in whole ns, so that a time at the edge of a window is inside despite rounding.
 fn nanoseconds(what: &str, times: &[f64]) -> Result<Vec<i64>> {
     // A hundred years.
     const MOST_MS: f64 = 3.2e12;
@@ -47,19 +47,20 @@ fn nanoseconds(what: &str, times: &[f64]) -> Result<Vec<i64>> {
     Ok(times.iter().map(|t| (t * 1e6).round() as i64).collect())
 }
 
-/// Pairs spikes or detections with the targets or reference events that they are to meet, one to one and in the order of
-/// time: as many pairs as the windows allow, and
-/// of all ways to have so many the one with the least sum of distances. Gives `(detection, reference)`, ascending.
+/// Pairs detections (or spikes) with reference events (or targets), one to one and in order of time: as many pairs as
+/// the windows allow, and among all pairings of that size the one with the least sum of distances. Returns
+/// `(detection, reference)`, ascending.
 ///
-/// Times must ascend; `windows` is one a reference event. With one width for all, no pairing at all, in order or
-/// not, has more pairs or a smaller sum: two pairs that cross can be uncrossed without growing the longer or the sum.
+/// Times must ascend; `windows` has one width for each reference event. If all widths are equal, no other pairing, in
+/// order or not, has more pairs or a smaller sum: uncrossing two crossed pairs increases neither the longer distance
+/// nor the sum.
 ///
 /// # Errors
 ///
-/// `Problem` where so many lie within the windows that matching them would not end; `Interrupted` where the caller stops it.
+/// `Problem` if so many are within the windows that matching would take too long; `Interrupted` if the caller stops it.
 pub fn in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<'_>) -> Result<Vec<(usize, usize)>> {
-    // Row i of the table stands for the first i + 1 reference events, its column j for the first j detections. Only the
-    // band of columns that some window reaches is kept; both its edges ascend from row to row.
+    // Row i of the table represents the first i + 1 reference events, column j the first j detections. Only the band of
+    // columns within reach of some window is stored; both its edges ascend from row to row.
     let rows = truth.len();
     let mut low: Vec<usize> =
         (0..rows).map(|i| found.partition_point(|&f| f < truth[i].saturating_sub(windows[i]))).collect();
@@ -82,7 +83,7 @@ pub fn in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<'_>) -
         PassEvent,
         Match,
     }
-    // One number orders "more pairs, then less distance": distances sum to less than 2^64.
+    // A single number orders by more pairs, then by less distance: distances sum to less than 2^64.
     const PAIR: i128 = 1 << 64;
     let mut steps: Vec<Vec<Step>> = Vec::with_capacity(rows);
     let mut above: Vec<i128> = vec![0];
@@ -144,7 +145,7 @@ mod tests {
         in_order(found, truth, &vec![window; truth.len()], Stop::never()).unwrap()
     }
 
-    /// The best of all pairings, crossing ones too: pairs, then the negative sum of distances.
+    /// The best of all pairings, including crossed ones: the number of pairs, then the negative sum of distances.
     fn best_of_all(found: &[i64], truth: &[i64], windows: &[i64], taken: u32, ordered: bool) -> (usize, i64) {
         let Some((&t, rest)) = truth.split_first() else { return (0, 0) };
         let mut best = best_of_all(found, rest, &windows[1..], taken, ordered);

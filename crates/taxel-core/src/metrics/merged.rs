@@ -1,8 +1,8 @@
-//! Two trains as one sequence of steps.
+//! Two trains merged into one sequence of steps.
 
-/// The times at which two ascending trains differ, with how many spikes `a` has there more than `b`.
+/// The times at which two ascending trains differ, each with the number of spikes of `a` minus that of `b`.
 ///
-/// What both have at the very same time cancels before anything is added up: equal trains give no step at all.
+/// Spikes of both at exactly the same time cancel before any summation, so equal trains yield no steps.
 pub(super) fn merged<'t>(a: &'t [f64], b: &'t [f64]) -> impl Iterator<Item = (f64, f64)> + 't {
     let (mut i, mut j) = (0, 0);
     std::iter::from_fn(move || {

@@ -1,4 +1,4 @@
-//! Many pairs: threads, progress, stopping, and the matrix that they fill.
+//! Matrices of many pairs: threads, progress and stopping.
 
 use std::num::NonZero;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
@@ -8,41 +8,43 @@ use std::time::Duration;
 use crate::vectors::Instructions;
 use crate::{Error, Result, Stop};
 
-/// How often the caller's thread checks whether to stop while only others still work.
+/// The interval at which the caller's thread checks for a stop while only other threads work.
 const ASK_EVERY: Duration = Duration::from_millis(20);
 
-/// How a matrix is worked on.
+/// How a matrix is computed.
 pub struct Work<'a> {
-    /// Threads; the caller's is one of them, and the only one that checks `stop` and calls `progress`.
+    /// The number of threads; the caller's thread is one of them and the only one that checks `stop` and calls
+    /// `progress`.
     pub threads: usize,
-    /// What a matrix of Victor-Purpura distances uses; the machine must have it.
+    /// The instructions for matrices of Victor-Purpura distances; the machine must have them.
     pub instructions: Instructions,
-    /// Ends the work early.
+    /// The caller's request to stop.
     pub stop: Stop<'a>,
-    /// Called with the pairs done and all of them, now and then.
+    /// Called from time to time with the number of finished pairs and of all pairs.
     pub progress: &'a mut dyn FnMut(usize, usize),
 }
 
 impl<'a> Work<'a> {
-    /// Work on all cores, or on so many threads.
+    /// Work on `threads` threads, by default one for each core.
     #[must_use]
     pub fn new(threads: Option<NonZero<usize>>, stop: Stop<'a>, progress: &'a mut dyn FnMut(usize, usize)) -> Self {
         let threads = threads.or_else(|| thread::available_parallelism().ok()).map_or(1, NonZero::get);
         Self { threads, instructions: Instructions::best(), stop, progress }
     }
 
-    /// Does tasks as [`Self::each`] does, without telling of them.
+    /// Like [`Self::each`], but without reports of progress.
     pub(super) fn quietly(&mut self, tasks: usize, task: impl Fn(usize, Stop<'_>) -> Result<()> + Sync) -> Result<()> {
         Work { progress: &mut |_, _| (), ..*self }.each(tasks, &|_| (0, 0), task)
     }
 
-    /// Does `tasks` tasks, each whole on one thread, in their order where there is one thread.
+    /// Runs `tasks` tasks, each on one thread, in order if there is one thread.
     ///
-    /// The stop that a task gets is for its thread. `told` turns how many tasks are done into pairs done and all of them.
+    /// Each task gets the stop of its thread. `report` converts a number of finished tasks to numbers of finished and of
+    /// all pairs.
     pub(super) fn each(
         &mut self,
         tasks: usize,
-        told: &dyn Fn(usize) -> (usize, usize),
+        report: &dyn Fn(usize) -> (usize, usize),
         task: impl Fn(usize, Stop<'_>) -> Result<()> + Sync,
     ) -> Result<()> {
         let (next, done, halt) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
@@ -62,7 +64,7 @@ impl<'a> Work<'a> {
         };
         let (stop, progress) = (self.stop, &mut self.progress);
         let mut tell = |done| {
-            let (now, all) = told(done);
+            let (now, all) = report(done);
             progress(now, all);
         };
         let asked = || stop.asked() || halt.load(Relaxed);
@@ -78,7 +80,7 @@ impl<'a> Work<'a> {
             };
             let handles: Vec<_> = (0..helpers).map(|_| scope.spawn(help)).collect();
             let mut outcome = run(Stop::when(&asked), &mut tell);
-            // Ctrl-C also works while only other threads still work.
+            // The caller's thread keeps checking for Ctrl-C while other threads work.
             while working.load(Relaxed) > 0 && handles.iter().any(|h| !h.is_finished()) {
                 if stop.asked() {
                     halt.store(true, Relaxed);
@@ -89,7 +91,7 @@ impl<'a> Work<'a> {
             for handle in handles {
                 match handle.join() {
                     Ok(Ok(())) => {}
-                    // The other threads are interrupted where one found an error, which is returned.
+                    // An error of one thread interrupts the others; that error is returned.
                     Ok(Err(error)) if outcome == Ok(()) || outcome == Err(Error::Interrupted) => outcome = Err(error),
                     Ok(Err(_)) => {}
                     Err(panic) => std::panic::resume_unwind(panic),
@@ -100,36 +102,36 @@ impl<'a> Work<'a> {
     }
 }
 
-/// Distances of all pairs, while they come in.
+/// The distances of all pairs while they are computed.
 ///
-/// Cells are atomic so that threads may write where their pairs lie; no two write the same one at a time.
+/// The cells are atomic so that any thread may write any cell; no two threads write the same cell at once.
 pub(super) struct Matrix {
     rows: usize,
     columns: usize,
-    /// Whether rows and columns are the same patterns: then only cells above the diagonal are filled, and mirrored.
+    /// Whether rows and columns are the same patterns: then only cells above the diagonal are computed, and mirrored.
     symmetric: bool,
     cells: Vec<AtomicU64>,
 }
 
 impl Matrix {
-    /// Zeros: `rows` patterns against `columns` others, or against each other.
+    /// A matrix of zeros for `rows` patterns against `columns` others, or against each other.
     pub(super) fn new(rows: usize, columns: Option<usize>) -> Self {
         let width = columns.unwrap_or(rows);
         let cells = (0..rows * width).map(|_| AtomicU64::new(0)).collect();
         Self { rows, columns: width, symmetric: columns.is_none(), cells }
     }
 
-    /// How many pairs there are, leaving out mirrored ones and the diagonal.
+    /// The number of pairs, without mirrored ones and the diagonal.
     pub(super) fn pairs(&self) -> usize {
         if self.symmetric { self.rows * self.rows.saturating_sub(1) / 2 } else { self.rows * self.columns }
     }
 
-    /// The first column of row `i` that is to be filled.
+    /// The first column of row `i` to be computed.
     pub(super) fn first(&self, i: usize) -> usize {
         if self.symmetric { i + 1 } else { 0 }
     }
 
-    /// Adds to the distance of patterns `i` and `j`, in either order where they are of the same set.
+    /// Adds to the distance of patterns `i` and `j`, in either order if the matrix is symmetric.
     #[inline]
     pub(super) fn add(&self, i: usize, j: usize, value: f64) {
         let (i, j) = if self.symmetric && j < i { (j, i) } else { (i, j) };
@@ -137,7 +139,7 @@ impl Matrix {
         cell.store((f64::from_bits(cell.load(Relaxed)) + value).to_bits(), Relaxed);
     }
 
-    /// Fills every cell by `between`, row after row.
+    /// Computes every cell by `between`, row after row.
     pub(super) fn each_pair(
         &self,
         work: &mut Work<'_>,

@@ -1,23 +1,23 @@
-//! What is compared: patterns of one or more spike trains, as columns.
+//! The input of metrics: patterns of one or more spike trains, stored as columns.
 
 use crate::{Result, problem};
 
-/// Several patterns with the same number of trains each; ms.
+/// Several patterns with the same number of trains each; times in ms.
 #[derive(Debug, Clone)]
 pub struct Patterns<'a> {
-    /// What the caller calls them, for errors.
+    /// The caller's name for the patterns, for errors.
     pub name: &'a str,
-    /// How many patterns.
+    /// The number of patterns.
     pub count: usize,
-    /// Trains in each.
+    /// The number of trains in each pattern.
     pub trains: usize,
     /// All times, pattern after pattern, train after train.
     pub times: &'a [f64],
-    /// Where each train begins in `times`, and at last where all end: `count * trains + 1` entries.
+    /// The start of each train in `times`, and finally the end of all: `count * trains + 1` entries.
     pub offsets: &'a [usize],
-    /// The widest window that was listened to, where the patterns have one.
+    /// The widest window of the patterns, ms, if they have one.
     pub window: Option<(f64, f64)>,
-    /// Whether the caller gave a list, so that errors say which entry.
+    /// Whether the caller passed a list, so that errors name the entry.
     pub listed: bool,
 }
 
@@ -35,7 +35,7 @@ impl Patterns<'_> {
         &self.times[self.offsets[p * self.trains]..self.offsets[(p + 1) * self.trains]]
     }
 
-    /// What errors call train `n` of pattern `p`.
+    /// The name of train `n` of pattern `p` in errors.
     #[must_use]
     pub fn place(&self, p: usize, n: usize) -> String {
         let entry = if self.listed { format!("{}[{p}]", self.name) } else { self.name.to_owned() };
@@ -58,7 +58,7 @@ impl Patterns<'_> {
         for p in 0..self.count {
             for n in 0..self.trains {
                 let train = self.train(p, n);
-                // One pass without a branch a spike; what is not finite fails it too.
+                // A branch-free pass over the spikes; values that are not finite fail it too.
                 let sound = train.iter().all(|t| t.is_finite()) && train.is_sorted();
                 if !sound {
                     return Err(self.fault(p, n));
@@ -68,7 +68,7 @@ impl Patterns<'_> {
         Ok(())
     }
 
-    /// The first fault of a train that has one.
+    /// The error for the first fault of an invalid train.
     fn fault(&self, p: usize, n: usize) -> crate::Error {
         let (train, place) = (self.train(p, n), self.place(p, n));
         if let Some(k) = train.iter().position(|t| !t.is_finite()) {

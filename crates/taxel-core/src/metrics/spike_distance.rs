@@ -1,4 +1,4 @@
-//! SPIKE distance: how far spikes are from their nearest ones, moment by moment.
+//! SPIKE distance: the distance of spikes to the nearest spikes of the other train, averaged over time.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,14 +10,15 @@ use super::van_rossum_absolute::Exposure;
 use crate::parameters::Described;
 use crate::{Result, Stop};
 
-/// The mean over the window of how far the spikes around each moment are from their nearest ones in the other train.
+/// The mean over the window of the distance between the spikes around each time and their nearest ones in the other
+/// train.
 ///
-/// Kreuz et al. (2013), J. Neurophysiol. 109:1457. The profile is linear between spikes and integrated exactly. Edges and
-/// empty trains as in `PySpike`. Time O(n + m). Not a metric: the triangle inequality need not hold.
+/// Kreuz et al. (2013), J. Neurophysiol. 109:1457. The profile is linear between spikes and integrated exactly. Edges
+/// and empty trains are treated as in `PySpike`. Time O(n + m). Not a metric: the triangle inequality need not hold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpikeDistance {
-    /// From when to when, ms; the patterns' own window where it is left out.
+    /// Start and end of the window, ms; by default the patterns' own window.
     #[serde(default)]
     pub window: Option<(f64, f64)>,
 }
@@ -44,7 +45,7 @@ impl Ready for Within {
     }
 }
 
-/// The distance of two ascending trains inside the window.
+/// The distance between two ascending trains inside the window.
 pub(super) fn between(a: &[f64], b: &[f64], window: Window) -> f64 {
     let (a, b) = (distinct(a, window), distinct(b, window));
     let (mut a, mut b) = (Side::new(&a, &b, window), Side::new(&b, &a, window));
@@ -69,29 +70,30 @@ pub(super) fn between(a: &[f64], b: &[f64], window: Window) -> f64 {
     mean(sum, window)
 }
 
-/// The profile at `t`, inside the present intervals of both.
+/// The profile at `t`, which must be inside the present intervals of both trains.
 fn profile(a: &Side<'_>, b: &Side<'_>, t: f64) -> f64 {
     let both = a.interval + b.interval;
     2.0 * (a.far(t) * (b.interval / both) + b.far(t) * (a.interval / both)) / both
 }
 
-/// One train, walked through interval by interval.
+/// One train, traversed interval by interval.
 struct Side<'s> {
     spikes: &'s [f64],
-    /// How far each spike is from the nearest one of the other train, ms.
+    /// The distance of each spike to the nearest one of the other train, ms.
     far: Vec<f64>,
     window: Window,
-    /// How many spikes lie behind.
+    /// The number of spikes already passed.
     k: usize,
     interval: f64,
-    /// How far the spike that a lone one at the window's start takes for the next, at its end, is from the other train.
+    /// For a lone spike at the window's start, the distance at the window's end to the nearest spike of the other
+    /// train, ms.
     end: f64,
 }
 
 impl<'s> Side<'s> {
     fn new(spikes: &'s [f64], other: &[f64], window: Window) -> Self {
         let k = begun(spikes, window);
-        // Outside its own the other train has one more spike on either side, so far off as its edge intervals are long.
+        // Outside its own spikes the other train gets one more on either side, at the distance of its edge intervals.
         let m = other.len();
         let beyond = |j: usize| if m > 1 { other[j + 1] - other[j] } else { 0.0 };
         let before = window.start.min(other[0] - beyond(0));
@@ -118,7 +120,7 @@ impl<'s> Side<'s> {
         self.interval = interval(self.spikes, self.k, self.window);
     }
 
-    /// How far the spikes around `t` are from the other train: linear from spike to spike, constant outside.
+    /// The distance of the spikes around `t` to the other train, ms: linear between spikes, constant outside.
     fn far(&self, t: f64) -> f64 {
         let (k, n) = (self.k, self.spikes.len());
         if k == 0 {
@@ -128,7 +130,7 @@ impl<'s> Side<'s> {
         if k < n {
             from + (self.far[k] - from) * past / self.interval
         } else if n == 1 && begun(self.spikes, self.window) == 1 {
-            // A lone spike at the window's start: PySpike goes on to the window's end.
+            // A lone spike at the window's start: like PySpike, continue linearly to the window's end.
             from + (self.end - from) * past / self.interval
         } else {
             from

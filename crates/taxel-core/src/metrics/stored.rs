@@ -1,21 +1,21 @@
-//! Exponentials worked out once a spike, so that a pair of smoothed trains is a few multiplications a spike.
+//! Exponentials computed once per spike, so that comparing two smoothed trains takes a few multiplications per spike.
 //!
 //! The inner product of two trains smoothed by `exp(-t / tau)` is, in units of tau / 2, the sum of `exp(-|s - t| / tau)`
 //! over their spikes s and t (Houghton and Kreuz 2012). For one spike t of the second that is
 //! `fall(t) * sum of rise(s) over s <= t  +  rise(t) * sum of fall(s) over s > t`, with `rise(t) = exp(t / tau)` and
-//! `fall = 1 / rise`: the sums are stored by the first train's entries, and found by the cell of time that t lies in. Time
-//! is cut into stretches short enough for `rise` to stay a number; a stretch's edge is an entry without a spike, at which
-//! sums go from one stretch's unit to the next's.
+//! `fall = 1 / rise`. The sums are stored for the first train's entries and looked up by the cell of time that contains
+//! t. Time is divided into stretches short enough for `rise` not to overflow; the edge of a stretch is an entry without
+//! a spike, at which the sums are converted from one stretch's unit to the next's.
 
 use super::patterns::Patterns;
 
-/// Length of a stretch in tau; `rise` goes from its inverse of half of that to half of that, as a power.
+/// The length of a stretch in tau; within it, `rise` ranges from `exp(-STRETCH / 2)` to `exp(STRETCH / 2)`.
 const STRETCH: f64 = 512.0;
 
-/// Cells of time for each spike of a usual train.
+/// The number of cells of time for each spike of a typical train.
 const CELLS_A_SPIKE: usize = 8;
 
-/// Time in cells and stretches.
+/// The division of time into cells and stretches.
 #[derive(Debug, Clone)]
 pub(super) struct Frame {
     tau: f64,
@@ -25,7 +25,7 @@ pub(super) struct Frame {
     cells_a_ms: f64,
 }
 
-/// A spike with its cell of time.
+/// A spike time with its cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Query {
     t: f64,
@@ -35,8 +35,8 @@ pub(super) struct Query {
 }
 
 impl Frame {
-    /// For the times of train `n` of these patterns, or of whole patterns. None where there are none, or where stretches
-    /// would have more edges than spikes, so that storing them gains nothing.
+    /// For the times of train `n` of these patterns, or of whole patterns. `None` if there are no spikes, or if there
+    /// would be more edges than spikes, so that storing the sums gains nothing.
     pub(super) fn around(tau: f64, sides: &[&Patterns<'_>], n: Option<usize>) -> Option<Self> {
         let trains = || {
             sides.iter().flat_map(|side| {
@@ -57,20 +57,20 @@ impl Frame {
         Some(Self { tau, start, stretches: stretches as usize, cells, cells_a_ms })
     }
 
-    /// Where stretch `s` begins.
+    /// The start of stretch `s`.
     fn edge(&self, s: usize) -> f64 {
         self.start + s as f64 * (STRETCH * self.tau)
     }
 
-    /// The cell of a time; later times never lie in earlier cells.
+    /// The cell of a time; cells ascend with time.
     fn cell(&self, t: f64) -> usize {
         (((t - self.start) * self.cells_a_ms) as usize).min(self.cells - 1)
     }
 
-    /// A spike with its cell of time.
+    /// A spike time with its cell.
     pub(super) fn query(&self, t: f64) -> Query {
         let mut stretch = ((t - self.start) / (STRETCH * self.tau)) as usize;
-        // The edges decide, not how this division rounds.
+        // The computed edges decide, so that rounding in this division does not matter.
         while stretch > 0 && self.edge(stretch) > t {
             stretch -= 1;
         }
@@ -82,26 +82,26 @@ impl Frame {
     }
 }
 
-/// Times at which sums change: spikes, and edges of stretches.
+/// The times at which sums change: spikes, and edges of stretches.
 #[derive(Debug, Clone)]
 pub(super) struct Entries {
-    /// Ascending; at last an infinite one, which ends every search.
+    /// The times in ascending order, followed by infinity, which ends every search.
     times: Vec<f64>,
-    /// Of spikes; 0 at edges.
+    /// The values of spikes; 0 at edges.
     rise: Vec<f64>,
     fall: Vec<f64>,
-    /// By cell: how many entries lie in cells before it.
+    /// The number of entries in earlier cells, by cell.
     before: Vec<u32>,
     edges: Vec<usize>,
 }
 
 impl Entries {
-    /// One for each of these ascending times, and those of edges; gives for each time its entry, too.
+    /// Entries for these ascending times and for the edges; also returns the entry of each time.
     pub(super) fn new(frame: &Frame, spikes: impl Iterator<Item = f64>) -> (Self, Vec<usize>) {
         let (mut times, mut rise, mut fall) = (Vec::new(), Vec::new(), Vec::new());
         let (mut edges, mut of_spike) = (Vec::new(), Vec::new());
         for spike in spikes.map(Some).chain([None]) {
-            // Sums change their unit at an edge before a spike right there is added.
+            // At an edge the sums change their unit before a spike at the same time is added.
             let until = spike.unwrap_or(f64::INFINITY);
             while edges.len() + 1 < frame.stretches && frame.edge(edges.len() + 1) <= until {
                 times.push(frame.edge(edges.len() + 1));
@@ -132,12 +132,12 @@ impl Entries {
         (Self { times, rise, fall, before, edges }, of_spike)
     }
 
-    /// How many there are.
+    /// The number of entries.
     pub(super) fn len(&self) -> usize {
         self.rise.len()
     }
 
-    /// How many are not later than a query.
+    /// The number of entries at or before a query.
     #[inline(always)]
     fn until(&self, query: &Query) -> usize {
         let mut k = self.before[query.cell] as usize;
@@ -147,7 +147,8 @@ impl Entries {
         k
     }
 
-    /// Sums of entries so weighted, by how many entries lie behind: of rises behind, of falls ahead.
+    /// The sums of entries weighted by `weight`, for each number of passed entries: rises of passed ones, falls of
+    /// later ones.
     pub(super) fn sums(&self, weight: impl Fn(usize) -> f64, sums: &mut Vec<[f64; 2]>) {
         let (n, unit) = (self.len(), (-STRETCH).exp());
         sums.clear();
@@ -170,7 +171,7 @@ impl Entries {
         }
     }
 
-    /// The inner product of what the sums are of with these spikes, in units of tau / 2.
+    /// The inner product of the summed trains with these spikes, in units of tau / 2.
     #[inline]
     pub(super) fn product(&self, sums: &[[f64; 2]], queries: &[Query]) -> f64 {
         let (mut behind, mut ahead) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Van Rossum distance: Euclidean, of trains smoothed by an exponential; in closed form.
+//! Van Rossum distance: Euclidean, between trains smoothed by an exponential; in closed form.
 
 mod matrix;
 
@@ -12,36 +12,36 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop};
 
-/// The Euclidean distance of two trains, each spike of which becomes `exp(-(t - t_i) / tau)` from its time on.
+/// The Euclidean distance between two trains, in which each spike becomes `exp(-(t - t_i) / tau)` from its time on.
 ///
-/// van Rossum (2001), Neural Comput. 13:751; thesis 5.8 to 5.10. Between spikes the difference of the smoothed trains is
-/// one decaying exponential, so its square is integrated piece by piece, exactly, over all time: a sum of terms none of
-/// which is below 0, so equal trains give 0 and near ones lose no digits. Time O(n + m).
+/// van Rossum (2001), Neural Comput. 13:751; thesis 5.8 to 5.10. Between spikes the difference of the smoothed trains
+/// is one decaying exponential, so its square is integrated exactly, piece by piece, over all time. No term of the sum
+/// is negative, so equal trains have distance 0 and similar trains lose no digits. Time O(n + m).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VanRossum {
     /// Time constant, ms.
     pub tau: f64,
-    /// What the integral is divided by.
+    /// The divisor of the integral.
     #[serde(default)]
     pub normalisation: Normalisation,
 }
 
-/// What the integral of the squared difference is divided by, before the root.
+/// The divisor of the integral of the squared difference, before the root.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Normalisation {
-    /// tau / 2: one spike more is 1, as elephant has it.
+    /// tau / 2, as in elephant: one additional spike has distance 1.
     #[default]
     Spike,
-    /// tau, as van Rossum has it: one spike more is the root of 1/2.
+    /// tau, as in van Rossum's paper: one additional spike has distance `sqrt(1/2)`.
     Tau,
-    /// Nothing, the norm as 5.10 names it: one spike more is the root of tau / 2, in the root of a ms.
+    /// None, as the norm in 5.10 is named: one additional spike has distance `sqrt(tau / 2)`, in the root of a ms.
     None,
 }
 
 impl Normalisation {
-    /// The distance of an integral over time in units of tau / 2.
+    /// The distance for an integral over time in units of tau / 2.
     pub(super) fn root(self, square: f64, tau: f64) -> f64 {
         let factor = match self {
             Self::Spike => 1.0,
@@ -88,9 +88,9 @@ impl VanRossum {
         tau: "ms", Range::ABOVE_0;
     }
 
-    /// The distance of two ascending trains.
+    /// The distance between two ascending trains.
     pub(super) fn between(&self, a: &[f64], b: &[f64]) -> f64 {
-        // `height`: the difference of the smoothed trains just after `last`.
+        // `height` is the difference of the smoothed trains just after `last`.
         let (mut square, mut height, mut last) = (0.0, 0.0, f64::NEG_INFINITY);
         for (t, more) in merged(a, b) {
             let fallen = (t - last) / self.tau;
@@ -103,6 +103,6 @@ impl VanRossum {
     }
 }
 
-/// Below this share of both trains' squares, the square of their distance is not taken as a difference of sums any more:
-/// it would have lost too many of its digits.
+/// If a squared distance is below this share of both trains' squares, it is not computed as a difference of sums, which
+/// would have lost too many digits.
 pub(super) const NEAR: f64 = 1e-4;

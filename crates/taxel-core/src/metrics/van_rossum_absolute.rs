@@ -1,4 +1,4 @@
-//! The distance that thesis 5.10 prints: absolute differences of smoothed trains, over time.
+//! The distance printed in thesis 5.10: absolute differences of smoothed trains, over time.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,19 +9,22 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop, problem};
 
-/// The absolute difference of two trains, smoothed as in 5.8, integrated over time, or summed over the points of a grid.
+/// The absolute difference between two trains, smoothed as in 5.8, integrated over time or summed over the points of a
+/// grid.
 ///
-/// 5.10 calls itself a Euclidean norm and prints `sum over t of sqrt((f_a - f_b)^2)`, which is this. Between spikes the
-/// difference is one decaying exponential of one sign: integral and sum are exact. Time O(n + m).
+/// The text of 5.10 names a Euclidean norm, but its formula is `sum over t of sqrt((f_a - f_b)^2)`, which is this
+/// distance. Between spikes the difference is one decaying exponential of one sign, so integral and sum are exact. Time
+/// O(n + m).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VanRossumAbsolute {
     /// Time constant, ms.
     pub tau: f64,
-    /// The time that counts, ms: 0 to T in 5.10; all time where it is left out.
+    /// The time that counts, ms: 0 to T in 5.10; by default all time.
     #[serde(default)]
     pub window: Option<(f64, f64)>,
-    /// A sum over points so far apart (ms), from the window's start, both ends included; the integral where it is left out.
+    /// The distance of the points that are summed (ms), from the window's start, both ends included; by default the
+    /// integral.
     #[serde(default)]
     pub step_ms: Option<f64>,
 }
@@ -54,7 +57,7 @@ impl VanRossumAbsolute {
         step_ms: "ms", Range::ABOVE_0;
     }
 
-    /// The distance of two ascending trains.
+    /// The distance between two ascending trains.
     pub(super) fn between(&self, a: &[f64], b: &[f64]) -> f64 {
         let exposure = Exposure::new(self.tau, self.window, self.step_ms);
         let (mut sum, mut height, mut last) = (0.0_f64, 0.0_f64, f64::NEG_INFINITY);
@@ -72,7 +75,7 @@ impl VanRossumAbsolute {
     }
 }
 
-/// What an exponential that begins at 1 adds up to, over parts of the time that counts.
+/// The sum, or integral, of an exponential that starts at 1, over parts of the time that counts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Exposure {
     tau: f64,
@@ -103,10 +106,10 @@ impl Exposure {
         let Some(step) = self.step else {
             return if first < end { self.tau * fallen(first) * -(-(end - first) / self.tau).exp_m1() } else { 0.0 };
         };
-        // Points are whole steps from the window's start, or from 0 where there is none.
+        // Points are whole steps from the window's start, or from 0 if the window has none.
         let origin = if self.start.is_finite() { self.start } else { 0.0 };
         let number = |t: f64| ((t - origin) / step).ceil();
-        // The stop itself is a point; the time `to` belongs to what comes after.
+        // The stop itself is a point; the time `to` belongs to the following interval.
         let past = if to <= self.stop { number(to) } else { ((self.stop - origin) / step).floor() + 1.0 };
         let least = number(first);
         if least >= past {

@@ -1,4 +1,4 @@
-//! The thesis' distance between patterns of an array: trains smoothed by an exponential, taxels by their distance.
+//! The thesis' distance between patterns of an array: smoothed by an exponential in time and in the distance of taxels.
 
 mod matrix;
 
@@ -14,8 +14,9 @@ use crate::{Array, Result, Stop, problem};
 
 /// Smoothing in time and over the array (5.8, 5.11).
 ///
-/// `g_m = f_m + sum over n of f_n exp(-d_mn / sigma)`, where `f_n` is train n smoothed as in 5.8 and `d_mn` the distance
-/// of taxels m and n. Train n is taxel n of the array; of more trains (ON and OFF), each array's worth is smoothed alone.
+/// `g_m = f_m + sum over n of f_n exp(-d_mn / sigma)`, where `f_n` is train n smoothed as in 5.8 and `d_mn` the
+/// distance of taxels m and n. Train n belongs to taxel n of the array; with several layers of trains (ON and OFF) each
+/// is smoothed alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Smoothing {
     /// Time constant, ms; 0.4 in the thesis.
@@ -24,9 +25,9 @@ pub struct Smoothing {
     /// Spatial constant, mm; 2 in the thesis.
     #[serde(default = "thesis_sigma")]
     pub sigma: f64,
-    /// Where the taxels are.
+    /// The positions of the taxels.
     pub array: Array,
-    /// How often a train counts at its own taxel.
+    /// The number of times that a train counts at its own taxel.
     #[serde(default)]
     pub own_train: OwnTrain,
 }
@@ -39,14 +40,14 @@ fn thesis_sigma() -> f64 {
     2.0
 }
 
-/// How often a train counts at its own taxel.
+/// The number of times that a train counts at its own taxel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OwnTrain {
-    /// By itself and in the sum, whose distance is 0 there: 5.11 as printed.
+    /// As the first term and in the sum, at distance 0: 5.11 as printed.
     #[default]
     Twice,
-    /// In the sum alone.
+    /// In the sum only.
     Once,
 }
 
@@ -56,7 +57,7 @@ impl Smoothing {
         sigma: "mm", Range::ABOVE_0;
     }
 
-    /// Its parameters, with their defaults and ranges.
+    /// The parameters with their defaults and ranges.
     #[must_use]
     pub fn described() -> Described {
         let defaults = serde_json::json!({
@@ -76,7 +77,7 @@ impl Smoothing {
         }
     }
 
-    /// The kernel for these patterns, each of whose trains must have a taxel of the array.
+    /// The kernel for these patterns; each train must have a taxel in the array.
     pub(super) fn laid_out(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Kernel> {
         let taxels = self.array.len();
         for side in std::iter::once(a).chain(b) {
@@ -98,7 +99,7 @@ impl Smoothing {
     }
 }
 
-/// The Euclidean distance of two patterns smoothed in time and over the array: 5.12, as 5.10 calls itself a norm.
+/// The Euclidean distance between two patterns smoothed in time and over the array: 5.12 as the norm that 5.10 names.
 ///
 /// The root of the sum over taxels of the integral over all time of `(g_m(a) - g_m(b))^2`, in closed form: between spikes
 /// all differences are one exponential. Time O(spikes x taxels).
@@ -107,7 +108,7 @@ pub struct VanRossumSpatial {
     /// Smoothing in time and over the array.
     #[serde(flatten)]
     pub smoothing: Smoothing,
-    /// What the integral is divided by.
+    /// The divisor of the integral.
     #[serde(default)]
     pub normalisation: Normalisation,
 }
@@ -147,12 +148,12 @@ impl Ready for Smoothed<'_> {
 }
 
 impl VanRossumSpatial {
-    /// The distance of two patterns.
+    /// The distance between two patterns.
     pub(super) fn between(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
         Ok(self.normalisation.root(self.square(kernel, a, b, stop)?, self.smoothing.tau))
     }
 
-    /// The squared distance of two patterns, in units of tau / 2.
+    /// The squared distance between two patterns, in units of tau / 2.
     fn square(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
         let tau = self.smoothing.tau;
         let mut square = 0.0;
@@ -163,24 +164,24 @@ impl VanRossumSpatial {
     }
 }
 
-/// How much each taxel's spikes add to each other's smoothed train.
+/// The contribution of each taxel's spikes to every taxel's smoothed train.
 pub(super) struct Kernel {
     rows: usize,
     columns: usize,
     exists: Option<Vec<bool>>,
-    /// By distance in rows and columns, from -(rows - 1), -(columns - 1) on: what taxel n adds to all of one row is a
-    /// stretch of one row of this.
+    /// The contributions by offset, from row -(rows - 1) and column -(columns - 1) on: those of taxel n to one row of
+    /// the array are consecutive.
     by_offset: Vec<f64>,
 }
 
-/// What is added up over taxels.
+/// The quantity that is summed over taxels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Gauge {
     Squares,
     Absolutes,
 }
 
-/// Heights are stored in units that grow with time, and rescaled beyond this power.
+/// Heights are stored in units that grow with time, and rescaled when the power exceeds this.
 const HIGHEST: f64 = 200.0;
 
 impl Kernel {
@@ -202,15 +203,15 @@ impl Kernel {
         self.rows * self.columns
     }
 
-    /// What a spike of taxel `n` adds to the taxels of row `row`.
+    /// The contributions of a spike of taxel `n` to the taxels of row `row`.
     fn reach(&self, n: usize, row: usize) -> &[f64] {
         let (y, x) = (n / self.columns, n % self.columns);
         let start = (row + self.rows - 1 - y) * (2 * self.columns - 1) + self.columns - 1 - x;
         &self.by_offset[start..start + self.columns]
     }
 
-    /// Walks through the steps of both patterns; returns for each stretch of time, from step to step and on for ever, what
-    /// the squares or absolutes of the taxels' differences add up to at its beginning.
+    /// Traverses the steps of both patterns. For each interval between steps, and for the time after the last one,
+    /// passes on the sum over taxels of the squared or absolute differences at its beginning.
     pub(super) fn walk(
         &self,
         tau: f64,
@@ -269,7 +270,7 @@ impl Kernel {
         if let Some(exists) = &self.exists {
             return heights.iter().zip(exists.iter().cycle()).filter(|(_, there)| **there).map(|(&h, _)| of(h)).sum();
         }
-        // Eight sums side by side: one alone waits for each addition.
+        // Eight independent sums, because a single sum would wait for each addition.
         let (eights, rest) = heights.as_chunks::<8>();
         let mut sums = [0.0; 8];
         for eight in eights {

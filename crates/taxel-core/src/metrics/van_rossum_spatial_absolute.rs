@@ -1,4 +1,4 @@
-//! 5.12 read as 5.10 is printed: absolute differences over taxels and time.
+//! 5.12 with the formula printed in 5.10: absolute differences summed over taxels and time.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,17 +12,18 @@ use crate::{Result, Stop};
 
 /// The sum over taxels of `|g_m(a) - g_m(b)|` (5.11), integrated over time or summed over the points of a grid.
 ///
-/// 5.12 prints `sum over n of sqrt(g_n(a) - g_n(b))`; the square under the root and the sum over time are those of 5.10.
-/// Exact, as all differences are one exponential between spikes. Time O(spikes x taxels).
+/// 5.12 prints `sum over n of sqrt(g_n(a) - g_n(b))`; the square under the root and the sum over time are taken from
+/// 5.10. Exact, because all differences are one exponential between spikes. Time O(spikes x taxels).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VanRossumSpatialAbsolute {
     /// Smoothing in time and over the array.
     #[serde(flatten)]
     pub smoothing: Smoothing,
-    /// The time that counts, ms: 0 to T in 5.10; all time where it is left out.
+    /// The time that counts, ms: 0 to T in 5.10; by default all time.
     #[serde(default)]
     pub window: Option<(f64, f64)>,
-    /// A sum over points so far apart (ms), from the window's start, both ends included; the integral where it is left out.
+    /// The distance of the points that are summed (ms), from the window's start, both ends included; by default the
+    /// integral.
     #[serde(default)]
     pub step_ms: Option<f64>,
 }
@@ -58,7 +59,7 @@ impl VanRossumSpatialAbsolute {
         step_ms: "ms", Range::ABOVE_0;
     }
 
-    /// The distance of two patterns.
+    /// The distance between two patterns.
     pub(super) fn between(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
         let tau = self.smoothing.tau;
         let exposure = Exposure::new(tau, self.window, self.step_ms);

@@ -1,4 +1,4 @@
-//! Victor-Purpura distance: the cheapest way to turn one spike train into another.
+//! Victor-Purpura distance: the least cost of turning one spike train into another.
 
 mod lanes;
 
@@ -13,14 +13,15 @@ use crate::vectors::Instructions;
 use crate::{Result, Stop};
 use lanes::{Block, lanes};
 
-/// The least cost of turning one train into the other: 1 for each spike removed or added, `q |dt|` for each one moved.
+/// The least cost of turning one train into the other: 1 for each spike removed or added, `q |dt|` for each spike
+/// moved.
 ///
-/// Victor and Purpura (1996), J. Neurophysiol. 76:1310; thesis 6.3.5. Spikes over `2 / q` apart never match, so only
-/// pairs nearer than that are looked at: time O(n + m + pairs within `2 / q`), memory O(m).
+/// Victor and Purpura (1996), J. Neurophysiol. 76:1310; thesis 6.3.5. Spikes more than `2 / q` apart never match, so
+/// only nearer pairs are considered: time O(n + m + pairs within `2 / q`), memory O(m).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VictorPurpura {
-    /// Cost of moving a spike by a ms; infinite: only spikes at the very same time match.
+    /// Cost of moving a spike by 1 ms; if infinite, only spikes at exactly the same time match.
     #[serde(deserialize_with = "number_or_name")]
     pub q: f64,
 }
@@ -62,17 +63,17 @@ impl VictorPurpura {
         q: "1/ms", Range::COST;
     }
 
-    /// Whether moving costs something, and not without end: otherwise spikes are only counted.
+    /// Whether moving has a positive and finite cost; otherwise spikes are only counted.
     pub(super) fn has_reach(&self) -> bool {
         self.q > 0.0 && self.q.is_finite()
     }
 
-    /// Spikes farther apart than this never match; rounded so that none is left out.
+    /// Spikes farther apart than this never match; rounded up so that no pair is left out.
     fn reach(&self) -> f64 {
         2.0 / self.q * (1.0 + 4.0 * f64::EPSILON)
     }
 
-    /// The distance of two ascending trains.
+    /// The distance between two ascending trains.
     pub(super) fn between(&self, a: &[f64], b: &[f64], stop: Stop<'_>) -> Result<f64> {
         let count = |n: usize| n as f64;
         if self.q == 0.0 {
@@ -81,9 +82,9 @@ impl VictorPurpura {
         if self.q == f64::INFINITY {
             return Ok(count(a.len() + b.len() - 2 * coincident(a, b)));
         }
-        // cost[j]: from the spikes of `a` so far to the first j of `b`; only columns lo to hi are kept up to date. Before
-        // them lie spikes too early to match any more, and nothing reads their columns; behind them spikes too late as
-        // yet, each of which costs 1 more than the one before.
+        // `cost[j]` is the cost of turning the spikes of `a` so far into the first j of `b`; only columns lo to hi are
+        // up to date. Earlier columns have spikes too early to match and are no longer read; in later ones, whose
+        // spikes are still too late to match, each spike adds a cost of 1.
         let mut cost = vec![0.0; b.len() + 1];
         let (mut lo, mut hi) = (0, 0);
         let reach = self.reach();
@@ -111,9 +112,10 @@ impl VictorPurpura {
         Ok(cost[hi] + count(b.len() - hi))
     }
 
-    /// Fills a matrix with the sums over trains, many pairs side by side.
+    /// Fills a matrix with the sums of distances over trains, many pairs side by side.
     ///
-    /// Train after train, the columns' trains are sorted by length, so that those side by side are about as long.
+    /// Train after train, the columns' trains are sorted by length, so that trains processed side by side have similar
+    /// lengths.
     pub(super) fn fill(
         &self,
         matrix: &Matrix,
@@ -131,10 +133,10 @@ impl VictorPurpura {
                 .chunks(lanes)
                 .map(|chunk| Block::new(lanes, &chunk.iter().map(|&p| others.train(p, n)).collect::<Vec<_>>()))
                 .collect();
-            // Patterns against each other: those that come later in the order.
+            // For patterns against each other, a row is compared with those that follow in the order.
             let row = |at: usize| if b.is_some() { (at, 0) } else { (order[at], at + 1) };
-            let told = |rows: usize| ((pairs * n + pairs * rows / a.count) / a.trains, pairs);
-            work.each(a.count, &told, |at, stop| {
+            let report = |rows: usize| ((pairs * n + pairs * rows / a.count) / a.trains, pairs);
+            work.each(a.count, &report, |at, stop| {
                 let (i, first) = row(at);
                 let mut cost = Vec::new();
                 for (block, from) in blocks.iter().zip((0..).step_by(lanes)).skip(first / lanes) {
@@ -151,13 +153,13 @@ impl VictorPurpura {
     }
 }
 
-/// The smaller of two numbers, neither of which is NaN: one instruction, which `f64::min` is not.
+/// The smaller of two numbers, neither of which is NaN: a single instruction, unlike `f64::min`.
 #[inline(always)]
 fn lesser(x: f64, y: f64) -> f64 {
     if x < y { x } else { y }
 }
 
-/// How many spikes have a partner at the very same time: what is left to match where moving costs without end.
+/// The number of spikes with a partner at exactly the same time, the only ones that match if moving has infinite cost.
 fn coincident(a: &[f64], b: &[f64]) -> usize {
     let (mut i, mut j, mut n) = (0, 0, 0);
     while i < a.len() && j < b.len() {

@@ -11,26 +11,26 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop};
 
-/// The least cost of turning one pattern into the other: 1 for each spike removed or added, `q |dt|` for each one moved,
-/// `k` for each one that goes to another train.
+/// The least cost of turning one pattern into the other: 1 for each spike removed or added, `q |dt|` for each spike
+/// moved, `k` for each spike moved to another train.
 ///
-/// Aronov (2003), J. Neurosci. Methods 124:175. Dynamic programming is exponential in the number of trains; but what is
-/// asked for is a matching of least cost between the spikes of both patterns, at `q |dt|` (`+ k`) a pair and 1 for each
-/// spike left over. It is found exactly by shortest augmenting paths (Jonker and Volgenant 1987), spike by spike, each
-/// path looking only at pairs that cost less than the 2 of removing and adding. Time O(n (p + n log n)) at worst, where p
-/// is the number of such pairs of n spikes, and O(p) where few of them compete; memory O(n).
+/// Aronov (2003), J. Neurosci. Methods 124:175. His dynamic programming is exponential in the number of trains, but the
+/// distance is the least cost of a matching between the spikes of both patterns, with `q |dt|` (`+ k`) a pair and 1 for
+/// each unmatched spike. It is found exactly by shortest augmenting paths (Jonker and Volgenant 1987), spike by spike;
+/// each path considers only pairs that cost less than 2, the cost of removing and adding. Time O(n (p + n log n)) at
+/// worst, where p is the number of such pairs of n spikes, and O(p) if few of them compete; memory O(n).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VictorPurpuraMultiUnit {
-    /// Cost of moving a spike by a ms; infinite: only spikes at the very same time match.
+    /// Cost of moving a spike by 1 ms; if infinite, only spikes at exactly the same time match.
     #[serde(deserialize_with = "number_or_name")]
     pub q: f64,
-    /// Cost of changing a spike's train: 0 pools all trains, 2 or more keeps them apart.
+    /// Cost of changing a spike's train: 0 pools all trains, 2 or more keeps them separate.
     #[serde(deserialize_with = "number_or_name")]
     pub k: f64,
 }
 
-/// A spike and its train.
+/// A spike time and its train.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Labelled {
     t: f64,
@@ -64,12 +64,13 @@ impl VictorPurpuraMultiUnit {
         k: "", Range::COST;
     }
 
-    /// The distance of two patterns.
+    /// The distance between two patterns.
     pub(super) fn between(&self, (a, p): One<'_>, (b, q): One<'_>, stop: Stop<'_>) -> Result<f64> {
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         for unit in 0..a.trains {
-            // Spikes that both have match for nothing, and some cheapest matching has them so: pairs cost a distance,
-            // so whatever two such spikes are matched with may as well be matched with each other.
+            // Equal spikes of both patterns match at no cost, and some cheapest matching contains these pairs: the
+            // costs satisfy the triangle inequality, so the partners of two equal spikes may be matched with each other
+            // instead.
             for (t, more) in super::merged::merged(a.train(p, unit), b.train(q, unit)) {
                 let side = if more > 0.0 { &mut rows } else { &mut columns };
                 side.extend(std::iter::repeat_n(Labelled { t, unit }, more.abs() as usize));
@@ -81,20 +82,20 @@ impl VictorPurpuraMultiUnit {
         Matching::new(self, rows, columns).solve(stop)
     }
 
-    /// What it costs to turn one spike into another.
+    /// The cost of turning one spike into another.
     fn pair(&self, x: Labelled, y: Labelled) -> f64 {
         let moved = if x.t == y.t || self.q == 0.0 { 0.0 } else { self.q * (x.t - y.t).abs() };
         if x.unit == y.unit { moved } else { moved + self.k }
     }
 }
 
-/// Cost of leaving out a spike and, with it, the one it might have matched.
+/// The cost of removing one spike and adding another instead of matching them.
 const APART: f64 = 2.0;
 
 /// A matching of least cost that grows by one row at a time.
 ///
-/// Every row is matched with a column, or with nothing at [`APART`]; `height` and `depth` are the prices of rows and
-/// columns that prove it cheapest: no pair costs less than its row's height plus its column's depth.
+/// Every row is matched with a column, or unmatched at the cost [`APART`]. `height` and `depth` are dual prices of rows
+/// and columns that prove optimality: no pair costs less than its row's height plus its column's depth.
 struct Matching<'m> {
     costs: &'m VictorPurpuraMultiUnit,
     rows: Vec<Labelled>,
@@ -105,7 +106,7 @@ struct Matching<'m> {
     depth: Vec<f64>,
 }
 
-/// A column by its distance from the row to be matched.
+/// A column with its distance to the row to be matched.
 #[derive(PartialEq)]
 struct At(f64, usize);
 
@@ -132,7 +133,7 @@ impl<'m> Matching<'m> {
 
     fn solve(mut self, stop: Stop<'_>) -> Result<f64> {
         let m = self.columns.len();
-        // Per search: how far each column is, from which row, and which are done.
+        // For each search: the distance of each column, its predecessor row, and whether it is finished.
         let mut far = vec![f64::INFINITY; m];
         let mut from = vec![0; m];
         let mut done = vec![false; m];
@@ -140,10 +141,10 @@ impl<'m> Matching<'m> {
         let mut next = BinaryHeap::new();
         for start in 0..self.rows.len() {
             stop.check()?;
-            // Rows reached, and how far they are.
+            // The rows reached, with their distances.
             let mut reached = vec![(start, 0.0)];
             let mut at = 0;
-            // The cheapest end found: a free column, or a row that gives its own up.
+            // The best end found so far: a free column, or a row that becomes unmatched.
             let (mut least, mut end) = (f64::INFINITY, End::Row(start));
             loop {
                 while let Some(&(row, here)) = reached.get(at) {
@@ -205,7 +206,7 @@ impl<'m> Matching<'m> {
         Ok(sum + (self.rows.len() + m - 2 * pairs) as f64)
     }
 
-    /// Columns that may cost less than [`APART`] with this row, by time alone.
+    /// The columns that may cost less than [`APART`] with this row, judged by time alone.
     fn near(&self, row: usize) -> std::ops::Range<usize> {
         let reach = APART / self.costs.q * (1.0 + 4.0 * f64::EPSILON);
         let t = self.rows[row].t;
@@ -213,7 +214,7 @@ impl<'m> Matching<'m> {
         first..first + self.columns[first..].partition_point(|c| c.t <= t + reach)
     }
 
-    /// Changes partners along the path from `start` to its end.
+    /// Exchanges partners along the path from `start` to its end.
     fn turn(&mut self, start: usize, end: End, from: &[usize]) {
         let (mut row, mut column) = match end {
             End::Row(row) => (row, self.of_row[row].take()),
@@ -233,11 +234,11 @@ impl<'m> Matching<'m> {
     }
 }
 
-/// Where a path ends.
+/// The end of an augmenting path.
 #[derive(Debug, Clone, Copy)]
 enum End {
-    /// At a row that is matched with nothing from now on.
+    /// A row that becomes unmatched.
     Row(usize),
-    /// At a column that nothing was matched with.
+    /// A column that was unmatched.
     Column(usize),
 }

@@ -5,7 +5,7 @@ use super::kernel::{KernelSum, Shape};
 use super::model::{AT_EDGE, AfterSpike, Neuron};
 use super::threshold::{OutputSpike, Threshold};
 
-/// A potential that was trained to reach the threshold may be below it by so many times `touch`.
+/// A trained potential counts as reaching the threshold at an input if it is at most `ROUNDED * touch` mV below it.
 const ROUNDED: f64 = 4.0;
 
 /// The state of a neuron in continuous time.
@@ -14,10 +14,10 @@ pub(super) struct ContinuousStream {
     neuron: Neuron,
     shape: Shape,
     pub(super) threshold: Threshold,
-    /// The potential at `at`.
+    /// The state at time `at`.
     state: KernelSum,
     at: f64,
-    /// The end of the refractory time (or the start of the printed first rise), while it is still to come.
+    /// The end of the refractory time (or the start of the printed first rise), until it has passed.
     edge: Option<f64>,
     next: Next,
 }
@@ -38,7 +38,8 @@ impl ContinuousStream {
         Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: Next::Never }
     }
 
-    /// Continues from a state at `at`, which the caller computed, to an input or the end at `until`; returns the state there.
+    /// Continues from `state` at time `at`, which the caller computed, up to an input or the end at `until`, and
+    /// returns the state at `until`.
     pub(super) fn resume(
         &mut self,
         state: KernelSum,
@@ -56,17 +57,17 @@ impl ContinuousStream {
         self.shape.after(self.state, until - self.at)
     }
 
-    /// The potential at `t`, not before what came last, mV.
+    /// The potential at `t`, which must not be before the state's time, mV.
     pub(super) fn potential(&self, t: f64) -> f64 {
         self.shape.after(self.state, (t - self.at).max(0.0)).b
     }
 
-    /// The end of the refractory time, or the start of the printed first rise, while it is still to come.
+    /// The end of the refractory time, or the start of the printed first rise, until it has passed.
     pub(super) fn edge(&self) -> Option<f64> {
         self.edge
     }
 
-    /// The rest of the threshold's rise at `t`, mV.
+    /// The remaining rise of the threshold at `t`, mV.
     pub(super) fn rise(&self, t: f64) -> f64 {
         self.threshold.rise(t)
     }
@@ -80,10 +81,11 @@ impl ContinuousStream {
         self.shape.add(&mut self.state, weight, self.at - t);
     }
 
-    /// Fires at every crossing up to an input at `t`, included.
+    /// Fires at every crossing up to and including `t`, the time of an input.
     fn settle_at_input(&mut self, t: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
         self.settle(t, horizon, out);
-        // The potential of a trained neuron reaches the threshold to rounding. An input there comes too late to turn it down.
+        // A trained potential touches the threshold only to within rounding, so its computed crossing may be shortly
+        // after an input that is simultaneous with it. Such an input comes too late to suppress the spike.
         if let Next::At(crossing) = self.next
             && crossing - t <= AT_EDGE
             && self.edge.is_none_or(|edge| crossing < edge)
@@ -95,7 +97,7 @@ impl ContinuousStream {
 
     /// How far the potential is below the threshold at `t`, mV.
     fn below(&self, t: f64) -> f64 {
-        // Before the printed first rise sets in there is none; it is an edge of its own.
+        // The printed first rise is 0 until it starts; its start is an edge, which `settle` handles by itself.
         let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(t) };
         self.threshold.base + rise - self.potential(t)
     }
@@ -108,11 +110,11 @@ impl ContinuousStream {
         self.next = Next::Unknown;
     }
 
-    /// Fires at every crossing up to `until`, included; crossings after `horizon` need not be found.
+    /// Fires at every crossing up to and including `until`. Crossings after `horizon` may be left out.
     pub(super) fn settle(&mut self, until: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
         loop {
             let waiting = self.edge.is_some() && self.threshold.fired.is_some();
-            // At the state's own time the potential has been compared already: an input adds 0 there.
+            // The potential at the state's own time has been compared before: an input contributes 0 at its own time.
             if !waiting && until > self.at && self.next == Next::Unknown {
                 self.next = self.crossing(horizon);
             }
@@ -121,7 +123,7 @@ impl ContinuousStream {
                 (_, Some(edge)) if edge <= until => {
                     self.move_to(edge);
                     self.edge = None;
-                    // After the refractory time the neuron fires at once where the potential is above the threshold already.
+                    // If the potential is above the threshold when the refractory time ends, the neuron fires at once.
                     self.next = self.crossing(horizon);
                 }
                 _ => return,
@@ -130,7 +132,7 @@ impl ContinuousStream {
     }
 
     fn crossing(&self, horizon: f64) -> Next {
-        // Before the printed first rise sets in there is none; it is an edge of its own.
+        // The printed first rise is 0 until it starts; its start is an edge, which `settle` handles by itself.
         let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(self.at) };
         let Threshold { base, touch, tau_rec, .. } = self.threshold;
         let found = next_crossing(&self.shape, self.state, (base, touch), rise, tau_rec, horizon - self.at);

@@ -1,23 +1,26 @@
 //! The exact time at which the potential reaches the threshold between two inputs.
 //!
-//! Between input spikes potential less threshold, `g(s) = U(s) - theta - c e^{-s/tau_rec}`, is a sum of few exponentials, and
-//! ends at `-theta`. Its derivative changes sign twice at most, so that `g` has one inner maximum at most, with a rise
-//! before it: the only stretch in which the threshold can be crossed from below.
+//! Between input spikes, potential minus threshold, `g(s) = U(s) - theta - c e^{-s/tau_rec}`, is a sum of few
+//! exponentials (one with a linear factor for the alpha kernel) that tends to `-theta`. Its derivative changes sign at
+//! most twice, so `g` has at most one inner maximum. Only during the rise to this maximum can the potential cross the
+//! threshold from below.
 
 use super::kernel::{Kernel, KernelSum, Shape};
 
-/// The inner maximum of potential less threshold, ms from now.
+/// The inner maximum of potential minus threshold, ms from now.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Peak {
-    /// Where the rise towards it begins.
+    /// The time at which the rise to the maximum begins.
     pub(crate) from: f64,
-    /// Where it is.
+    /// The time of the maximum.
     pub(crate) at: f64,
 }
 
-/// Where the potential first reaches the threshold, ms from now, if no input comes; `rise` decays with `tau_rec`.
+/// The first time at which the potential reaches the threshold, ms from now, if no input follows; `rise` decays with
+/// `tau_rec`.
 ///
-/// A maximum `touch` mV below the threshold reaches it. Crossings later than `within` ms from now need not be found.
+/// A maximum at most `touch` mV below the threshold counts as reaching it. Crossings later than `within` ms from now
+/// may be left out.
 pub(super) fn next_crossing(
     shape: &Shape,
     state: KernelSum,
@@ -30,7 +33,7 @@ pub(super) fn next_crossing(
         return None;
     }
     let risen = |s: f64| if rise == 0.0 { 0.0 } else { rise * (-s / tau_rec).exp() };
-    // Potential less threshold, and its slope.
+    // Potential minus threshold, and its slope.
     let above = |s: f64| {
         let (now, risen) = (shape.after(state, s), risen(s));
         (now.b - theta - risen, shape.slope(now) + risen / tau_rec)
@@ -41,7 +44,8 @@ pub(super) fn next_crossing(
     let (mut low, mut high) = (0.0, within);
     let (at_end, slope) = if within.is_finite() { above(within) } else { (f64::NEG_INFINITY, 0.0) };
     if at_end < 0.0 {
-        // Below at the end it may have been above before, around a maximum; not if it still comes up to its only one.
+        // If `g` is negative at the end, it can have been positive only around its maximum. Without a threshold rise,
+        // `g` has a single extremum, so a `g` that still increases at the end has not passed its maximum.
         if slope > 0.0 && rise == 0.0 {
             return None;
         }
@@ -55,7 +59,8 @@ pub(super) fn next_crossing(
         }
         (low, high) = (peak.from, peak.at);
     }
-    // There is one root between `low` and `high`. Newton's method from the left stays left of it where the curve is concave.
+    // There is exactly one root between `low` and `high`. Newton steps that start on its left stay there where `g` is
+    // concave; a step that leaves the bracket is replaced by a bisection.
     let mut s = low;
     for _ in 0..100 {
         let (value, slope) = above(s);
@@ -66,7 +71,7 @@ pub(super) fn next_crossing(
         }
         let newton = s - value / slope;
         let next = if low <= newton && newton <= high { newton } else { f64::midpoint(low, high) };
-        // Nearer than this the potential's own rounding decides.
+        // Below this distance the rounding of the potential itself decides.
         if (next - s).abs() <= 2.0 * f64::EPSILON * next.max(shape.tau) {
             return Some(next);
         }
@@ -75,17 +80,17 @@ pub(super) fn next_crossing(
     Some(s)
 }
 
-/// The inner maximum of potential less threshold; `None` where it falls from now on, or rises for ever.
+/// The inner maximum of potential minus threshold; `None` if there is none after now.
 pub(crate) fn peak(shape: &Shape, state: KernelSum, rise: f64, tau_rec: f64) -> Option<Peak> {
     match shape.kernel {
         Kernel::Alpha => alpha_peak(state, shape.tau, rise, tau_rec).map(|at| Peak { from: 0.0, at }),
         Kernel::DoubleExponential => double_exponential_peak(shape, state, rise, tau_rec),
-        // Nothing rises between inputs but what is left below 0, and that never reaches a threshold.
+        // A sum of decaying jumps rises only while it is negative, so it has no maximum that could reach a threshold.
         Kernel::Exponential => None,
     }
 }
 
-/// With `f(s) = e^{s/tau} g'(s)`, a straight line and a convex exponential: the first of its zeros.
+/// The first zero of `f(s) = e^{s/tau} g'(s)`, the sum of a straight line and a convex exponential.
 fn alpha_peak(state: KernelSum, tau: f64, rise: f64, tau_rec: f64) -> Option<f64> {
     let KernelSum { a, b } = state;
     let line = -a / (tau * tau);
@@ -99,7 +104,7 @@ fn alpha_peak(state: KernelSum, tau: f64, rise: f64, tau_rec: f64) -> Option<f64
     if value <= 0.0 {
         return None;
     }
-    // f is convex: from the left, Newton falls onto the first zero and never beyond it.
+    // `f` is convex, so Newton's method from the left converges to the first zero without overshooting it.
     for _ in 0..200 {
         let exponential = height * (s * rate).exp();
         value = (a - b) / tau + line * s + exponential;
@@ -119,37 +124,38 @@ fn alpha_peak(state: KernelSum, tau: f64, rise: f64, tau_rec: f64) -> Option<f64
     Some(s)
 }
 
-/// With `f(s) = e^{s/tau_s} g'(s) = B/tau_s - A/tau e^{p s} + c/tau_rec e^{q s}`, which turns once at most.
+/// The maximum by `f(s) = e^{s/tau_s} g'(s) = B/tau_s - A/tau e^{p s} + c/tau_rec e^{q s}`, which has at most one
+/// extremum.
 fn double_exponential_peak(shape: &Shape, state: KernelSum, rise: f64, tau_rec: f64) -> Option<Peak> {
     let Shape { tau, tau_s, scale, rate: p, .. } = *shape;
     let slow = scale * state.a;
     let (constant, fall, height, q) =
         ((slow - state.b) / tau_s, slow / tau, rise / tau_rec, 1.0 / tau_s - 1.0 / tau_rec);
     if rise == 0.0 {
-        // Rises now, and what lasts pulls it down: one zero, in closed form.
+        // `g` increases now and the slow term decreases it later: `f` has one zero, in closed form.
         return (fall > 0.0 && constant > fall).then(|| Peak { from: 0.0, at: (constant / fall).ln() / p });
     }
-    // Scaled by its fastest exponential: the same sign, and no overflow.
+    // `f` divided by its fastest exponential has the same sign and does not overflow.
     let m = p.max(q);
     let f = |s: f64| constant * (-m * s).exp() - fall * ((p - m) * s).exp() + height * ((q - m) * s).exp();
-    // Where f turns: fall p e^{p s} = height q e^{q s}.
+    // The extremum of f: fall p e^{p s} = height q e^{q s}.
     let turn = ((height * q) / (fall * p)).ln() / (p - q);
     let turn = (turn.is_finite() && turn > 0.0).then_some(turn);
     let now = f(0.0);
     let (low, from) = match turn {
-        // Rises at once: the maximum is where f first falls through 0, before or behind its turn.
+        // `g` increases now: its maximum is the first zero of f, before or after the extremum of f.
         _ if now > 0.0 => (0.0, 0.0),
-        // Falls first: a rise begins only if f comes up to its turn.
+        // `g` decreases now: it increases later only if f is positive at its extremum.
         Some(turn) if f(turn) > 0.0 => (turn, if now < 0.0 { zero(f, 0.0, turn) } else { 0.0 }),
         _ => return None,
     };
     let high = match turn {
         Some(turn) if turn > low && f(turn) < 0.0 => turn,
-        // After its turn f is monotone: search forward until it is below 0, or can no longer become so.
+        // f is monotone after its extremum: double the distance until f is negative, or every term is below rounding.
         _ => {
             let mut reach = turn.unwrap_or(0.0).max(low) + tau_s;
             while f(reach) >= 0.0 {
-                // What is left of every term is below rounding there.
+                // Every term is below rounding here.
                 if reach > 50.0 * tau.max(tau_rec) {
                     return None;
                 }
@@ -161,7 +167,7 @@ fn double_exponential_peak(shape: &Shape, state: KernelSum, rise: f64, tau_rec: 
     Some(Peak { from, at: zero(f, low, high) })
 }
 
-/// The zero of `f` between two places of opposite sign, by bisection to rounding.
+/// The zero of `f` between two points of opposite sign, by bisection down to rounding.
 fn zero(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let below = f(low) < 0.0;
     for _ in 0..200 {

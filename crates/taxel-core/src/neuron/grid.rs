@@ -12,14 +12,14 @@ pub(super) struct GridStream {
     shape: Shape,
     pub(super) threshold: Threshold,
     grid: Grid,
-    /// The potential at grid point `point`; inputs of the interval before it are in already.
+    /// The state at grid point `point`, including the inputs of the interval before it.
     state: KernelSum,
-    /// The weights of inputs at that point itself: they move neither potential nor slope before it is left.
+    /// The sum of the weights of inputs exactly at `point`: they change potential and slope only after it.
     arriving: f64,
     point: f64,
-    /// Whether that point has been compared with the threshold.
+    /// Whether `point` has been compared with the threshold.
     compared: bool,
-    /// One step of the grid.
+    /// The decay over one step of the grid.
     step: Step,
 }
 
@@ -39,7 +39,8 @@ impl GridStream {
         }
     }
 
-    /// An input adds to the state at the first point not before it, so it needs one exponential and no queue.
+    /// Adds an input to the state at the first grid point at or after it, at the cost of one exponential and without a
+    /// queue.
     pub(super) fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
         let place = self.grid.place(t);
         let point = place.from();
@@ -68,14 +69,14 @@ impl GridStream {
 
     pub(super) fn potential(&self, t: f64) -> f64 {
         let since = self.grid.between(Place::at(self.point), self.grid.place(t));
-        // An input at the point itself moves nothing before the point is left.
+        // An input exactly at the point contributes nothing at the point itself.
         if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
     }
 
-    /// Steps point by point as long as the potential could reach the threshold without a further input.
+    /// Steps point by point while the potential could still reach the threshold without a further input.
     ///
-    /// Where it could not, the state stays and is advanced in one jump at the next input. The steps depend on the state
-    /// alone, so that a stream cut elsewhere gives the same bits.
+    /// Once it cannot, the state stays where it is and the next input advances it in one jump. The number of steps
+    /// depends only on the state, so a stream that is cut elsewhere gives the same bits.
     fn step_through(&mut self, last: f64, out: &mut Vec<OutputSpike>) {
         while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - self.slack() {
             self.jump(self.point + 1.0);
@@ -83,7 +84,7 @@ impl GridStream {
         }
     }
 
-    /// The distance below the threshold from which on a potential is compared with it, mV.
+    /// A potential at most this far below the threshold must be compared with it exactly, mV.
     fn slack(&self) -> f64 {
         self.threshold.slack(self.grid.rounding_ms(self.grid.time(self.point)))
     }

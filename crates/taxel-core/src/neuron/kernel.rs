@@ -1,4 +1,4 @@
-//! The kernels, and the state of two numbers from which a weighted sum of them is computed at any later time.
+//! The kernels, and the two-number state from which a weighted sum of kernels follows at any later time.
 
 use serde::{Deserialize, Serialize};
 
@@ -29,16 +29,18 @@ pub struct Shape {
 
 /// The state of a weighted sum of kernels without further input.
 ///
-/// This stepwise form neither overflows nor loses digits after a long time, as `e^{-t/tau} (A t/tau - B)` does.
+/// Advancing this state neither overflows nor loses digits after a long time, unlike the closed form
+/// `e^{-t/tau} (A t/tau - B)`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct KernelSum {
-    /// The sum of the decayed weights, which drives the potential, mV; unused where the input itself moves the potential.
+    /// The decayed sum of the weights, which drives the potential, mV; unused if an input makes the potential itself
+    /// jump.
     pub a: f64,
     /// The potential, mV.
     pub b: f64,
 }
 
-/// The effect of a stretch of time without input on a [`KernelSum`]: `a' = aa a`, `b' = ba a + bb b`.
+/// How a [`KernelSum`] decays over a time without input: `a' = aa a`, `b' = ba a + bb b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// From `a` to `a`.
@@ -50,7 +52,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// The state after this stretch.
+    /// The state at the end of the step.
     #[must_use]
     #[inline]
     pub fn apply(&self, state: KernelSum) -> KernelSum {
@@ -59,7 +61,7 @@ impl Step {
 }
 
 impl Shape {
-    /// A kernel with its time constants, ms; `tau_s` matters for [`Kernel::DoubleExponential`] alone.
+    /// A kernel with its time constants, ms; only [`Kernel::DoubleExponential`] uses `tau_s`.
     #[must_use]
     pub fn new(kernel: Kernel, tau: f64, tau_s: f64) -> Self {
         let rate = 1.0 / tau_s - 1.0 / tau;
@@ -78,7 +80,7 @@ impl Shape {
         }
     }
 
-    /// The effect of `dt` ms without input.
+    /// The decay over `dt` ms without input.
     #[must_use]
     #[inline]
     pub fn step(&self, dt: f64) -> Step {
@@ -100,7 +102,7 @@ impl Shape {
         self.step(dt).apply(state)
     }
 
-    /// Adds an input of this weight that came `age` ms ago, 0 or more.
+    /// Adds an input of weight `weight` that arrived `age` ms ago, 0 or more.
     #[inline]
     pub fn add(&self, state: &mut KernelSum, weight: f64, age: f64) {
         let one = self.after(self.input(), age);
@@ -108,14 +110,14 @@ impl Shape {
         state.b += weight * one.b;
     }
 
-    /// The kernel itself, `age` ms after the input; 0 up to the input's own time.
+    /// The kernel `age` ms after the input; 0 up to and including the input's own time.
     #[must_use]
     #[inline]
     pub fn value(&self, age: f64) -> f64 {
         if age <= 0.0 { 0.0 } else { self.after(self.input(), age).b }
     }
 
-    /// When the kernel is largest, ms after the input.
+    /// The time at which the kernel is largest, ms after the input.
     #[must_use]
     pub fn peak(&self) -> f64 {
         match self.kernel {
@@ -125,7 +127,7 @@ impl Shape {
         }
     }
 
-    /// How steeply the potential rises now, mV/ms.
+    /// The slope of the potential now, mV/ms.
     #[must_use]
     #[inline]
     pub fn slope(&self, state: KernelSum) -> f64 {
@@ -136,7 +138,7 @@ impl Shape {
         }
     }
 
-    /// A value that the potential will not exceed while no input comes, mV.
+    /// An upper bound of the potential until the next input, mV.
     #[must_use]
     #[inline]
     pub fn bound(&self, state: KernelSum) -> f64 {
@@ -155,7 +157,7 @@ impl Shape {
         self.after(self.input(), age.min(self.peak())).b
     }
 
-    /// Beyond this many ms a kernel is below the rounding of its largest value.
+    /// The age of an input, ms, from which on its kernel is smaller than the rounding of its largest value.
     #[must_use]
     pub fn forgotten(&self) -> f64 {
         45.0 * self.tau

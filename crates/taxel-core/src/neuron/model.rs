@@ -1,4 +1,4 @@
-//! The parameters of an SRM0 neuron, and what follows from them at once.
+//! The parameters of an SRM0 neuron, and quantities that depend on the parameters alone.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,45 +9,46 @@ use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};
 
-/// What remains of the inputs after the neuron's own spike.
+/// The inputs that still contribute after the neuron's own spike.
 ///
-/// Reading: 6.7 masks the potential for the refractory time and then has the whole linear sum back (`Keep`), while the
-/// sentence before it says that inputs of that time have no effect (`Ignore`); figures 6.9 to 6.11 need `Reset`.
+/// Reading: 6.7 sets the potential to 0 for the refractory time and to the whole linear sum afterwards (`Keep`), while
+/// the preceding sentence states that inputs during that time have no effect (`Ignore`); figures 6.9 to 6.11 need
+/// `Reset`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AfterSpike {
-    /// Every input counts (6.7 as printed).
+    /// All inputs (6.7 as printed).
     #[default]
     Keep,
-    /// Inputs of the refractory time are lost.
+    /// All inputs except those during the refractory time.
     Ignore,
-    /// Every input up to the end of the refractory time is lost.
+    /// Only inputs after the end of the refractory time.
     Reset,
 }
 
 /// The threshold before the first output spike.
 ///
-/// Reading: 6.9 sets the time of a spike number 0 to 0, which raises the threshold from the start; a neuron that has not
-/// fired has no threshold rise.
+/// Reading: 6.9 sets the time of spike number 0 to 0, which raises the threshold from the start. By default taxel
+/// raises it only after a real spike (`theta_0`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum FirstThreshold {
     /// `theta_0` until the first spike.
     #[default]
     #[serde(rename = "theta_0")]
     Base,
-    /// Raised as though the neuron had fired where the listening starts.
+    /// Raised as though the neuron had fired at the start of the inputs.
     #[serde(rename = "printed")]
     Printed,
 }
 
-/// Where the potential is compared with the threshold.
+/// The times at which the potential is compared with the threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Time {
-    /// At every instant: crossings are found exactly between the input spikes.
+    /// Every instant: crossings are computed exactly between the input spikes.
     #[default]
     Continuous,
-    /// At the points `start + k step_ms`.
+    /// The points `start + k step_ms`.
     Grid,
 }
 
@@ -55,21 +56,21 @@ pub enum Time {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Neuron {
-    /// What an input spike does to the potential.
+    /// The effect of an input spike on the potential.
     pub kernel: Kernel,
     /// Membrane time constant, ms.
     pub tau: f64,
-    /// Synaptic time constant of the double exponential kernel, ms; `tau/4` where left out, as the Tempotron has it.
+    /// Synaptic time constant of the double exponential kernel, ms; by default `tau/4`, as for the Tempotron.
     pub tau_s: Option<f64>,
     /// Baseline threshold, mV.
     pub theta_0: f64,
-    /// Rise of the threshold by a spike, mV.
+    /// Rise of the threshold after a spike, mV.
     pub theta_plus: f64,
-    /// Time constant by which that rise decays, ms; `2 tau` where left out, as in Tables 6.1 and 6.2.
+    /// Time constant with which that rise decays, ms; by default `2 tau`, as in Tables 6.1 and 6.2.
     pub tau_rec: Option<f64>,
     /// Absolute refractory time, ms.
     pub refractory: f64,
-    /// What remains after a spike.
+    /// The inputs that still contribute after a spike.
     pub after_spike: AfterSpike,
     /// The threshold before the first spike.
     pub first_threshold: FirstThreshold,
@@ -79,16 +80,17 @@ pub struct Neuron {
     pub step_ms: f64,
 }
 
-/// An input so near an end of a refractory time counts as at it, ms: trained neurons fire within 1e-6 ms of their targets, and
-/// inputs at whole ms often lie just there.
+/// An input at most this far from the end of a refractory time counts as exactly there, ms: trained neurons fire within
+/// 1e-6 ms of their targets, and inputs at whole milliseconds often coincide with such an end.
 pub(crate) const AT_EDGE: f64 = 1e-6;
-/// How far below the threshold a potential may end and still count as reaching it, mV where `theta_0` is 0.3 mV and in
-/// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
+/// A maximum of the potential this far below the threshold still counts as reaching it, mV at `theta_0` = 0.3 mV and in
+/// proportion to it: a trained potential touches the threshold only to within rounding.
 const TOUCH: f64 = 1e-12;
 
-/// The rest at `t` of a rise of `plus` mV that began `recovering` ms ago, mV (6.8).
+/// The remaining threshold rise at `t`, mV (6.8): `plus` mV, decaying since `recovering` ms.
 ///
-/// A rise that begins later than `t` by rounding alone counts, as an input can be exactly at the edge.
+/// A `recovering` that is negative by rounding alone counts as 0, because `t` can be exactly the end of the refractory
+/// time.
 pub(super) fn left_of_rise(plus: f64, recovering: f64, tau_rec: f64, t: f64) -> f64 {
     if plus == 0.0 || recovering < -rounding_ms(t) { 0.0 } else { plus * (-recovering / tau_rec).exp() }
 }
@@ -122,13 +124,13 @@ impl Neuron {
         tau_s(tau_s): "ms", Range::ABOVE_0;
     }
 
-    /// Its parameters, with their defaults and ranges.
+    /// The parameters with their defaults and ranges.
     #[must_use]
     pub fn described() -> Described {
         Described::by(&Self::default(), &[], Self::RANGES)
     }
 
-    /// Checks every parameter.
+    /// Checks the range of every parameter, and that `tau_s` is below `tau`.
     ///
     /// # Errors
     ///
@@ -152,19 +154,20 @@ impl Neuron {
         Ok(())
     }
 
-    /// The unit of potential, mV, in which the threshold is near its default, so that tolerances do not depend on the scale.
+    /// The unit, in mV, in which `theta_0` is near its default of 0.3, so that numerical tolerances do not depend on
+    /// the scale.
     ///
-    /// A power of 2, so that nothing is rounded on the way there and back.
+    /// It is a power of 2, so that scaling there and back rounds nothing.
     pub(crate) fn unit(&self) -> f64 {
         (self.theta_0 / Self::default().theta_0).log2().round().exp2()
     }
 
-    /// The same with its thresholds in units of this many mV.
+    /// The neuron with its thresholds in units of `unit` mV.
     pub(crate) fn in_units(&self, unit: f64) -> Self {
         Self { theta_0: self.theta_0 / unit, theta_plus: self.theta_plus / unit, ..self.clone() }
     }
 
-    /// The time constant by which the threshold recovers, ms.
+    /// The time constant with which the threshold recovers, ms.
     #[must_use]
     pub fn tau_rec(&self) -> f64 {
         self.tau_rec.unwrap_or(2.0 * self.tau)
@@ -176,8 +179,8 @@ impl Neuron {
         self.tau_s.unwrap_or(0.25 * self.tau)
     }
 
-    /// How long an input moves the potential, ms: after it less than 1 % of its largest effect is left, whatever the kernel (of
-    /// 6.5, which is the slowest, after 7.64 tau).
+    /// The time after which an input's effect is less than 1 % of its largest value for every kernel, ms. The slowest,
+    /// 6.5, falls below 1 % after 7.64 tau.
     #[must_use]
     pub fn memory_ms(&self) -> f64 {
         8.0 * self.tau.max(self.tau_s())
@@ -189,20 +192,21 @@ impl Neuron {
         Shape::new(self.kernel, self.tau, self.tau_s())
     }
 
-    /// The threshold `since` ms after the last spike (6.8), or before the first one, mV.
+    /// The threshold `since` ms after the last spike (6.8), or before the first one if `None`, mV.
     ///
-    /// In the refractory time the potential is 0 and the threshold does not matter.
+    /// In the refractory time the potential is 0, so the threshold has no effect.
     #[must_use]
     pub fn threshold(&self, since: Option<f64>) -> f64 {
         self.theta_0 + since.map_or(0.0, |t| self.rise(Some(0.0), t))
     }
 
-    /// The rest at `t` of the threshold's rise by the last spike, mV.
+    /// The remaining threshold rise at `t` after the last spike, mV.
     pub(crate) fn rise(&self, spike: Option<f64>, t: f64) -> f64 {
         spike.map_or(0.0, |spike| left_of_rise(self.theta_plus, t - spike - self.refractory, self.tau_rec(), t))
     }
 
-    /// The time from other times to `t`, ms: on a grid that begins at `start` computed from the numbers of its points.
+    /// A function that returns how long before `t` a time is, ms; on a grid that begins at `start` it uses the points'
+    /// numbers.
     pub(crate) fn ages(&self, start: f64, t: f64) -> impl Fn(f64) -> f64 + use<> {
         let grid = (self.time == Time::Grid).then(|| Grid::new(start, self.step_ms));
         let here = grid.map(|grid| grid.place(t));
@@ -212,17 +216,17 @@ impl Neuron {
         }
     }
 
-    /// How many points of the grid lie from `start` to `end`.
+    /// The number of grid points from `start` to `end`.
     pub(crate) fn points(&self, start: f64, end: f64) -> f64 {
         points_between(start, end, self.step_ms)
     }
 
-    /// Refuses more grid points than can be stored, before memory is allocated.
+    /// Refuses more grid points than fit in memory, before any is allocated.
     pub(crate) fn check_rows(&self, points: f64) -> Result<()> {
         check_points(points, MOST_LAID_OUT, self.step_ms)
     }
 
-    /// How far below the threshold a potential may end and still count as reaching it, mV.
+    /// A maximum of the potential this far below the threshold still counts as reaching it, mV.
     pub(crate) fn touch(&self) -> f64 {
         TOUCH * self.unit()
     }

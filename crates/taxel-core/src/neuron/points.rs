@@ -1,13 +1,13 @@
-//! The points of a grid in time: their times, their numbers, and how many are too many.
+//! The points of a time grid: their times and numbers, and limits on how many are stored or stepped through.
 //!
-//! Far from time 0 neighbouring times are so far apart that `start + k step_ms` is rounded by more than a trained potential may
-//! be off. So the state of a neuron and the ages of its inputs are both computed from the number of a step, never from the
-//! difference of two rounded times.
+//! Far from time 0, neighbouring floating-point times are so far apart that rounding `start + k step_ms` moves a time
+//! by more than a trained potential tolerates. The state of a neuron and the ages of its inputs are therefore both
+//! computed from step numbers, never from differences of rounded times.
 
 use super::rounding::rounding_ms;
 use crate::{Result, problem};
 
-/// The most points that are stored (some GB), and that are stepped through (some ten seconds).
+/// Limits on the points that are stored (a few GB), and on those that are stepped through (about ten seconds).
 pub(crate) const MOST_LAID_OUT: f64 = 2e7;
 pub(super) const MOST_STEPPED: f64 = 1e9;
 
@@ -23,22 +23,22 @@ pub(crate) struct Grid {
 pub(crate) struct Place {
     /// The number of the nearest point.
     point: f64,
-    /// How long after that point, ms; 0 at the point itself, negative before it.
+    /// The time since that point, ms; 0 at the point itself, negative before it.
     rest: f64,
 }
 
 impl Place {
-    /// A point itself.
+    /// The point with number `point` itself.
     pub(crate) fn at(point: f64) -> Self {
         Self { point, rest: 0.0 }
     }
 
-    /// Whether the time is that of a point.
+    /// Whether the time is exactly a grid point.
     pub(crate) fn is_point(self) -> bool {
         self.rest == 0.0
     }
 
-    /// The first point not before the time.
+    /// The first point at or after the time.
     pub(crate) fn from(self) -> f64 {
         if self.rest > 0.0 { self.point + 1.0 } else { self.point }
     }
@@ -48,7 +48,7 @@ impl Place {
         if self.rest >= 0.0 { self.point + 1.0 } else { self.point }
     }
 
-    /// The last point not after the time.
+    /// The last point at or before the time.
     pub(crate) fn until(self) -> f64 {
         if self.rest < 0.0 { self.point - 1.0 } else { self.point }
     }
@@ -64,7 +64,8 @@ impl Grid {
         self.start + point * self.step_ms
     }
 
-    /// The place of a time. Its side of the nearest point is decided by the point's rounded time, its distance is exact.
+    /// The place of a time. The nearest point's rounded time decides whether `t` is before or after it; the distance is
+    /// exact.
     pub(crate) fn place(&self, t: f64) -> Place {
         let since = t - self.start;
         let point = (since / self.step_ms).round();
@@ -79,29 +80,29 @@ impl Grid {
         Place { point, rest: if t > rounded { rest.max(f64::MIN_POSITIVE) } else { rest.min(-f64::MIN_POSITIVE) } }
     }
 
-    /// Whether a time is at or before a point, to rounding.
+    /// Whether a time is at or before a point, within rounding.
     pub(crate) fn has_come(&self, t: f64, point: f64) -> bool {
         let now = self.time(point);
         t <= now + rounding_ms(now)
     }
 
-    /// Whether a time is that of a point, to rounding.
+    /// Whether a time is a grid point, within rounding.
     pub(crate) fn is_at_point(&self, t: f64) -> bool {
         self.place(t).rest.abs() <= rounding_ms(t)
     }
 
-    /// The first point that is not before a time, to rounding.
+    /// The first point at or after a time, within rounding.
     pub(crate) fn first_from(&self, t: f64) -> f64 {
         let nearest = self.place(t).point;
         if self.has_come(t, nearest) { nearest } else { nearest + 1.0 }
     }
 
-    /// How long after one time another is, ms.
+    /// The time from `from` to `to`, ms.
     pub(crate) fn between(&self, from: Place, to: Place) -> f64 {
         (to.point - from.point) * self.step_ms + (to.rest - from.rest)
     }
 
-    /// How many points there are up to `end`, a point that rounding alone puts after it included.
+    /// The number of points up to `end`, including a point that is after `end` by rounding alone.
     pub(crate) fn points_until(&self, end: f64) -> f64 {
         let place = self.place(end);
         let last = if self.time(place.point) <= end + rounding_ms(end) { place.point } else { place.until() };
@@ -114,7 +115,7 @@ impl Grid {
     }
 }
 
-/// How many points of a grid of `step_ms` lie from `start` to `end`, ms.
+/// The number of points of a grid of `step_ms` from `start` to `end`, ms.
 pub(crate) fn points_between(start: f64, end: f64, step_ms: f64) -> f64 {
     Grid::new(start, step_ms).points_until(end)
 }

@@ -1,8 +1,8 @@
 //! Many neurons on the same inputs at once.
 //!
-//! Neurons go in blocks: while all of time runs through a block, its weights stay in the cache. States of a block lie side
-//! by side and move in step. A bound that costs a few operations a neuron excludes most crossings; where
-//! it does not, the code of the single neuron runs, so that both give the same spikes.
+//! Neurons are processed in blocks: the weights of a block stay in the cache while the whole recording runs through it,
+//! and the states of its neurons are advanced together by vector instructions. A cheap upper bound of the potential
+//! excludes most crossings; where it cannot, the code of the single neuron runs, so that both give the same spikes.
 
 mod continuous;
 mod grid;
@@ -15,21 +15,22 @@ use lanes::LANES;
 use super::model::{Neuron, Time};
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// What all neurons have in common.
+/// The input sequence, computed once for all neurons.
 enum Script {
     Continuous(continuous::Script),
     Grid(grid::Script),
 }
 
 impl Neuron {
-    /// The output spikes of many neurons to the same trains, one train a neuron.
+    /// The output spikes of many neurons to the same trains, one train per neuron.
     ///
-    /// Spikes are those of [`Neuron::run`] with each neuron's weights. `weights` holds neuron after neuron, one a train.
-    /// Cost: a few operations an input spike and neuron.
+    /// The spikes equal those of [`Neuron::run`] with each neuron's weights. `weights` lists the weights by neuron, one
+    /// per train.
+    /// Cost: a few operations per input spike and neuron.
     ///
     /// # Errors
     ///
-    /// As [`Neuron::run`], naming neuron and train of a weight.
+    /// Those of [`Neuron::run`]; the message names neuron and train of a weight.
     pub fn run_many<W: Weight>(
         &self,
         weights: &[W],
@@ -79,9 +80,9 @@ impl Neuron {
     }
 }
 
-/// Lays the weights of up to [`LANES`] neurons side by side, train by train; missing neurons weigh 0.
+/// Copies the weights of up to [`LANES`] neurons side by side, train by train; missing neurons get weight 0.
 fn gather<W: Weight>(weights: &[W], block: &mut [[W; LANES]]) {
-    /// So many trains at a time that reading and writing stay within few lines of the cache.
+    /// The number of trains copied at a time, small enough for reads and writes to stay in the cache.
     const TILE: usize = 16;
     let trains = block.len();
     for row in weights.len() / trains.max(1)..LANES {

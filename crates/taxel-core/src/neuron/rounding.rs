@@ -1,7 +1,7 @@
-//! The rounding of times.
+//! The rounding error of times.
 
-/// Rounding of a time that is the sum of others, ms, and in distances of neighbouring numbers: from some 20 minutes on the
-/// latter is larger.
+/// The rounding error allowed for a sum of times: an absolute one, ms, and one in units of the last place, which is the
+/// larger from about 20 minutes on.
 const ROUNDING_MS: f64 = 1e-9;
 const ROUNDINGS: f64 = 4.0;
 

@@ -1,4 +1,4 @@
-//! A neuron on whole trains: its spikes, and its potential where they are given.
+//! A neuron on whole trains: its output spikes, and its potential for given output spikes.
 
 use super::kernel::KernelSum;
 use super::model::{AfterSpike, Neuron, Time};
@@ -8,7 +8,7 @@ use super::threshold::OutputSpike;
 use crate::allowed::one_weight_a_train;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// Grid points between two checks for Ctrl-C.
+/// The number of grid points between two checks for Ctrl-C.
 const POINTS_A_LOOK: f64 = 65_536.0;
 
 impl Neuron {
@@ -16,7 +16,7 @@ impl Neuron {
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters, weights or a factor that make no sense.
+    /// `Problem` if a parameter, a weight or the factor is not valid.
     pub fn stream(&self, weights: &[f64], threshold: f64, start: f64) -> Result<NeuronStream> {
         NeuronStream::new(self, weights, threshold, start)
     }
@@ -25,7 +25,8 @@ impl Neuron {
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters, weights, a factor or trains that make no sense; `Interrupted` where the caller stops it.
+    /// `Problem` if a parameter, a weight, the factor or the trains are not valid; `Interrupted` if the caller stops
+    /// the run.
     pub fn run(
         &self,
         weights: &[f64],
@@ -51,7 +52,7 @@ impl Neuron {
         Ok(out)
     }
 
-    /// Advances a stream on a grid towards `to`, checking for Ctrl-C; the caller advances the rest.
+    /// Advances a stream on a grid towards `to` in pieces, checking for Ctrl-C; the caller advances the last piece.
     fn advance(
         &self,
         stream: &mut NeuronStream,
@@ -75,13 +76,13 @@ impl Neuron {
 
     /// The potential at `times` (ms, ascending), given that the neuron fired at `spikes` (ms, ascending); mV.
     ///
-    /// Without spikes this is the linear sum 6.4. With them it is 6.7: 0 in the refractory time, then what `after_spike`
-    /// leaves. At a spike itself it is the potential before the spike.
+    /// Without spikes this is the linear sum 6.4. With spikes it is 6.7: 0 in the refractory time, then the sum over
+    /// the inputs that `after_spike` keeps. At the time of a spike it is the potential before the spike.
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters, weights or trains that make no sense, or times that do not ascend; `Interrupted` where the
-    /// caller stops it.
+    /// `Problem` if parameters, weights or trains are not valid or times do not ascend; `Interrupted` if the caller
+    /// stops the computation.
     pub fn potential(
         &self,
         weights: &[f64],
@@ -132,7 +133,8 @@ fn potential(
     let (mut next_input, mut next_spike, mut last, mut done) = (0, 0, None, 0_usize);
     let mut out = Vec::with_capacity(times.len());
     for &t in times {
-        // A spike takes effect after its own time, an input from it on; at equal times the spike sees the input (as 0).
+        // A spike takes effect just after its own time, an input from its own time on; at equal times the spike comes
+        // after the input, which still contributes 0.
         loop {
             let spike = spikes.get(next_spike).copied().filter(|&s| s < t);
             let input = inputs.get(next_input).filter(|i| i.t < t && spike.is_none_or(|s| i.t <= s));

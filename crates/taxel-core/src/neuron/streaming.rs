@@ -9,8 +9,8 @@ use crate::{Result, problem};
 
 /// A neuron that runs while its inputs arrive.
 ///
-/// Output depends on the inputs alone, not on when [`NeuronStream::advance`] is called: a crossing is computed from the last
-/// input, never from the last call.
+/// The output depends on the inputs alone, not on the calls of [`NeuronStream::advance`]: a crossing is computed from
+/// the state after the last input, never from that at the last call.
 #[derive(Debug, Clone)]
 pub struct NeuronStream {
     weights: Vec<f64>,
@@ -39,11 +39,11 @@ impl NeuronStream {
         Ok(Self { weights: weights.to_vec(), now: start, clock })
     }
 
-    /// Adds the next input spike, at `t` ms on train `train`; appends the output spikes up to there to `out`.
+    /// Adds the next input spike, at `t` ms on train `train`, and appends the output spikes up to `t` to `out`.
     ///
     /// # Errors
     ///
-    /// `Problem` where the spike comes before an earlier one, or names a train without a weight.
+    /// `Problem` if the spike is earlier than a previous one, or its train has no weight.
     pub fn push(&mut self, t: f64, train: u32, out: &mut Vec<OutputSpike>) -> Result<()> {
         if t.is_nan() || t < self.now {
             return Err(problem!("input spike at {t} ms: time has come to {} ms already", self.now));
@@ -59,7 +59,7 @@ impl NeuronStream {
         Ok(())
     }
 
-    /// Advances to `t` ms: no later input is before it. An earlier time changes nothing.
+    /// Advances to `t` ms, promising that no later input is before `t`. An earlier time changes nothing.
     pub fn advance(&mut self, t: f64, out: &mut Vec<OutputSpike>) {
         if t >= self.now {
             self.now = t;
@@ -75,7 +75,7 @@ impl NeuronStream {
         self.now
     }
 
-    /// The potential now, as 6.7 has it (0 in the refractory time), mV.
+    /// The present potential by 6.7 (0 in the refractory time), mV.
     #[must_use]
     pub fn potential(&self) -> f64 {
         let (refractory, value) = match &self.clock {

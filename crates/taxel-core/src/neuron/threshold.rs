@@ -1,4 +1,4 @@
-//! The threshold after a spike, and the spike that crossed it.
+//! The threshold after a spike, and output spikes.
 
 use super::model::{FirstThreshold, Neuron, left_of_rise};
 use super::rounding::rounding_ms;
@@ -6,28 +6,28 @@ use super::rounding::rounding_ms;
 /// A spike of the neuron.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutputSpike {
-    /// When the potential crossed the threshold (on a grid: the first point at or above it), ms.
+    /// The time at which the potential crossed the threshold (on a grid: the first point at or above it), ms.
     pub t: f64,
-    /// How steeply it crossed, mV/ms.
+    /// The slope of potential minus threshold at the crossing, mV/ms.
     pub slope: f64,
 }
 
-/// The steepest rise of a potential that counts, thresholds a ms.
+/// The largest slope that is allowed for when a time is rounded, in thresholds per ms.
 const STEEPEST: f64 = 1e4;
 
-/// The threshold and the last spike, from which it recovers.
+/// The threshold, and the last spike since which it recovers.
 #[derive(Debug, Clone)]
 pub(super) struct Threshold {
     /// `theta_0` times the factor, mV.
     pub(super) base: f64,
-    /// How far below it counts as reaching it, mV.
+    /// A potential this far below the threshold still counts as reaching it, mV.
     pub(super) touch: f64,
     plus: f64,
     pub(super) tau_rec: f64,
     refractory: f64,
-    /// The last spike, or spike number 0 of the printed reading.
+    /// The last spike, or spike number 0 of the printed first threshold.
     since: Option<f64>,
-    /// The last spike proper.
+    /// The last real spike.
     pub(super) fired: Option<f64>,
 }
 
@@ -49,7 +49,7 @@ impl Threshold {
         self.fired = Some(t);
     }
 
-    /// The rest of the rise at `t`, mV.
+    /// The remaining rise at `t`, mV.
     pub(super) fn rise(&self, t: f64) -> f64 {
         self.since.map_or(0.0, |since| left_of_rise(self.plus, t - since - self.refractory, self.tau_rec, t))
     }
@@ -59,15 +59,15 @@ impl Threshold {
         self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + rounding_ms(t))
     }
 
-    /// Whether a potential on a grid has reached the threshold at `t`, a time that may be rounded by `rounding_ms`, and the
-    /// neuron may fire: rounding may move a potential by its slope, and the threshold by its own, times that.
+    /// Whether the neuron may fire at grid time `t` and its potential has reached the threshold. The time may be off by
+    /// `rounding_ms`, which moves the potential by its slope times that, and the threshold likewise.
     pub(super) fn reached(&self, t: f64, potential: f64, slope: f64, rounding_ms: f64) -> bool {
         let slope = slope.abs().min(STEEPEST * self.base) + self.plus / self.tau_rec;
         let potential = potential + self.touch + slope * rounding_ms;
         potential >= self.base && !self.silent_at(t) && potential >= self.base + self.rise(t)
     }
 
-    /// No potential lower than so far below the threshold, mV, has reached it, whatever its slope.
+    /// A potential further below the threshold than this, mV, has not reached it, whatever its slope.
     pub(super) fn slack(&self, rounding_ms: f64) -> f64 {
         self.touch + (STEEPEST * self.base + self.plus / self.tau_rec) * rounding_ms
     }

@@ -1,26 +1,27 @@
-//! Numbers on the border of a cache line.
+//! Arrays of numbers that are aligned to cache lines.
 
 use super::eight::LANES;
 
 /// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// Something that begins on a cache line's border.
+/// A value that is aligned to a cache line.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct OnLine<T>(pub(crate) T);
 
-/// Numbers on a cache line's border, so that no vector straddles two lines.
+/// Numbers aligned to a cache line, so that no vector straddles two lines.
 #[derive(Debug, Default)]
 pub(crate) struct Aligned {
-    /// With room before and behind, as the allocator knows no such border.
+    /// Allocated a vector longer than needed, because the allocator does not align to cache lines;
+    /// the numbers begin at `from`.
     numbers: Vec<f64>,
     from: usize,
     len: usize,
 }
 
 impl Aligned {
-    /// Zeros, which take no memory from the machine until something is written there.
+    /// Zeros, for which the operating system reserves no memory until they are written.
     pub(crate) fn zeros(len: usize) -> Self {
         let len = len.next_multiple_of(LANES);
         let numbers = vec![0.0; len + LANES];

@@ -1,9 +1,9 @@
-//! Eight numbers in the machine's registers.
+//! Vectors of eight numbers.
 
-/// Numbers in a vector of the widest kind.
+/// The number of values in a vector of the widest kind.
 pub(crate) const LANES: usize = 8;
 
-/// Eight numbers in the machine's registers.
+/// Eight numbers in one or two of the machine's vector registers.
 pub(crate) trait Vector: Copy {
     fn splat(value: f64) -> Self;
     fn load(from: &[f64; LANES]) -> Self;
@@ -68,7 +68,7 @@ mod x86 {
 
     use super::{LANES, Vector};
 
-    /// A vector of AVX-512; made only in functions compiled for it.
+    /// A vector of AVX-512; constructed only in functions compiled for it.
     #[derive(Clone, Copy)]
     pub(crate) struct Zmm(__m512d);
 
@@ -120,7 +120,7 @@ mod x86 {
         }
     }
 
-    /// Two vectors of AVX2; made only in functions compiled for it.
+    /// Two vectors of AVX2; constructed only in functions compiled for it.
     #[derive(Clone, Copy)]
     pub(crate) struct Ymm(__m256d, __m256d);
 
@@ -182,13 +182,13 @@ mod x86 {
     }
 }
 
-/// Numbers by eights; what does not fill the last is left out.
+/// Numbers in groups of eight; an incomplete last group is left out.
 #[inline(always)]
 pub(crate) fn lines(numbers: &[f64]) -> &[[f64; LANES]] {
     numbers.as_chunks().0
 }
 
-/// As [`lines`].
+/// Mutable [`lines`].
 #[inline(always)]
 pub(crate) fn lines_mut(numbers: &mut [f64]) -> &mut [[f64; LANES]] {
     numbers.as_chunks_mut().0

@@ -1,14 +1,14 @@
-//! The chosen of eight 16-bit lanes brought to the front, where the machine has no instruction for it.
+//! Compaction of selected 16-bit lanes to the front of a vector, for machines without an instruction for it.
 
-/// For each choice of eight 16-bit lanes (a bit each) the bytes that a `pshufb` fetches: the chosen lanes in order, and
-/// behind them the last chosen one again and again; of an empty choice, zeros.
+/// For each selection of eight 16-bit lanes (one bit per lane) the byte indices for `pshufb`: the selected lanes in
+/// order, then the last selected lane repeated; for an empty selection, zeros.
 pub(crate) static TO_FRONT: [[u8; 16]; 256] = {
     let mut out = [[0x80; 16]; 256];
     let mut choice = 1_u32;
     while choice < 256 {
         let (mut from, mut to) = (0, 0);
         while to < 8 {
-            // The next chosen lane, if there is one, else the last one stays.
+            // Advances to the next selected lane; after the last one `from` stays.
             let rest = (choice >> from) & !1;
             if to == 0 {
                 from = choice.trailing_zeros();

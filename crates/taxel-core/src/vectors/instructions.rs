@@ -4,27 +4,27 @@ use std::sync::OnceLock;
 
 use crate::{Result, problem};
 
-/// The best set that may be used, once it is known.
+/// The widest set that may be used, once it has been determined.
 static BEST: OnceLock<Instructions> = OnceLock::new();
 
-/// Sets of vector instructions that code is written or compiled for.
+/// A set of vector instructions for which code is written or compiled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Instructions {
-    /// None: on any machine.
+    /// No vector instructions: runs on every machine.
     Plain,
     /// AVX2 with fused multiply-add (and BMI1, POPCNT).
     Avx2,
     /// AVX-512 F, BW, DQ and VL.
     Avx512,
-    /// AVX-512 that moves single bytes as well: VBMI and VBMI2 (and BMI2, LZCNT).
+    /// AVX-512 with permutations of single bytes: VBMI and VBMI2 (and BMI2, LZCNT).
     Avx512Bytes,
 }
 
 impl Instructions {
-    /// All, from the plainest; each machine that has one has those before it.
+    /// All sets, from the narrowest; a machine that has one also has those before it.
     pub const ALL: [Self; 4] = [Self::Plain, Self::Avx2, Self::Avx512, Self::Avx512Bytes];
 
-    /// The best set that may be used: the widest of this machine, or a narrower one after [`cap`](Self::cap).
+    /// The widest set that may be used: that of this machine, or a narrower one after [`cap`](Self::cap).
     #[must_use]
     #[inline]
     pub fn best() -> Self {
@@ -36,11 +36,11 @@ impl Instructions {
         Self::ALL.into_iter().take_while(|set| set.detected()).last().unwrap_or(Self::Plain)
     }
 
-    /// Allows no set wider than the named one in this process; asked once, before anything is computed.
+    /// Allows no set wider than the named one in this process; must be called before anything is computed.
     ///
     /// # Errors
     ///
-    /// `Problem` where no set is called so, where this machine does not have it, or where another set is in use already.
+    /// `Problem` if no set has this name, if this machine lacks it, or if another set is already in use.
     pub fn cap(name: &str) -> Result<()> {
         let set = Self::named(name).ok_or_else(|| {
             problem!("TAXEL_INSTRUCTIONS is {name:?}: must be {}", Self::ALL.map(Self::name).join(", "))
@@ -55,13 +55,13 @@ impl Instructions {
         Ok(())
     }
 
-    /// The set of this name.
+    /// The set with this name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|set| set.name() == name)
     }
 
-    /// What the set is called in TAXEL_INSTRUCTIONS.
+    /// The name of the set in TAXEL_INSTRUCTIONS.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -79,16 +79,16 @@ impl Instructions {
         self <= Self::best()
     }
 
-    /// Itself, where this machine has it.
+    /// Returns the set if this machine has it.
     ///
     /// # Errors
     ///
-    /// `Problem` where it does not.
+    /// `Problem` if the machine lacks the set.
     pub fn checked(self) -> Result<Self> {
         if self.present() { Ok(self) } else { Err(problem!("instructions {self:?}: this machine does not have them")) }
     }
 
-    /// Whether the machine has what this set has beyond the one before.
+    /// Whether the machine has the instructions that this set adds to the one before.
     fn detected(self) -> bool {
         match self {
             Self::Plain => true,
@@ -119,7 +119,7 @@ impl Instructions {
     }
 }
 
-/// Calls what fits a set of [`Instructions`], in a function with arms compiled for AVX-512, for AVX2 and plainly.
+/// Dispatches on a set of [`Instructions`] to a variant compiled for AVX-512, for AVX2 or without vector instructions.
 macro_rules! by_width {
     ($set:expr, ($($argument:ident: $kind:ty),*) -> $out:ty, [$($generic:tt)*], $avx512:expr, $avx2:expr, $plain:expr) => {{
         #[cfg(target_arch = "x86_64")]
@@ -134,7 +134,8 @@ macro_rules! by_width {
             }
             let set: $crate::vectors::Instructions = $set;
             if set >= $crate::vectors::Instructions::Avx512 {
-                // SAFETY: the machine has these: the set is its best, or was just asserted to be present.
+                // SAFETY: the machine has these instructions: the set is its widest, or was just asserted to be
+                // present.
                 return unsafe { avx512($($argument),*) };
             }
             if set == $crate::vectors::Instructions::Avx2 {
@@ -142,17 +143,18 @@ macro_rules! by_width {
                 return unsafe { avx2($($argument),*) };
             }
         }
-        // Other machines have one set, which needs no choice.
+        // Other architectures have one variant only.
         #[cfg(not(target_arch = "x86_64"))]
         let _: $crate::vectors::Instructions = $set;
         $plain($($argument),*)
     }};
 }
 
-/// Defines a function that runs compiled for AVX-512 or AVX2 where the machine has it, and as it stands elsewhere.
+/// Defines a function that is compiled for AVX-512, for AVX2 and without either, and dispatches to the machine's
+/// variant.
 ///
-/// Only the width of vectors differs, never the arithmetic (the compiler fuses nothing by itself), so all machines give
-/// the same bits. What the function calls must be `#[inline(always)]` to be compiled with it.
+/// Only the width of the vectors differs, not the arithmetic (the compiler fuses no operations by itself), so every
+/// machine computes the same bits. Functions called inside must be `#[inline(always)]` to be compiled for the same set.
 macro_rules! wide {
     (
         $(#[$about:meta])*
@@ -176,10 +178,10 @@ macro_rules! wide {
     };
 }
 
-/// Defines a function over [`Vector`](super::Vector)s `V`, compiled for AVX-512, for AVX2 and plainly.
+/// Defines a function over [`Vector`](super::Vector)s `V`, compiled for AVX-512, for AVX2 and without either.
 ///
-/// The machine's best is taken; where the arguments begin with `on NAME;`, the caller names the set, which the machine
-/// must have.
+/// The widest set is used by default; if the arguments begin with `on NAME;`, the caller passes the set, which the
+/// machine must have.
 macro_rules! kernel {
     (
         $(#[$about:meta])*

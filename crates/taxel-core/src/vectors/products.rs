@@ -4,7 +4,7 @@ use super::eight::{LANES, Vector, lines, lines_mut};
 use super::instructions::kernel;
 
 kernel! {
-    /// `a.b`; what does not fill a line counts too.
+    /// The dot product `a.b`, including an incomplete last group.
     pub(crate) fn dot<V>(a: &[f64], b: &[f64]) -> f64 {
         let mut sums = [V::splat(0.0); 4];
         let (a4, b4) = (lines(a).chunks_exact(4), lines(b).chunks_exact(4));
@@ -21,7 +21,7 @@ kernel! {
     }
 }
 
-/// Products of S rows with x, by vectors.
+/// The dot products of S rows with x.
 #[inline(always)]
 pub(crate) fn times<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], x: &[[f64; LANES]]) -> [f64; S] {
     let rows = rows.map(|row| &row[..x.len()]);
@@ -35,7 +35,7 @@ pub(crate) fn times<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], x: &[
     sums.map(V::total)
 }
 
-/// `sum += by[0] rows[0] + ..`, by vectors.
+/// `sum += by[0] rows[0] + by[1] rows[1] + ..`.
 #[inline(always)]
 pub(crate) fn add_lines<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], by: [f64; S], sum: &mut [[f64; LANES]]) {
     let rows = rows.map(|row| &row[..sum.len()]);

@@ -1,18 +1,18 @@
-//! Short windows of numbers, read from many places at once.
+//! Short windows of consecutive numbers, gathered from many positions at once.
 
-/// Windows in a row.
+/// The number of windows in a row.
 pub(crate) const ROW: usize = 16;
 
-/// Numbers in a window.
+/// The number of values in a window.
 pub(crate) const WIDE: usize = 4;
 
-/// Where windows of [`WIDE`] numbers begin in a slice, in rows.
+/// The start positions of windows of [`WIDE`] numbers in a slice, in rows of [`ROW`].
 ///
-/// How far they reach is known, so that reading asks once a row, not once a window.
+/// The furthest end is stored, so that a read checks its bounds once per row, not once per window.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Windows {
     starts: Vec<[u32; ROW]>,
-    /// No window ends behind this.
+    /// The largest end position of any window.
     end: usize,
 }
 
@@ -23,28 +23,31 @@ impl Windows {
         self.starts.push(starts);
     }
 
-    /// Where those of a row begin.
+    /// The start positions of a row's windows.
     pub(crate) fn starts(&self, row: usize) -> &[u32; ROW] {
         &self.starts[row]
     }
 
-    /// Where the windows of a row lie, all of which may be read.
+    /// Pointers to the windows of a row, checked to be within `from`.
     #[inline(always)]
     fn within(&self, row: usize, from: &[f32]) -> [*const f32; ROW] {
         assert!(self.end <= from.len(), "windows must lie within what they are read from");
-        // SAFETY: `push` saw that every window ends by `end`, which was just seen to be within `from`.
+        // SAFETY: by `push`, every window ends at or before `end`, which the assertion shows to be
+        // within `from`.
         self.starts[row].map(|start| unsafe { from.as_ptr().add(start as usize) })
     }
 
-    /// Reads the windows of a row: the first number of each, the second of each, and so on.
+    /// Reads the windows of a row, transposed: the first number of each window, the second of each,
+    /// and so on.
     #[inline(always)]
     pub(crate) fn read(&self, row: usize, from: &[f32]) -> [[f32; ROW]; WIDE] {
-        // SAFETY: these windows may be read; an array of f32 may stand wherever an f32 may.
+        // SAFETY: `within` checked the windows; an array of f32 has the alignment of an f32.
         let read = self.within(row, from).map(|at| unsafe { at.cast::<[f32; WIDE]>().read() });
         std::array::from_fn(|k| std::array::from_fn(|lane| read[lane][k]))
     }
 
-    /// As [`read`](Self::read), in 8 shuffles, where the compiler finds 16 and as many blends.
+    /// [`read`](Self::read) in 8 shuffles, instead of the 16 shuffles and 16 blends that the compiler
+    /// generates.
     #[cfg(target_arch = "x86_64")]
     #[inline]
     #[target_feature(enable = "avx512f")]
@@ -54,7 +57,7 @@ impl Windows {
         let at = self.within(row, from);
         let mut every_fourth = [_mm512_setzero_ps(); 4];
         for (k, windows) in every_fourth.iter_mut().enumerate() {
-            // SAFETY: these windows may be read, at any address.
+            // SAFETY: `within` checked the windows, and the loads need no alignment.
             let (a, b, c, d) = unsafe {
                 (_mm_loadu_ps(at[k]), _mm_loadu_ps(at[k + 4]), _mm_loadu_ps(at[k + 8]), _mm_loadu_ps(at[k + 12]))
             };
@@ -74,7 +77,7 @@ impl Windows {
         columns
     }
 
-    /// As [`read`](Self::read), in 16 shuffles of 256 bits.
+    /// [`read`](Self::read) in 16 shuffles of 256 bits.
     #[cfg(target_arch = "x86_64")]
     #[inline]
     #[target_feature(enable = "avx2")]
@@ -84,7 +87,7 @@ impl Windows {
         let at = self.within(row, from);
         let mut columns = [[0.0; ROW]; WIDE];
         for half in [0, ROW / 2] {
-            // SAFETY: these windows may be read, at any address.
+            // SAFETY: `within` checked the windows, and the loads need no alignment.
             let [a, b, c, d] = std::array::from_fn(|k| unsafe {
                 let (early, late) = (_mm_loadu_ps(at[half + k]), _mm_loadu_ps(at[half + k + 4]));
                 _mm256_set_m128(late, early)
@@ -120,16 +123,16 @@ mod tests {
             assert_eq!(windows.read(row, &from), wanted);
             #[cfg(target_arch = "x86_64")]
             if crate::vectors::Instructions::Avx2.present() {
-                // SAFETY: the machine has it.
+                // SAFETY: the machine has AVX2.
                 assert_eq!(unsafe { windows.read_avx2(row, &from) }, wanted);
             }
             #[cfg(target_arch = "x86_64")]
             if crate::vectors::Instructions::Avx512.present() {
-                // SAFETY: the machine has them.
+                // SAFETY: the machine has AVX-512.
                 assert_eq!(unsafe { windows.read_avx512(row, &from) }, wanted);
             }
         }
-        // Any row is refused where one window of any row would lie outside.
+        // Any row is refused if a window of any row ends outside the slice.
         assert!(std::panic::catch_unwind(|| windows.read(0, &from[..20])).is_err());
     }
 }

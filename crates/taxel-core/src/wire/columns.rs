@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::{Events, Intensities, Marker, Result, problem};
 
-/// Columns to be filled; all equally long, but for `ticks` and `present` where rows have no intensities.
+/// Columns that a decoder fills, all equally long; `ticks` and `present` may be empty if no row has an intensity.
 #[derive(Debug)]
 pub struct Room<'a> {
     pub(in crate::wire) t: &'a mut [MaybeUninit<i64>],
@@ -17,11 +17,11 @@ pub struct Room<'a> {
 }
 
 impl<'a> Room<'a> {
-    /// Room in the given columns; polarity and presence become 0 or 1.
+    /// Views the given columns as unfilled; the decoder writes polarity and presence as 0 or 1.
     ///
     /// # Errors
     ///
-    /// `Problem` where they are not equally long.
+    /// `Problem` if the columns are not equally long.
     pub fn new(t: &'a mut [i64], [x, y, ticks]: [&'a mut [u16]; 3], [p, present]: [&'a mut [u8]; 2]) -> Result<Self> {
         if [x.len(), y.len(), ticks.len(), p.len(), present.len()].iter().any(|&n| n != t.len()) {
             return Err(problem!("columns to fill must be equally long"));
@@ -37,7 +37,7 @@ impl<'a> Room<'a> {
         self.t.len()
     }
 
-    /// The room from a row on.
+    /// The part of the columns from a row on.
     pub(in crate::wire) fn behind(&mut self, row: usize) -> Room<'_> {
         Room {
             t: &mut self.t[row..],
@@ -49,37 +49,39 @@ impl<'a> Room<'a> {
         }
     }
 
-    /// Writes "none" for the first rows.
+    /// Marks the first rows as without intensity.
     pub(in crate::wire) fn without_intensities(&mut self, rows: usize) {
         self.ticks[..rows].fill(MaybeUninit::new(0));
         self.present[..rows].fill(MaybeUninit::new(false));
     }
 }
 
-/// The same entries, to be written only.
+/// Views the same entries as uninitialised, for writing only.
 ///
 /// # Safety
 ///
 /// `U` must have the size and alignment of `T`, and the caller must write valid `U` that are valid `T` too.
 unsafe fn open<T, U>(column: &mut [T]) -> &mut [MaybeUninit<U>] {
-    // SAFETY: the caller's promise; length and lifetime are the slice's own.
+    // SAFETY: the caller guarantees this; length and lifetime are the slice's own.
     unsafe { std::slice::from_raw_parts_mut(column.as_mut_ptr().cast(), column.len()) }
 }
 
-/// What a decoder wrote into columns.
+/// How much of the columns a decoder wrote.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Filled {
-    /// Rows.
+    /// Number of rows written.
     pub rows: usize,
-    /// Whether the columns of intensities were written too; else no event has one.
+    /// Whether the columns of intensities were written too; otherwise no event has an intensity.
     pub paired: bool,
 }
 
-/// Appends rows to events: `fill` gets room for `most` of them, whether intensities are there already, and the markers.
+/// Appends rows to events: `fill` gets room for `most` rows, whether the events have intensities so far, and the
+/// markers.
 ///
 /// # Safety
 ///
-/// `fill` must have written as many rows as it says: t, x, y and p of each, and with `paired` ticks and present too.
+/// `fill` must have written the number of rows that it returns: t, x, y and p of each, and with `paired` ticks and
+/// present too.
 #[inline]
 pub(in crate::wire) unsafe fn append(
     out: &mut Events,
@@ -128,20 +130,21 @@ pub(in crate::wire) unsafe fn append(
     }
 }
 
-/// Where version 2 writes the rows of datagrams: columns that grow, or columns that were laid out.
+/// The destination of the rows that version 2 decodes: columns that grow, or columns that the caller allocated.
 pub(in crate::wire) trait Table {
-    /// Takes a start or a stop.
+    /// Appends a start or a stop marker.
     fn mark(&mut self, marker: Marker);
 
-    /// Whether each row has an intensity, or the mark that it has none.
+    /// Whether the intensity columns (ticks and present) are written for each row.
     fn paired(&self) -> bool;
 
-    /// Takes rows: `fill` gets room, the row from which on there is some for `most` of them, and whether each has an intensity or the mark that it has none, as it
-    /// must where they are `valued`; it returns how many it wrote. States gave them where they are `repaired`.
+    /// Appends rows: `fill` gets the room, the index of the first free row (at least `most` rows follow) and whether it
+    /// must write the intensity columns, which it must if the rows are `valued`; it returns the number of rows that it
+    /// wrote. Rows decoded from states are marked as `repaired`.
     ///
     /// # Safety
     ///
-    /// `fill` must have written as many rows as it says, as [`append`] asks for.
+    /// `fill` must have written the number of rows that it returns, as [`append`] requires.
     unsafe fn rows(
         &mut self,
         most: usize,
@@ -188,7 +191,8 @@ impl Table for Events {
         };
         let rows = fill(&mut room, 0, paired);
         assert!(rows <= most, "more rows than there was room for");
-        // SAFETY: the caller's promise: so many entries were written behind each column's own, into what was reserved.
+        // SAFETY: the caller guarantees that `fill` wrote this many entries after the end of each column, into reserved
+        // capacity.
         unsafe {
             t.set_len(t.len() + rows);
             x.set_len(x.len() + rows);
@@ -203,25 +207,25 @@ impl Table for Events {
     }
 }
 
-/// Room for so many entries behind a column's own.
+/// The spare capacity of a column, as this many entries after its end.
 #[inline]
 fn spare<T>(column: &mut Vec<T>, entries: usize) -> &mut [MaybeUninit<T>] {
     column.reserve(entries);
     &mut column.spare_capacity_mut()[..entries]
 }
 
-/// What was written into columns that were laid out, and what stands beside them.
+/// What was written into columns that the caller allocated, and the markers found with it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Columns {
     /// How far the columns were filled.
     pub filled: Filled,
-    /// Which rows states gave; none where no row is of that kind.
+    /// Which rows were decoded from states; none if no row was.
     pub repaired: Option<Vec<bool>>,
-    /// Starts and stops, as they came.
+    /// Starts and stops, in the order of the stream.
     pub markers: Vec<Marker>,
 }
 
-/// Columns that were laid out, as they fill from their first row on.
+/// Columns that the caller allocated, filled from their first row on.
 pub(in crate::wire) struct Laid<'a> {
     room: Room<'a>,
     filled: Filled,

@@ -5,18 +5,18 @@ use crate::{Error, Result, problem};
 /// Sets one 32-bit register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Command {
-    /// 0 to 7.
+    /// Number of the register, 0 to 7.
     pub register: u8,
-    /// The whole register.
+    /// New value of the whole register.
     pub value: u32,
 }
 
 impl Command {
-    /// A write of `value` to `register`.
+    /// A command that writes `value` to `register`.
     ///
     /// # Errors
     ///
-    /// `Problem` where the register is above 7.
+    /// `Problem` if the register is above 7.
     pub fn new(register: u8, value: u32) -> Result<Self> {
         if register > 7 {
             return Err(problem!("register {register}: the board has registers 0 to 7"));
@@ -24,7 +24,8 @@ impl Command {
         Ok(Self { register, value })
     }
 
-    /// The five bytes: register and the top bits of the value's bytes first, then seven bits of each byte.
+    /// The command's five bytes: the first holds the register and the top bits of the value's four bytes, the others
+    /// seven bits each.
     #[must_use]
     pub fn to_bytes(self) -> [u8; 5] {
         let v = self.value.to_be_bytes();
@@ -32,11 +33,11 @@ impl Command {
         [0x80 | (self.register & 7) << 4 | tops, v[0] & 0x7f, v[1] & 0x7f, v[2] & 0x7f, v[3] & 0x7f]
     }
 
-    /// Reads five bytes.
+    /// Parses a command's five bytes.
     ///
     /// # Errors
     ///
-    /// `Format` where the first byte lacks its top bit or another has it.
+    /// `Format` if the first byte's top bit is clear or another byte's is set.
     pub fn from_bytes(b: [u8; 5]) -> Result<Self> {
         if let Some(k) = (0..5).find(|&k| (b[k] >= 0x80) != (k == 0)) {
             let right = if k == 0 { "80 or above" } else { "below 80" };
@@ -47,7 +48,7 @@ impl Command {
     }
 }
 
-/// Finds commands in bytes as they come, and its place again after damage.
+/// Parses commands from bytes as they arrive, and resynchronises after damage.
 #[derive(Debug, Clone, Default)]
 pub struct CommandReader {
     bytes: [u8; 5],
@@ -56,7 +57,7 @@ pub struct CommandReader {
 }
 
 impl CommandReader {
-    /// Takes the next byte; gives the command that it completes.
+    /// Consumes the next byte; returns the command that it completes.
     pub fn push(&mut self, byte: u8) -> Option<Command> {
         if byte >= 0x80 {
             self.skipped += self.have as u64;
@@ -74,7 +75,7 @@ impl CommandReader {
         Command::from_bytes(self.bytes).ok()
     }
 
-    /// Bytes that belonged to no whole command.
+    /// Number of bytes that belonged to no whole command.
     #[must_use]
     pub fn skipped(&self) -> u64 {
         self.skipped

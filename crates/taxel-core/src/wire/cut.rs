@@ -1,27 +1,28 @@
-//! Raw bytes of version 1 cut into datagrams, as a recorder would have received them.
+//! Cuts raw bytes of version 1 into datagrams, as a recorder would have received them.
 
 use super::decoder::clock::Clock;
 use super::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
 
-/// Bytes of a datagram at most: 280 words.
+/// Largest datagram, bytes: 280 words.
 const MOST_BYTES: usize = 1400;
 
-/// The longest time from a datagram's first stamp to its last, us: readers look for times within half a turn of the stamps.
+/// Longest time from a datagram's first stamp to its last, us. A reader assumes that a time is within half a turn of
+/// the stamps.
 const LONGEST_US: i64 = 1_000_000;
 
-/// Datagrams that lie one behind the other.
+/// Datagrams, stored one after the other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cut {
-    /// Where each begins, and where the last one ends.
+    /// Where each datagram begins, and where the last one ends.
     pub offsets: Vec<usize>,
-    /// The board's time of the first stamp of each, us, which stands for its arrival; it never steps back.
+    /// The board's time of each datagram's first stamp, us, which stands for its arrival time; never decreases.
     pub times: Vec<i64>,
 }
 
 /// Cuts bytes into datagrams, never between a change and its intensity.
 ///
-/// Bytes have no arrival times. Each datagram gets the time of its first stamp, unwrapped from stamps alone, which is what a
-/// reader needs to unwrap them again; it holds at most a second.
+/// The bytes have no arrival times. Each datagram gets the time of its first stamp, unwrapped from the stamps alone, so
+/// that a reader can unwrap the stamps again; a datagram spans at most a second.
 #[must_use]
 pub fn cut(bytes: &[u8]) -> Cut {
     let stamped = stamped(bytes);
@@ -37,7 +38,7 @@ pub fn cut(bytes: &[u8]) -> Cut {
         };
         let wanted = stamped.get(k + late.min(fits)).map_or(bytes.len(), |&(at, _)| at);
         let most = bytes.len().min(begin + MOST_BYTES);
-        // Where no word that shows a time begins in reach, as in damage, only the length bounds a datagram.
+        // If no word with a time begins within reach, as in damaged data, only the length bounds a datagram.
         begin = if (begin + 1..=most).contains(&wanted) { wanted } else { most };
         cut.offsets.push(begin);
         cut.times.push(now);
@@ -45,7 +46,7 @@ pub fn cut(bytes: &[u8]) -> Cut {
     cut
 }
 
-/// Where whole words that show a time begin (changes and markers), and the latest time up to each, us.
+/// Offsets of the whole words that have a time (changes and markers), and the latest time up to each, us.
 fn stamped(bytes: &[u8]) -> Vec<(usize, i64)> {
     let mut clock = Clock::default();
     let (mut found, mut latest, mut at) = (vec![], i64::MIN, 0);

@@ -1,4 +1,5 @@
-//! Bytes to events, as they come: finds its place after damage, unwraps time, pairs intensities, counts every loss.
+//! Decodes bytes of version 1 to events as they arrive: resynchronises after damage, unwraps time, pairs intensities
+//! and counts every loss.
 
 mod blocks;
 pub(in crate::wire) mod clock;
@@ -21,10 +22,10 @@ use crate::wire::columns::{self, Filled, Room};
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
 use crate::{Array, Events, Marker, Result};
 
-/// Turns bytes into events as they come, wherever they are cut.
+/// Decodes bytes to events as they arrive, however the stream is cut.
 ///
-/// A change waits for the next word (its intensity), the end of its datagram ([`Self::end_of_datagram`]) or the end of
-/// the stream ([`Self::finish`]), and no longer.
+/// A change waits until the next word shows whether it has an intensity, until the end of its datagram
+/// ([`Self::end_of_datagram`]), or until the end of the stream ([`Self::finish`]).
 ///
 /// # Examples
 ///
@@ -39,19 +40,19 @@ use crate::{Array, Events, Marker, Result};
 pub struct Decoder {
     array: Array,
     instructions: Instructions,
-    /// The bytes of a word that is not complete.
+    /// The bytes of an incomplete word.
     partial: [u8; WORD_BYTES],
     have: usize,
     clock: Clock,
     waiting: Option<Change>,
     by_taxel: Option<ByTaxel>,
-    /// What each taxel held last, where intensities are differences; none where that is not known.
+    /// Each taxel's last value, if intensities are differences; none if it is unknown.
     held: Option<Vec<Option<u16>>>,
     counts: Counts,
 }
 
 impl Decoder {
-    /// A decoder for the given array: pairs directly, takes intensities as values.
+    /// A decoder for the given array. It pairs an intensity with the word before it and reads intensities as values.
     #[must_use]
     pub fn new(array: Array) -> Self {
         Self {
@@ -74,24 +75,26 @@ impl Decoder {
         self
     }
 
-    /// Says whether intensities are differences from the last value sent (the panel's "delta intensity"), which the
-    /// bytes do not show. They are then added up from 0 by polarity, so that events hold values either way; right from
-    /// the board's reset on, where it compares with the last value sent, and until an intensity is lost.
+    /// Sets whether intensities are differences from the last value sent (the panel's "delta intensity"); the bytes do
+    /// not show this. The decoder then accumulates the differences from 0, signed by polarity, so that events hold
+    /// values in both cases. The sums are correct from the board's reset on, where the board compares with the last
+    /// value sent, and until an intensity is lost.
     #[must_use]
     pub fn differences(mut self, differences: bool) -> Self {
         self.held = differences.then(|| vec![Some(0); self.array.len()]);
         self
     }
 
-    /// Says what the taxels hold, by index, none where that is not known: differences add up from there. One that is added to
-    /// what is not known gives no event an intensity, and counts as unpaired. Of no account where intensities are values.
+    /// Sets each taxel's current value, by index, none if it is unknown; differences accumulate from these values. An
+    /// event whose difference applies to an unknown value gets no intensity and counts as unpaired. Has no effect if
+    /// intensities are values.
     pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
         if let Some(own) = &mut self.held {
             own.iter_mut().zip(held).for_each(|(own, held)| *own = held);
         }
     }
 
-    /// What each taxel holds, by index; none where that is not known, as it is not where intensities are values.
+    /// Each taxel's current value, by index; none if it is unknown, and always none if intensities are values.
     #[must_use]
     pub fn held(&self) -> Vec<Option<u16>> {
         self.held.clone().unwrap_or_else(|| vec![None; self.array.len()])
@@ -101,7 +104,7 @@ impl Decoder {
     ///
     /// # Errors
     ///
-    /// `Problem` where this machine does not have them.
+    /// `Problem` if this machine does not have them.
     pub fn instructions(mut self, instructions: Instructions) -> Result<Self> {
         self.instructions = instructions.checked()?;
         Ok(self)
@@ -113,13 +116,13 @@ impl Decoder {
         &self.array
     }
 
-    /// What was seen and dropped so far.
+    /// What was read and dropped so far.
     #[must_use]
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// Takes the next bytes; gives the events that they complete.
+    /// Decodes the next bytes; returns the events that they complete.
     ///
     /// `arrived` is the host's clock in us when the bytes came; it shows how long a silence of more than 6.45 s was.
     pub fn push(&mut self, bytes: &[u8], arrived: Option<i64>) -> Events {
@@ -128,7 +131,7 @@ impl Decoder {
         events
     }
 
-    /// As [`Self::push`], into columns that are used again ([`Events::clear`]): appends.
+    /// As [`Self::push`], but appends to columns that the caller reuses ([`Events::clear`]).
     pub fn push_into(&mut self, bytes: &[u8], arrived: Option<i64>, out: &mut Events) {
         let (before, most) = (out.len(), self.most_rows(bytes.len()));
         // SAFETY: `fill_columns` writes each row that it counts, and with `paired` its ticks and present.
@@ -140,20 +143,20 @@ impl Decoder {
         out.mark_repaired(before, false);
     }
 
-    /// How many rows the next `bytes` bytes can give at most.
+    /// Most rows that the next `bytes` bytes can complete.
     #[must_use]
     pub fn most_rows(&self, bytes: usize) -> usize {
         (self.have + bytes) / WORD_BYTES + 1
     }
 
-    /// Says that a datagram ends here: a change whose intensity has not come has none.
+    /// Marks the end of a datagram: a change whose intensity has not arrived gets none.
     pub fn end_of_datagram(&mut self) -> Events {
         let mut events = Events::empty(self.array.clone());
         self.end_of_datagram_into(&mut events);
         events
     }
 
-    /// As [`Self::end_of_datagram`]; appends.
+    /// As [`Self::end_of_datagram`], but appends.
     pub fn end_of_datagram_into(&mut self, out: &mut Events) {
         if let Some(change) = self.waiting.take() {
             append(out, change, None);
@@ -161,14 +164,14 @@ impl Decoder {
         }
     }
 
-    /// Ends the stream: gives the rest and is as new, but for the counts.
+    /// Ends the stream: returns the remaining events and resets the decoder, except for its counts.
     pub fn finish(&mut self) -> Events {
         let mut events = Events::empty(self.array.clone());
         self.finish_into(&mut events);
         events
     }
 
-    /// As [`Self::finish`]; appends.
+    /// As [`Self::finish`], but appends.
     pub fn finish_into(&mut self, out: &mut Events) {
         self.end_of_datagram_into(out);
         if let Some(by_taxel) = &mut self.by_taxel {
@@ -179,7 +182,7 @@ impl Decoder {
         self.as_new();
     }
 
-    /// Forgets half a word and the time, but not the counts.
+    /// Discards an incomplete word and the time, but not the counts.
     fn as_new(&mut self) {
         self.give_up_partial();
         self.clock = Clock::default();
@@ -207,7 +210,7 @@ impl Decoder {
         }
         while at < bytes.len() {
             at += self.plain(&bytes[at..], arrived, &mut filling);
-            // What is not plain: one word, or damage byte by byte to the next place.
+            // The block loop stopped here: decode one word, or skip damaged bytes until the next first byte.
             for &byte in &bytes[at..] {
                 self.byte(byte, arrived, &mut filling, markers);
                 at += 1;
@@ -222,15 +225,15 @@ impl Decoder {
         Filled { rows: filling.rows, paired: filling.paired }
     }
 
-    /// Decodes the plain words that lie ahead; gives how many bytes they had.
+    /// Decodes the plain words at the start of `bytes`; returns how many bytes they have.
     ///
-    /// None where stamps alone do not unwrap them: before the first, and until this arrival has been reckoned with.
+    /// None if the stamps alone do not unwrap the words: before the first stamp, and until this arrival time was used.
     fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, filling: &mut Filling<'_>) -> usize {
         if self.by_taxel.is_some() || self.held.is_some() || self.clock.arrived != arrived {
             return 0;
         }
         let Some(latest) = self.clock.latest else { return 0 };
-        // Behind a step back (a datagram that was overtaken) the words up to the latest time are plain too.
+        // After a step back (a reordered datagram), the words up to the latest time are plain too.
         let mut state = match self.clock.behind {
             Some(behind) => Carried { latest: behind, until: latest - 1, intensities: 0, unpaired: 0 },
             None => Carried { latest, until: i64::MAX, intensities: 0, unpaired: 0 },
@@ -322,7 +325,7 @@ impl Decoder {
         }
     }
 
-    /// Unwraps a stamp; us.
+    /// Unwraps a stamp to us.
     fn time(&mut self, stamp: u16, arrived: Option<i64>) -> i64 {
         let (time, back) = self.clock.unwrap(stamp, arrived);
         self.counts.back += u64::from(back);
@@ -330,7 +333,7 @@ impl Decoder {
     }
 }
 
-/// How many rows so many bytes can give at most, whatever came before them.
+/// Most rows that this many bytes can complete, whatever preceded them.
 #[must_use]
 pub fn most_rows(bytes: usize) -> usize {
     bytes / WORD_BYTES + 2

@@ -20,10 +20,11 @@ pub use table::Registers;
 use crate::wire::Command;
 use crate::{Array, Error, Result, problem};
 
-/// Sense lines that a board of the thesis' build has, however many of them the array uses; larger arrays have their rows.
+/// Sense lines of a board of the thesis' build, however many of them the array uses; for larger arrays it is the number
+/// of rows.
 const SENSE_LINES: u16 = 64;
 
-/// Registers whose order of writing matters.
+/// Registers that must be written in a certain order.
 const TIMING: [u8; 4] = [1, 2, 3, 4];
 
 /// All fields, in the order of the registers.
@@ -35,11 +36,11 @@ pub fn fields() -> &'static [Field] {
 /// A write that the rules forbid; nothing has changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// The register that was to be written.
+    /// The register that the write addressed.
     pub register: u8,
     /// Which rule of the reference (5 and 6 only warn).
     pub rule: u8,
-    /// Rule and numbers, in one line.
+    /// The rule and the numbers that break it, in one line.
     pub text: String,
 }
 
@@ -50,18 +51,18 @@ impl From<Refusal> for Error {
 }
 
 impl Default for Registers {
-    /// What the board holds at reset. Reading: the first preset, for with zeros every first write would be refused.
+    /// The state at reset. Reading: the first preset, because with zeros every first write would be refused.
     fn default() -> Self {
         PRESETS[0].registers
     }
 }
 
 impl Registers {
-    /// The preset of that name.
+    /// The preset with this name.
     ///
     /// # Errors
     ///
-    /// `Problem` where there is none, with the names that there are.
+    /// `Problem` if there is no preset with this name; the message lists the names.
     pub fn preset(name: &str) -> Result<Self> {
         match PRESETS.iter().find(|preset| preset.name == name) {
             Some(preset) => Ok(preset.registers),
@@ -69,12 +70,12 @@ impl Registers {
         }
     }
 
-    /// The preset of that name on a board of that array: a smaller one has fewer lines to drive.
+    /// The preset with this name, adapted to the array: a smaller array has fewer lines to drive.
     ///
     /// # Errors
     ///
-    /// `Problem` where there is none, or where it is made for boards of more lines than version 1 names and the array
-    /// has no more than these, or the other way round; with the names that there are.
+    /// `Problem` if there is no preset with this name, or if the preset is for boards with more lines than version 1
+    /// can name and the array is not, or the other way round; the message lists the names.
     pub fn preset_on(name: &str, array: &Array) -> Result<Self> {
         let preset = Self::preset(name)?;
         let fitting = || PRESETS.iter().filter(|preset| preset.is_of_size(array));
@@ -88,8 +89,9 @@ impl Registers {
         Ok(Self { lines: preset.lines.min(array.columns), ..preset })
     }
 
-    /// These registers with a preset taken over, as a board of that array takes it: which version of the wire it sends, and
-    /// whether a recording runs, no preset says; channels are the board's build, and a smaller array has fewer lines.
+    /// These registers with a preset applied, for a board with this array. A preset defines neither the version of the
+    /// wire nor whether a recording runs; the number of channels belongs to the board's build, and a smaller array has
+    /// fewer lines.
     #[must_use]
     pub fn with_preset(&self, preset: &Self, array: &Array) -> Self {
         Self {
@@ -101,12 +103,12 @@ impl Registers {
         }
     }
 
-    /// The presets that are made for boards of that array's size and so many channels.
+    /// The presets for boards of the array's size with this number of channels.
     pub fn presets(array: &Array, channels: u8) -> impl Iterator<Item = &'static Preset> + use<'_> {
         PRESETS.iter().filter(move |preset| preset.is_of_size(array) && preset.registers.channels == channels)
     }
 
-    /// What a board of that array and so many channels holds at reset.
+    /// The state at reset of a board with this array and number of channels.
     ///
     /// Up to 64 lines the first preset; beyond, version 2 and a preset of 128 lines, its lines and steps fitted to the array.
     #[must_use]
@@ -122,7 +124,7 @@ impl Registers {
         registers
     }
 
-    /// The registers whose eight words a board of so many channels read back, whatever the rules say.
+    /// The registers that a board with this number of channels reads back as eight words; the rules are not checked.
     #[must_use]
     pub fn of_words(words: &[u32; 8], channels: u8) -> Self {
         let mut registers = Self { channels, ..Self::default() };
@@ -132,12 +134,13 @@ impl Registers {
         registers
     }
 
-    /// What a board holds that scans another sensor's frames as they come: so many a second, of values of so many bits. And by
-    /// how many bits a value is to be shifted down, where the ramp of so fast a scan cannot tell that many.
+    /// The registers of a board that scans another sensor's frames as they arrive, at `rate_hz` frames a second and
+    /// with values of `bits` bits; and the number of bits by which values must be shifted down if the ramp of a scan at
+    /// this rate resolves fewer.
     ///
     /// # Errors
     ///
-    /// `Problem` where there are no such bits or so fast a scan is none; `Device` where the array breaks a rule.
+    /// `Problem` if the number of bits or the rate is invalid; `Device` if the array breaks a rule.
     pub fn of_source(array: &Array, rate_hz: f64, bits: u32) -> Result<(Self, u32)> {
         const CHANNELS: u8 = 64;
         if !(1..=16).contains(&bits) {
@@ -145,7 +148,7 @@ impl Registers {
         }
         let line = 1e8 / (rate_hz * f64::from(array.columns));
         let steps = u32::from(sense_lines(array)).div_ceil(CHANNELS.into());
-        // Rule 7, and a ramp of 16 ticks.
+        // Rule 7, with a ramp of 16 ticks.
         let least = f64::from(steps * (u32::from(CHANNELS) + 10));
         if !(line >= least && line <= 4e9) {
             let most = 1e8 / (least * f64::from(array.columns));
@@ -174,19 +177,19 @@ impl Registers {
         Ok((registers, shift))
     }
 
-    /// Multiplexer steps in a line: on a board of 64 sense lines 4 with 16 channels, 1 with 64.
+    /// Number of multiplexer steps in a line: on a board with 64 sense lines 4 with 16 channels, 1 with 64.
     #[must_use]
     pub fn steps(&self, array: &Array) -> u32 {
         u32::from(sense_lines(array)).div_ceil(u32::from(self.channels.max(1)))
     }
 
-    /// A frame's length, 10 ns: lines times line period.
+    /// Length of a frame, in units of 10 ns: lines times line period.
     #[must_use]
     pub fn frame_10ns(&self) -> u64 {
         u64::from(self.lines) * u64::from(self.line_period)
     }
 
-    /// A frame's length, us.
+    /// Length of a frame, us.
     #[must_use]
     pub fn frame_us(&self) -> f64 {
         self.frame_10ns() as f64 / 100.0
@@ -196,7 +199,7 @@ impl Registers {
     ///
     /// # Errors
     ///
-    /// The rule that forbids it; then nothing has changed.
+    /// The rule that forbids the write; then no register has changed.
     pub fn write(&mut self, command: Command, array: &Array) -> std::result::Result<(), Refusal> {
         let Command { register, value } = command;
         if value & !Self::mask(register) != 0 {
@@ -225,7 +228,8 @@ impl Registers {
         self.rules(0, array).map_err(Error::from)
     }
 
-    /// The rules that refuse, in the order in which the board tries them: first that every value lies in its range.
+    /// The rules that refuse, in the order in which the board checks them; the first is that every value is in its
+    /// range.
     fn rules(&self, register: u8, array: &Array) -> std::result::Result<(), Refusal> {
         for field in fields() {
             let value = self.get(field);
@@ -254,10 +258,10 @@ impl Registers {
         rules::warned(self).into_iter().map(|(_, text)| text).collect()
     }
 
-    /// What a field holds, in its own unit.
+    /// The value of a field, in the register's own unit.
     fn get(&self, field: &Field) -> u32 {
         let bits = self.word(field.register) >> field.shift & field.mask;
-        // Of a count of lines the bits alone cannot say 0.
+        // The bits alone cannot represent 0 lines.
         if field.name == "lines" { self.lines.into() } else { bits + field.offset }
     }
 
@@ -268,7 +272,7 @@ impl Registers {
     ///
     /// # Errors
     ///
-    /// `Device` where either set breaks a rule, or they are of boards with different channels.
+    /// `Device` if either set breaks a rule, or they are of boards with different channels.
     pub fn commands_to(&self, target: &Self, array: &Array) -> Result<Vec<Command>> {
         self.check(array)?;
         target.check(array)?;
@@ -312,7 +316,8 @@ impl Registers {
     ///
     /// # Errors
     ///
-    /// `Problem` where there is no such field; `Device` with the rule that would be broken. Then nothing has changed.
+    /// `Problem` if there is no such field; `Device` with the rule that would be broken. In both cases no register has
+    /// changed.
     pub fn set_all(&mut self, values: &[(impl AsRef<str>, u32)], array: &Array) -> Result<()> {
         let mut next = *self;
         for (name, value) in values {
@@ -325,7 +330,8 @@ impl Registers {
                 let names: Vec<_> = fields().iter().map(|f| f.name).collect();
                 return Err(problem!("register {name:?}: there are {}, channels", names.join(", ")));
             };
-            // The manual's name counts as the register does, ours what is meant.
+            // The manual's name takes the value as the register holds it; ours takes the number meant, without the
+            // register's offset.
             let offset = if name == field.name { field.offset } else { 0 };
             let (least, greatest) = (field.least - field.offset + offset, field.greatest - field.offset + offset);
             if value < least || value > greatest {
@@ -355,13 +361,14 @@ impl Registers {
 }
 
 impl Preset {
-    /// Whether it is made for boards of the array's size: beyond the lines that version 1 can name, or within.
+    /// Whether the preset is for boards of the array's size: with more lines than version 1 can name, or with at most
+    /// as many.
     fn is_of_size(&self, array: &Array) -> bool {
         (self.sense_lines > SENSE_LINES) == is_large(array)
     }
 }
 
-/// Presets' names, as an error lists them.
+/// The presets' names, as an error message lists them.
 fn named<'a>(presets: impl IntoIterator<Item = &'a Preset>) -> String {
     let names: Vec<_> = presets.into_iter().map(|preset| format!("{:?}", preset.name)).collect();
     names.join(", ")
@@ -372,7 +379,7 @@ fn is_large(array: &Array) -> bool {
     array.rows.max(array.columns) > SENSE_LINES
 }
 
-/// The sense lines that a board for this array converts.
+/// Number of sense lines that a board for this array converts.
 pub(crate) fn sense_lines(array: &Array) -> u16 {
     array.rows.max(SENSE_LINES)
 }

@@ -16,7 +16,7 @@ use crate::{EventsView, Result, problem};
 /// Bytes of a word.
 pub const WORD_BYTES: usize = 5;
 
-/// What one unit of a stamp is worth, us (manual, 3.3.3).
+/// Unit of a stamp, us (manual, 3.3.3).
 pub const STAMP_US: i64 = 100;
 
 /// Only the first byte of a word has this bit.
@@ -26,10 +26,10 @@ const Z2: u8 = 0x20;
 const Z0: u8 = 0x08;
 const COORDINATE: u8 = 0x3f;
 
-/// What five bytes say.
+/// A decoded word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Word {
-    /// More or less pressure at a taxel.
+    /// A change of pressure at a taxel.
     Change {
         /// Time in units of [`STAMP_US`], modulo 65 536.
         stamp: u16,
@@ -37,18 +37,18 @@ pub enum Word {
         x: u8,
         /// Row.
         y: u8,
-        /// More pressure.
+        /// True if the pressure rose.
         p: bool,
     },
     /// The converter's reading at a taxel.
     Intensity {
-        /// Value or difference, as the stream has it, in ticks of 1/300 us.
+        /// Value or difference, depending on the stream, in ticks of 1/300 us.
         ticks: u16,
         /// Column.
         x: u8,
         /// Row.
         y: u8,
-        /// That of its change.
+        /// Polarity of the change that it belongs to.
         p: bool,
     },
     /// Start or stop of a recording.
@@ -58,12 +58,12 @@ pub enum Word {
         /// Start (true) or stop.
         start: bool,
     },
-    /// Intensity and marker at once: no meaning.
+    /// Marked as intensity and marker at once, which has no meaning.
     Contradictory,
 }
 
 impl Word {
-    /// Reads five bytes, of which only the first may have its top bit set (the decoder sees to that).
+    /// Parses five bytes, of which only the first may have its top bit set (the decoder checks this).
     #[must_use]
     pub fn from_bytes(b: [u8; WORD_BYTES]) -> Self {
         let value = u16::from(b[0] & 3) << 14 | u16::from(b[1] & 0x7f) << 7 | u16::from(b[2] & 0x7f);
@@ -76,7 +76,7 @@ impl Word {
         }
     }
 
-    /// The five bytes, first byte first.
+    /// The word's five bytes, first byte first.
     #[must_use]
     pub fn to_bytes(self) -> [u8; WORD_BYTES] {
         let (kind, value, x, y, p) = match self {
@@ -96,20 +96,20 @@ impl Word {
     }
 }
 
-/// The stamp of a time: whole units of [`STAMP_US`] (cut down, as the board counts), modulo 65 536.
+/// The stamp of a time: whole units of [`STAMP_US`] (rounded down, as the board counts), modulo 65 536.
 #[must_use]
 pub fn stamp(t_us: i64) -> u16 {
     (t_us.div_euclid(STAMP_US) & 0xffff) as u16
 }
 
-/// Events as bytes: each change, its intensity next to it, markers before the first event that is not earlier.
+/// Encodes events as bytes: each change followed by its intensity, markers before the first event that is not earlier.
 ///
-/// Version 1 holds times to 100 us and modulo 6.5536 s: finer times are cut down, and a reader gets back whole
-/// silences of up to 6.45 s.
+/// Version 1 holds times in units of 100 us and modulo 6.5536 s: finer times are rounded down, and a reader recovers
+/// whole silences of up to 6.45 s.
 ///
 /// # Errors
 ///
-/// `Problem` where columns are unequal, or a taxel's column or row is above 63, which six bits cannot say.
+/// `Problem` if columns are unequal, or a taxel's column or row is above 63, the limit of six bits.
 pub fn encode(events: EventsView<'_>) -> Result<Vec<u8>> {
     events.check()?;
     let mut bytes = Vec::with_capacity(WORD_BYTES * (2 * events.len() + events.markers.len()));

@@ -1,4 +1,5 @@
-//! Version 2 of the wire: datagrams that stand alone, say whose they are and which, and when time has gone on.
+//! Version 2 of the wire: self-contained datagrams with board, session, sequence number, and a promise that time has
+//! advanced.
 //!
 //! `docs/wire-v2.md` specifies it. Little-endian throughout; byte 0 has its top bit clear, so that the first byte shows the
 //! version. A datagram is a header, a body of words of one kind, a promise (*span*) and a checksum.
@@ -10,7 +11,7 @@
 //! | 2-3 | board |
 //! | 4-7 | sequence: one more a datagram, 0 at reset |
 //! | 8-13 | base time, us since reset |
-//! | 14-15 | session: a number that each reset draws anew |
+//! | 14-15 | session: a random number, drawn at each reset |
 //! | 16 | 5 bits of stride: position = line << stride \| row; 3 low bits of the first event's line, from where positions count |
 //! | 17 | 4 bits of flags: 0 frame sync, 1 values are differences, 2 events were dropped since the last datagram; that line's 4 high bits |
 //! | 18 ... | body |
@@ -38,23 +39,30 @@ pub const MAGIC: u8 = 0x54;
 /// Bytes before the body.
 pub const HEADER_BYTES: usize = 18;
 
-/// Bytes behind the body: span and checksum.
+/// Bytes after the body: span and checksum.
 pub const TRAILER_BYTES: usize = 6;
 
-/// Bytes of a datagram at most: what an Ethernet frame carries over UDP, with room to spare.
+/// Largest datagram, bytes: fits a UDP datagram in one Ethernet frame, with room to spare.
 pub const DATAGRAM_BYTES: usize = 1400;
 
-/// Bytes of the length that stands before a datagram in files and on streams.
+/// Bytes of a body at most.
+const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
+
+/// Before any time, us.
+const NEVER: i64 = i64::MIN;
+
+/// Size of the length that precedes each datagram in files and on streams, bytes.
 const LENGTH_BYTES: usize = 2;
 
-/// The latest offset from the base that a word holds, us: later times begin a new datagram. Its words could otherwise be taken
-/// for a control word by a reader that looks at all words alike.
+/// The latest offset from the base that a word can hold, us; later times begin a new datagram. A later offset could be
+/// mistaken for a control word by a reader that examines all words alike.
 pub const LATEST_OFFSET: u64 = 32_511;
 
-/// The last line that a header names: from there on positions count where the first event lies in a later one.
+/// The last line that a header can name; if the first event is in a later line, positions count from this line.
 pub const LAST_LINE: u16 = 127;
 
-/// Bits of a header's stride and of its flags, in a byte each; above them lie the low and the high bits of the first line.
+/// Bits of a header's stride and of its flags, in a byte each; the bits above hold the low and the high bits of the
+/// first line.
 const STRIDE_BITS: u32 = 5;
 const FLAG_BITS: u32 = 4;
 const LOW_LINE_BITS: u32 = u8::BITS - STRIDE_BITS;
@@ -82,7 +90,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The kind of a number; none of one that is not known (yet).
+    /// The kind with this number; none if the number is unknown (yet).
     #[must_use]
     pub fn of(number: u8) -> Option<Self> {
         Some(match number {
@@ -97,7 +105,7 @@ impl Kind {
         })
     }
 
-    /// Its number.
+    /// The kind's number in the header.
     #[must_use]
     pub fn number(self) -> u8 {
         match self {
@@ -111,7 +119,7 @@ impl Kind {
         }
     }
 
-    /// Bytes of a word, bits of its skip, bits of its value; none of a kind that names no taxels.
+    /// Bytes of a word, bits of its skip, bits of its value; none for a kind without taxels.
     #[must_use]
     pub(crate) fn layout(self) -> Option<Layout> {
         Some(match self {
@@ -123,7 +131,7 @@ impl Kind {
     }
 }
 
-/// How a word is divided, from its top bit down: polarity, skip, value.
+/// The fields of a word, from its top bit down: polarity, skip, value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Layout {
     pub(crate) bytes: usize,
@@ -132,42 +140,42 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// The skip that makes a control word.
+    /// The skip that marks a control word.
     pub(crate) const fn control(self) -> u32 {
         (1 << self.skip) - 1
     }
 
-    /// A control word moves by so many positions a step, and by so many steps at most.
+    /// How many positions a step of a control word advances, and how many steps it can hold.
     pub(crate) const fn advance(self) -> (i64, i64) {
         (1 << (self.skip - 1), 1 << self.value)
     }
 }
 
-/// A marker's code.
+/// Code of a marker that starts a recording.
 pub(crate) const START: u16 = 1;
-/// A marker's code.
+/// Code of a marker that stops a recording.
 pub(crate) const STOP: u16 = 2;
 
-/// What stands around a body.
+/// A datagram's fields other than its body and checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
-    /// The kind's number, known or not.
+    /// Number of the kind, known or not.
     pub kind: u8,
-    /// Which board.
+    /// Number of the board.
     pub board: u16,
-    /// Which datagram of its session.
+    /// Number of the datagram in its session.
     pub sequence: u32,
-    /// us since reset.
+    /// Base time, us since reset.
     pub base: u64,
-    /// Which reset.
+    /// Random number drawn at each reset.
     pub session: u16,
-    /// position = line << stride | row; 5 bits.
+    /// Bits of a position that name the row: position = line << stride | row; 5 bits.
     pub stride: u8,
-    /// The line that the body's positions begin in; 7 bits.
+    /// The line from which the body's positions count; 7 bits.
     pub line: u8,
-    /// Bit 0 frame sync, 1 differences, 2 dropped, 3 means nothing yet.
+    /// Bit 0 frame sync, 1 differences, 2 dropped; bit 3 has no meaning yet.
     pub flags: u8,
-    /// us; 0 promises nothing.
+    /// No datagram with a higher sequence number has an event before base + span, us; 0 promises nothing.
     pub span: u16,
 }
 
@@ -178,29 +186,29 @@ pub const DIFFERENCES: u8 = 2;
 /// Events were dropped since the last datagram.
 pub const DROPPED: u8 = 4;
 
-/// Why bytes are no datagram of version 2.
+/// Why bytes are not a datagram of version 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Refused {
     /// Too short for header and trailer.
     #[error("shorter than 24 bytes")]
     Short,
-    /// Longer than any that a board sends.
+    /// Longer than any datagram that a board sends.
     #[error("longer than 1400 bytes")]
     Long,
-    /// Another first byte, or another version.
+    /// The first byte or the version differs.
     #[error("begins with another byte or version")]
     Foreign,
-    /// The checksum disagrees.
+    /// The checksum does not match.
     #[error("its checksum disagrees")]
     Checksum,
 }
 
 impl Header {
-    /// Reads a datagram's header and body.
+    /// Splits a datagram into header and body.
     ///
     /// # Errors
     ///
-    /// [`Refused`], saying why it is none.
+    /// [`Refused`], with the reason.
     pub fn read(datagram: &[u8]) -> Result<(Self, &[u8]), Refused> {
         if datagram.first().is_some_and(|&byte| byte != MAGIC) || datagram.get(1).is_some_and(|byte| byte >> 4 != 2) {
             return Err(Refused::Foreign);
@@ -224,8 +232,8 @@ impl Header {
         bytes.first() == Some(&MAGIC) && bytes.get(1).is_some_and(|byte| byte >> 4 == 2)
     }
 
-    /// What a long enough datagram shares with all changes as they are of its kind, board, session and stride: its first four
-    /// bytes and the header's last four, without the line and frame sync.
+    /// The part of a datagram that is equal for all plain changes of one kind, board, session and stride: its first
+    /// four bytes and the header's last four, without the line and frame sync.
     #[inline(always)]
     fn common(datagram: &[u8]) -> u64 {
         let four = |at: usize| {
@@ -237,14 +245,14 @@ impl Header {
         (four(0) | four(HEADER_BYTES - 4) << 32) & (flags << 56 | ((1 << STRIDE_BITS) - 1) << 48 | 0xffff_ffff_ffff)
     }
 
-    /// As [`Self::common`] gives it of changes as they are.
+    /// The value of [`Self::common`] for plain changes with this header.
     #[inline(always)]
     fn common_of(kind: Kind, board: u16, session: u16, stride: u8) -> u64 {
         let [board, session, stride] = [u64::from(board), u64::from(session), u64::from(stride)];
         u64::from(MAGIC) | u64::from(2 << 4 | kind.number()) << 8 | board << 16 | session << 32 | stride << 48
     }
 
-    /// The header and the body of a datagram that is long enough to have them.
+    /// The header and the body of a datagram, which must be long enough to have them.
     #[inline(always)]
     fn fields(datagram: &[u8]) -> (Self, &[u8]) {
         let (header, rest) = datagram.split_at(HEADER_BYTES);
@@ -269,7 +277,7 @@ impl Header {
         (header, body)
     }
 
-    /// Writes a datagram.
+    /// Appends a datagram with this header and body.
     pub fn write(&self, body: &[u8], out: &mut Vec<u8>) {
         out.clear();
         out.extend([MAGIC, 2 << 4 | self.kind & 0xf]);
@@ -286,13 +294,14 @@ impl Header {
     }
 }
 
-/// The position before the first word of a body, whose positions begin in a line.
+/// The position before the first word of a body whose positions count from this line.
 #[must_use]
 pub(crate) fn before(line: u8, stride: u8) -> i64 {
     (i64::from(line) << stride.min(31)) - 1
 }
 
-/// Whether bytes begin with an intact datagram of version 2, of whatever length, with its length before it or without.
+/// Whether bytes begin with an intact datagram of version 2 of any length, with or without the length that precedes it
+/// on a stream.
 #[must_use]
 pub fn begins(bytes: &[u8]) -> bool {
     let whole = |bytes: &[u8]| {
@@ -303,17 +312,17 @@ pub fn begins(bytes: &[u8]) -> bool {
     whole(bytes) || bytes.get(2..).is_some_and(whole)
 }
 
-/// The stride of an array: the fewest bits that name each of its rows.
+/// The stride of an array: the fewest bits that can name each of its rows.
 #[must_use]
 pub fn stride(rows: u16) -> u8 {
     (u16::BITS - rows.saturating_sub(1).leading_zeros()) as u8
 }
 
-/// The stride of an array that a board can have.
+/// The stride of an array, checked against what a board can have.
 ///
 /// # Errors
 ///
-/// `Problem` where its positions need more than 16 bits.
+/// `Problem` if the array's positions need more than 16 bits.
 pub fn checked_stride(array: &Array) -> crate::Result<u8> {
     let stride = stride(array.rows);
     if u32::from(array.columns) << stride > 1 << 16 {

@@ -1,4 +1,4 @@
-//! What the emulated board sends: every event once, promises that hold, heartbeats in silence.
+//! Tests of the emulated board's output: every event once, promises that hold, heartbeats in silence.
 
 use rand::{SeedableRng, rngs::StdRng};
 use taxel_core::board::Board;
@@ -8,7 +8,7 @@ use taxel_core::{Array, Events};
 
 use crate::scenes::{Row, arrays, board, rows, scene};
 
-/// The events that a board sends of each frame, found by comparing values as the specification does.
+/// The events that a board must send for each frame, found by comparing values as the specification does.
 fn expected_events(frames: &[Vec<u16>], array: &Array, registers: &Registers, valued: bool) -> Vec<(i64, Vec<Row>)> {
     let mut held = vec![0_u16; array.len()];
     let mut all = vec![];
@@ -66,7 +66,8 @@ fn the_host_decodes_the_events_that_the_board_sent() {
         let mut expected: Vec<Row> =
             expected_events(&frames, &array, &registers, valued).into_iter().flat_map(|f| f.1).collect();
         assert!(registers.frame_sync || events.t.is_sorted());
-        // By taxel, in the order of time: with frame sync at the frame's time, else at its step's within the frame.
+        // By taxel and in order of time: with frame sync at the frame's time, otherwise at the time of the step in the
+        // frame.
         heard.sort_by_key(|&(t, x, y, ..)| (x, y, t));
         expected.sort_by_key(|&(t, x, y, ..)| (x, y, t));
         assert_eq!(heard.len(), expected.len(), "seed {seed}");
@@ -104,7 +105,7 @@ fn both_versions_carry_the_same_events_of_one_scene() {
     for datagram in play(2) {
         decoder.push(&datagram, None, &mut two);
     }
-    // Version 1 cuts times to 100 us.
+    // Version 1 rounds times down to 100 us.
     two.t.iter_mut().for_each(|t| *t = *t / 100 * 100);
     let (mut a, mut b) = (rows(&one), rows(&two));
     a.sort_unstable();
@@ -116,7 +117,7 @@ fn both_versions_carry_the_same_events_of_one_scene() {
 #[test]
 fn a_slow_board_still_promises_and_silence_has_its_heartbeats() {
     let array = Array::new(4, 4, 1.0, "slow").unwrap();
-    // A frame of 120 ms: longer than a span can say.
+    // Frames of 120 ms, which exceed the largest span.
     let registers = Registers { wire_version: 2, lines: 4, line_period: 3_000_000, ..Registers::default() };
     let mut board = Board::new(registers, &array).unwrap();
     let mut decoder = Decoder::new(array.clone());

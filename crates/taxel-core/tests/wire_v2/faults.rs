@@ -1,4 +1,4 @@
-//! Loss, repetition, reordering, damage, resets and unknown datagrams.
+//! Tests of loss, repetition, reordering, damage, resets and unknown datagrams.
 
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
 use taxel_core::board::{Board, IntensityWord, Version2};
@@ -23,7 +23,7 @@ fn each_intact_datagram_is_decoded_once_whatever_the_network_does() {
                 })
                 .unwrap();
         }
-        // Each is decoded alone; differences need their order, so only taxels and times are compared.
+        // Each datagram is decoded alone; differences depend on their order, so only taxels and times are compared.
         let alone = |datagram: &[u8]| -> Vec<(i64, u16, u16, bool)> {
             let mut events = Events::empty(array.clone());
             Decoder::new(array.clone()).push(datagram, None, &mut events);
@@ -111,7 +111,7 @@ fn repeated_states_repair_the_picture_after_a_loss() {
         let counts = decoder.counts();
         assert!(counts.missing > 0 && counts.repaired > 0 && counts.states > 256);
         assert_eq!(counts.repaired, (0..events.len()).filter(|&k| events.is_repaired(k)).count() as u64);
-        // The events alone, repaired ones included, lead to the same picture.
+        // The events alone, including repaired ones, must lead to the same values.
         let mut picture = vec![0_u16; 256];
         for (_, x, y, _, value) in rows(&events) {
             picture[array.index(x, y)] = value;
@@ -165,7 +165,7 @@ fn a_number_drawn_twice_is_a_reset_once() {
     let intact = |heard| matches!(heard, Outcome::Intact { .. });
     assert!(intact(hear(70_000, 20_000_000)));
     assert!(intact(hear(70_001, 20_000_192)));
-    // After the reset, each once; what comes again stays a repetition, and the old session is over.
+    // After the reset each number is decoded once; a repeated one stays repeated, and the old session has ended.
     for sequence in 0..5 {
         assert!(intact(hear(sequence, 192 * u64::from(sequence))));
         assert!(matches!(hear(sequence, 192 * u64::from(sequence)), Outcome::Repeated));

@@ -1,4 +1,4 @@
-//! Every set of vector instructions decodes alike.
+//! Tests that all sets of vector instructions decode to the same events.
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::Events;

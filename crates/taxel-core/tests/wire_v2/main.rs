@@ -1,4 +1,4 @@
-//! Version 2 of the wire between the emulated board and the decoder, under every fault that a network knows.
+//! Tests of version 2 of the wire between the emulated board and the decoder, with every fault of a network.
 
 mod board;
 mod faults;

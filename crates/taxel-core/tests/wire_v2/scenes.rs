@@ -1,11 +1,11 @@
-//! Scenes, boards and datagrams that the tests of version 2 draw, and the rows of events.
+//! Random scenes, boards and datagrams for the tests of version 2, and the rows of events.
 
 use rand::{Rng, rngs::StdRng};
 use taxel_core::board::{Board, IntensityWord, Version2};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, Events};
 
-/// A scene on an array: blobs that come and go, noise, now and then everything at once.
+/// A random scene on an array: touches that appear and disappear, noise, and sometimes a change of all taxels.
 pub(crate) fn scene(random: &mut StdRng, array: &Array, frames: usize, ramp: u16) -> Vec<Vec<u16>> {
     let taxels = array.len();
     let mut held = vec![0_u16; taxels];
@@ -56,7 +56,7 @@ pub(crate) fn rows(events: &Events) -> Vec<Row> {
     (0..events.len()).map(|k| (events.t[k], events.x[k], events.y[k], events.p[k], ticks(k))).collect()
 }
 
-/// Words as a board would never send them, among those that it would.
+/// Random words, including ones that a board never sends.
 pub(crate) fn words(random: &mut StdRng, kind: u8) -> Vec<u8> {
     let (bytes, skip_bits, value_bits) = [(2, 15, 0), (2, 7, 8), (4, 15, 16)][[0, 1, 2, 0, 0, 0, 1, 2][kind as usize]];
     let control = (1_u32 << skip_bits) - 1;
@@ -75,7 +75,7 @@ pub(crate) fn words(random: &mut StdRng, kind: u8) -> Vec<u8> {
         let word = u32::from(p) << (skip_bits + value_bits) | skip << value_bits | value;
         body.extend(&word.to_le_bytes()[..bytes]);
         if p && skip == control {
-            // An offset, now and then one that looks like a control word.
+            // An offset, sometimes one that resembles a control word.
             let offset = if random.random_bool(0.1) { u32::MAX } else { random.random_range(0..40_000) };
             body.extend(&offset.to_le_bytes()[..bytes]);
         }
@@ -86,7 +86,7 @@ pub(crate) fn words(random: &mut StdRng, kind: u8) -> Vec<u8> {
     body
 }
 
-/// Words of a few events on the array, or nearly, behind a line in which they begin.
+/// Words of a few events on the array or slightly beyond it, and the line from which their positions count.
 pub(crate) fn few_words(random: &mut StdRng, kind: u8, array: &Array, stride: u8) -> (u8, Vec<u8>) {
     let (bytes, skip_bits, value_bits) = [(2, 15, 0), (2, 7, 8), (4, 15, 16)][kind as usize];
     let control = (1_u64 << skip_bits) - 1;
@@ -117,7 +117,8 @@ pub(crate) fn few_words(random: &mut StdRng, kind: u8, array: &Array, stride: u8
     (line as u8, body)
 }
 
-/// Some lost, some twice, some late, some cut, some with a flipped bit, of which a part is sealed again, so that it is read.
+/// Drops, duplicates, delays and truncates some datagrams, and flips a bit in others; some of these get a valid
+/// checksum, so that they are decoded.
 pub(crate) fn as_a_network(random: &mut StdRng, datagrams: &[Vec<u8>]) -> Vec<Vec<u8>> {
     let mut out: Vec<Vec<u8>> = vec![];
     for datagram in datagrams {

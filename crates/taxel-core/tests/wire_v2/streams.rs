@@ -1,4 +1,4 @@
-//! Streams of datagrams: cut anywhere, damaged, decoded in one call.
+//! Tests of streams of datagrams: cut anywhere, damaged, decoded in one call.
 
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use taxel_core::vectors::Instructions;
@@ -33,7 +33,8 @@ fn a_stream_is_cut_anywhere_and_found_again_after_damage() {
                     junk += framed.len() as u64;
                 }
                 2 => {
-                    // What promises more than there is, and so swallows what follows until the stream ends.
+                    // A length that exceeds the remaining stream, and so delays the decoding of what follows until the
+                    // stream ends.
                     let promise = [random.random_range(100..1400_u16).to_le_bytes(), [MAGIC, 0x21]].concat();
                     junk += promise.len() as u64;
                     stream.extend(promise);
@@ -58,7 +59,7 @@ fn a_stream_is_cut_anywhere_and_found_again_after_damage() {
     }
 }
 
-/// A decoded stream: its events, its counts, and how many bytes belonged to no datagram.
+/// A decoded stream: its events, its counts, and the number of bytes that belonged to no datagram.
 type Decoded = (Events, Counts, u64);
 
 fn one_by_one(stream: &[u8], array: &Array, set: Instructions) -> Decoded {
@@ -73,8 +74,8 @@ fn one_by_one(stream: &[u8], array: &Array, set: Instructions) -> Decoded {
     (events, decoder.counts(), reader.skipped())
 }
 
-/// What each datagram was and found, as a host hears it that hands its events on now and then, and what was held, missed and said
-/// of the board by then.
+/// Decodes datagrams one by one, as a live host does that passes events on at intervals: the outcome and the events of
+/// each, and at these intervals the taxels' values, the counts and the board's status.
 fn as_they_arrive(
     datagrams: &[Vec<u8>],
     array: &Array,
@@ -85,7 +86,7 @@ fn as_they_arrive(
     let mut events = Events::empty(array.clone());
     let mut found = vec![];
     for (k, datagram) in datagrams.iter().enumerate() {
-        // Behind the board's clock, and every now and then nothing says when.
+        // Arrival times that lag behind the board's clock; every seventh datagram has none.
         let arrived = (k % 7 > 0).then_some(5_000_000 + 211 * k as i64);
         let heard = decoder.push(datagram, arrived, &mut events);
         if (k + 1) % every == 0 || k + 1 == datagrams.len() {
@@ -118,8 +119,8 @@ fn in_one_call(stream: &[u8], array: &Array) -> Decoded {
     (events, found.counts, found.skipped)
 }
 
-/// Scenes of short datagrams, with everything that ends a run of them: other kinds, states, differences, times, taxels outside,
-/// missing numbers, resets, another board, noise.
+/// Scenes of short datagrams, with everything that ends a run of them: other kinds, states, differences, times, taxels
+/// outside the array, missing numbers, resets, another board, noise.
 #[test]
 fn a_stream_in_one_call_gives_what_its_datagrams_give_one_by_one() {
     let mut events = 0;

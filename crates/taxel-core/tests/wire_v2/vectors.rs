@@ -1,4 +1,4 @@
-//! The vectors that all languages share.
+//! Tests the test vectors that all implementations share.
 
 use taxel_core::wire::v2::Decoder;
 use taxel_core::{Array, Events};

@@ -1,32 +1,33 @@
-//! What a receiver counts.
+//! The counts of a receiver.
 
 use serde::Serialize;
 
-/// What arrived and what was lost up to now; see [`crate::capture`] for the sums.
+/// Counts of what arrived and what was lost so far; see [`crate::capture`] for the equations between them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Counts {
-    /// Receive calls that gave something.
+    /// Number of messages: receive calls that returned data.
     pub messages: u64,
-    /// Datagrams in them.
+    /// Number of datagrams in the messages.
     pub datagrams: u64,
-    /// Payload bytes in them.
+    /// Number of payload bytes in the messages.
     pub bytes: u64,
-    /// Messages that the kernel threw away because its own queue was full.
+    /// Number of messages that the kernel dropped because its own queue was full.
     pub dropped_by_kernel: u64,
-    /// Datagrams that were dropped because they were not taken in time.
+    /// Datagrams that were dropped because they were not read in time.
     pub dropped_by_queue: u64,
-    /// Payload bytes in those.
+    /// Number of payload bytes in those datagrams.
     pub bytes_dropped_by_queue: u64,
-    /// Datagrams that wait to be taken.
+    /// Datagrams that wait to be read.
     pub waiting: u64,
-    /// What the kernel's own queue may hold, bytes, as it counts them (its overhead included).
+    /// Size of the kernel's own queue, bytes, as the kernel counts them (including its overhead).
     pub kernel_buffer_bytes: u64,
-    /// Whether trains of datagrams come in one call.
+    /// Whether one receive call can return several datagrams (`UDP_GRO`).
     pub gro: bool,
 }
 
 impl Counts {
-    /// Adds what receive calls gave, and how many messages the kernel has dropped so far; gives the first datagram's number.
+    /// Adds the results of receive calls, and the kernel's total of dropped messages; returns the first datagram's
+    /// number.
     pub(super) fn add(&mut self, datagrams: usize, bytes: usize, messages: u64, dropped_by_kernel: u64) -> u64 {
         let first = self.datagrams;
         self.messages += messages;

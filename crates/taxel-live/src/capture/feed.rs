@@ -45,11 +45,11 @@ impl Feed {
         Self { queue, state: Arc::default() }
     }
 
-    /// Queues the datagrams of a parcel. Returns false, and does nothing, where the parcel begins a session and
+    /// Queues the datagrams of a parcel. Returns false without any effect if the parcel begins a session and
     /// [`Feed::begin_session`] was not called for it.
     ///
     /// Parcels that cannot be read, and repeated ones, are counted and ignored.
-    pub fn take(&self, parcel: &[u8]) -> bool {
+    pub fn push(&self, parcel: &[u8]) -> bool {
         let mut state = lock(&self.state);
         let FeedState { bridged, session, received, batch, clock } = &mut *state;
         let Some(parcel) = Parcel::read(parcel) else {
@@ -88,13 +88,14 @@ impl Feed {
         for (arrived_ns, bytes) in parcel.datagrams() {
             batch.push_arrived(offset.here_ns(arrived_ns), bytes);
         }
-        // The promise holds for callers that find the queue empty after this.
+        // The promise must be set after the datagrams are in the queue: callers that find it empty rely on it.
         self.queue.put(batch, u64::from(parcel.count > 0), 0);
         self.queue.promise(offset.here_ns(parcel.until_ns()));
         true
     }
 
-    /// Begins a session: the first one, or one after the bridge was restarted. The clocks are compared again.
+    /// Starts a session: the first one, or one after the bridge was restarted. The comparison of the clocks starts
+    /// again.
     pub fn begin_session(&self) {
         let mut state = lock(&self.state);
         if state.session.take().is_some() {
@@ -112,8 +113,8 @@ impl Feed {
     #[must_use]
     pub fn bridged(&self) -> Bridged {
         let state = lock(&self.state);
-        let heard = state.received.is_some_and(|received| received.elapsed() < SILENT);
-        Bridged { heard, clock: state.clock.offset(), ..state.bridged }
+        let received = state.received.is_some_and(|received| received.elapsed() < SILENT);
+        Bridged { received, clock: state.clock.offset(), ..state.bridged }
     }
 
     /// Ends the pipeline with an error.

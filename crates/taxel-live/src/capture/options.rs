@@ -1,13 +1,14 @@
 //! The options of a receiver.
 
-/// How a [`Receiver`](super::Receiver) works.
+/// The options of a [`Receiver`](super::Receiver).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReceiverOptions {
-    /// Asked of the kernel for its own queue, bytes; [`Counts::kernel_buffer_bytes`](super::Counts::kernel_buffer_bytes) is what it gave.
+    /// Requested size of the kernel's own queue, bytes;
+    /// [`Counts::kernel_buffer_bytes`](super::Counts::kernel_buffer_bytes) is the size that the kernel granted.
     pub kernel_buffer_bytes: usize,
-    /// How much may wait in taxel's queue, bytes; memory is bounded by twice this.
+    /// Capacity of taxel's queue, bytes; memory is bounded by twice this.
     pub queue_bytes: usize,
-    /// Take trains of datagrams in one call where the kernel can (`UDP_GRO`).
+    /// Receive several datagrams in one call if the kernel can (`UDP_GRO`).
     pub gro: bool,
 }
 

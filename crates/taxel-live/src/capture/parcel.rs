@@ -1,24 +1,25 @@
-//! The format in which datagrams are sent to other computers: unchanged, several in a parcel, with counts from which every loss is
-//! known.
+//! The format in which datagrams are sent to other computers: unchanged, several in a parcel, with counts that reveal
+//! every loss.
 //!
-//! All numbers are little-endian. The transport changes one field, the base time, so that tests can set the clocks of two computers
-//! apart; see docs/bridge.md.
+//! All numbers are little-endian. The transport changes one field, the base time, so that tests can offset the clocks
+//! of two computers; see docs/bridge.md.
 //!
 //! | bytes | field |
 //! |---|---|
 //! | 0-3 | `TXLP` |
 //! | 4 | 1, the version of this format |
-//! | 5 | 1 where it is the last of its session, else 0 |
+//! | 5 | 1 if it is the last parcel of its session, otherwise 0 |
 //! | 6-7 | 0 |
-//! | 8-15 | session: another one each time a bridge begins |
+//! | 8-15 | session: a random number, drawn each time a bridge starts |
 //! | 16-23 | number of this parcel in its session, from 0 |
 //! | 24-31 | base time, ns since 1970 of the computer that the board sends to |
-//! | 32-35 | until, ns from the base (signed): nothing that arrived before it follows |
-//! | 36-39 | how many datagrams |
-//! | 40-47 | how many datagrams that computer had received before them |
-//! | 48-55 | how many of those it dropped, its queues being full |
-//! | 56-63 | how many messages its kernel had dropped |
-//! | 64... | each datagram: its length (u16), when it arrived in ns from the base (i32), its bytes |
+//! | 32-35 | until, ns from the base (signed): every datagram that arrived before it is in this parcel or an earlier
+//! one |
+//! | 36-39 | number of datagrams |
+//! | 40-47 | number of datagrams that the computer had received before them |
+//! | 48-55 | number of those that it dropped because its queues were full |
+//! | 56-63 | number of messages that its kernel had dropped |
+//! | 64... | each datagram: its length (u16), its arrival time in ns from the base (i32), its bytes |
 
 use std::hash::{BuildHasher, RandomState};
 
@@ -51,7 +52,7 @@ pub(super) struct Parcel<'a> {
 }
 
 impl<'a> Parcel<'a> {
-    /// Reads a parcel; `None` where the bytes are not a whole parcel.
+    /// Parses a parcel; `None` if the bytes are not a whole parcel.
     pub(super) fn read(bytes: &'a [u8]) -> Option<Self> {
         let (head, body) = bytes.split_first_chunk::<HEADER>()?;
         let last = match head[4..8] {
@@ -118,11 +119,11 @@ pub struct Packer {
 }
 
 impl Packer {
-    /// Begins a session after this number of received datagrams.
+    /// Starts a session after this number of received datagrams.
     #[must_use]
     pub fn after(received: u64) -> Self {
         Self {
-            // A random number from the standard library.
+            // A random number; the standard library has no other source of randomness.
             session: RandomState::new().hash_one(std::process::id()),
             number: 0,
             base_ns: 0,
@@ -134,13 +135,14 @@ impl Packer {
         }
     }
 
-    /// How many datagrams wait.
+    /// Number of datagrams in the current parcel.
     #[must_use]
     pub fn waiting(&self) -> u32 {
         self.count
     }
 
-    /// Adds a datagram, with its number among those received; returns the previous parcel where the datagram does not fit into it.
+    /// Adds a datagram, with its number among those received; returns the previous parcel if the datagram does not fit
+    /// into it.
     pub fn push(&mut self, number: u64, arrived_ns: i64, bytes: &[u8], dropped_by_kernel: u64) -> Option<Vec<u8>> {
         let since = arrived_ns.checked_sub(self.base_ns).and_then(|since| i32::try_from(since).ok());
         let fits = self.next == number && since.is_some() && self.body.len() + bytes.len() <= FULL;
@@ -149,7 +151,7 @@ impl Packer {
         if self.count == 0 {
             (self.base_ns, self.before) = (arrived_ns, number);
         }
-        // The length of a datagram fits a u16, and the base time of a parcel that begins with it is its own.
+        // The length of a datagram fits in a u16, and a parcel's first datagram defines its base time.
         let length = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
         let since = i32::try_from(arrived_ns.saturating_sub(self.base_ns)).unwrap_or(0);
         self.body.extend_from_slice(&length.to_le_bytes());
@@ -184,7 +186,7 @@ impl Packer {
         parcel
     }
 
-    /// Counts the datagrams of a closed parcel that found no room in the queue as dropped.
+    /// Counts the datagrams of a closed parcel that did not fit in the queue as dropped.
     pub fn lost(&mut self, parcel: &[u8]) {
         self.dropped += Parcel::read(parcel).map_or(0, |parcel| u64::from(parcel.count));
     }

@@ -33,13 +33,13 @@ impl Batch {
         Self::default()
     }
 
-    /// How many datagrams.
+    /// Number of datagrams.
     #[must_use]
     pub fn len(&self) -> usize {
         self.datagrams.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no datagrams.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.datagrams.is_empty()
@@ -50,13 +50,13 @@ impl Batch {
         self.datagrams.iter().map(|d| (d, &self.bytes[d.start..d.end]))
     }
 
-    /// How many bytes can still be received into it.
+    /// Number of bytes that can still be received into the batch.
     pub(super) fn room(&self) -> usize {
         self.bytes.capacity() - self.bytes.len()
     }
 
-    /// Adds a message, the bytes from `start` on, that arrived at `arrived_ns`, of datagrams of `segment` bytes,
-    /// the last of which may be shorter.
+    /// Adds a message, the bytes from `start` on, that arrived at `arrived_ns`; it consists of datagrams of `segment`
+    /// bytes, the last of which may be shorter.
     pub(super) fn note_message(&mut self, start: usize, segment: usize, arrived_ns: i64) {
         let stop = self.bytes.len();
         let mut from = start;
@@ -86,19 +86,19 @@ impl Batch {
         self.datagrams.clear();
     }
 
-    /// Whether it is empty, or holds a datagram that arrived at `ns` or later.
+    /// Whether the batch is empty, or contains a datagram that arrived at `ns` or later.
     pub(super) fn ends_after(&self, ns: i64) -> bool {
         self.datagrams.last().is_none_or(|last| last.arrived_ns >= ns)
     }
 
-    /// Numbers its datagrams.
+    /// Numbers the batch's datagrams.
     fn number_from(&mut self, first: u64) {
         for (number, datagram) in (first..).zip(&mut self.datagrams) {
             datagram.number = number;
         }
     }
 
-    /// Empties it and makes room for this many bytes.
+    /// Clears the batch and reserves this many bytes.
     pub(super) fn begin(&mut self, bytes: usize) {
         self.clear();
         self.bytes.reserve(bytes);
@@ -111,7 +111,7 @@ impl Batch {
 pub(super) struct Queue {
     state: Mutex<Received>,
     came: Condvar,
-    /// When the end was requested, ns of the host's clock since 1970.
+    /// The time when the end was requested, ns of the host's clock since 1970.
     stop: OnceLock<i64>,
     limit: usize,
 }
@@ -132,7 +132,7 @@ impl Queue {
         Self { state: Mutex::new(state), came: Condvar::new(), stop: OnceLock::new(), limit }
     }
 
-    /// Moves received datagrams into the waiting batch; those without room are dropped and counted.
+    /// Moves received datagrams into the waiting batch; those that do not fit are dropped and counted.
     pub(super) fn put(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
         let mut state = self.state();
         let Received { waiting, counts, .. } = &mut *state;
@@ -158,14 +158,14 @@ impl Queue {
         }
     }
 
-    /// Counts and numbers datagrams that the caller received itself.
+    /// Counts and numbers datagrams that the caller received directly.
     pub(super) fn count(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
         let (datagrams, bytes) = (received.datagrams.len(), received.bytes.len());
         let first = self.state().counts.add(datagrams, bytes, messages, dropped_by_kernel);
         received.number_from(first);
     }
 
-    pub(super) fn take(&self, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
+    pub(super) fn pop(&self, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
         batch.clear();
         let state = self.state();
         let nothing = |s: &mut Received| s.waiting.is_empty() && !s.closed;
@@ -180,13 +180,13 @@ impl Queue {
         Ok(!batch.is_empty())
     }
 
-    /// No datagram that arrived before this time will be added any more.
+    /// Records a feed's promise that no datagram that arrived before this time will be added.
     pub(super) fn promise(&self, until_ns: i64) {
         let mut state = self.state();
         state.until_ns = state.until_ns.max(Some(until_ns));
     }
 
-    /// The promised time, where the queue is empty.
+    /// The promised time, if the queue is empty.
     pub(super) fn silent_until(&self) -> Option<i64> {
         let state = self.state();
         state.until_ns.filter(|_| state.waiting.is_empty())
@@ -214,12 +214,13 @@ impl Queue {
         self.stop.get_or_init(now_ns);
     }
 
-    /// When the end was requested, ns of the host's clock since 1970; `None` where it was not.
+    /// The time when the end was requested, ns of the host's clock since 1970; `None` if it was not.
     pub(super) fn stopped_ns(&self) -> Option<i64> {
         self.stop.get().copied()
     }
 
-    /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
+    /// Locks the state. No holder of the lock can panic half-way through a change, so a poisoned lock still guards a
+    /// valid state.
     fn state(&self) -> MutexGuard<'_, Received> {
         lock(&self.state)
     }

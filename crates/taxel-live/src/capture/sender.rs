@@ -14,10 +14,11 @@ use taxel_core::{Stop, problem};
 
 use crate::{Error, Result};
 
-/// A datagram, and so a train, must fit one IPv4 packet with its headers, bytes.
+/// Largest datagram or train, bytes: it must fit in one IPv4 packet with its headers.
 const LARGEST: usize = 65_507;
 
-/// The kernel takes no longer train (`UDP_MAX_SEGMENTS` of linux/udp.h before 6.9; later kernels take twice that).
+/// Largest train that the kernel accepts (`UDP_MAX_SEGMENTS` of linux/udp.h before 6.9; later kernels accept twice
+/// that).
 const TRAIN_DATAGRAMS: usize = 64;
 
 /// Counts of what was sent, whether it was received or not.
@@ -25,30 +26,30 @@ const TRAIN_DATAGRAMS: usize = 64;
 pub struct SendCounts {
     /// Send calls: trains of datagrams, or single ones.
     pub messages: u64,
-    /// Datagrams in them.
+    /// Number of datagrams sent.
     pub datagrams: u64,
-    /// Payload bytes in them.
+    /// Number of payload bytes sent.
     pub bytes: u64,
-    /// Whether the kernel cuts trains into datagrams (`UDP_SEGMENT`).
+    /// Whether the kernel splits trains into datagrams (`UDP_SEGMENT`).
     pub segmenting: bool,
 }
 
-/// Sends datagrams to one address, in trains where the kernel can cut them apart.
+/// Sends datagrams to one address, in trains if the kernel can split them.
 ///
-/// A datagram leaves when the next one does not fit its train, or with [`Sender::flush`]; a board flushes at the end of
-/// each frame.
+/// A datagram is sent when the next one does not fit its train, or with [`Sender::flush`]; a board flushes at the end
+/// of each frame.
 #[derive(Debug)]
 pub struct Sender {
     socket: UdpSocket,
     to: SocketAddr,
     train: Vec<u8>,
-    /// Length of the train's datagrams but the last, bytes.
+    /// Length of each datagram of the train except the last, bytes.
     segment: usize,
     datagrams: usize,
     counts: SendCounts,
 }
 
-/// Any address of this machine, of the kind of another.
+/// The unspecified address of the same family (IPv4 or IPv6).
 fn unspecified(to: SocketAddr) -> SocketAddr {
     match to {
         SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
@@ -60,32 +61,33 @@ fn unspecified(to: SocketAddr) -> SocketAddr {
 struct Control([u8; 64]);
 
 impl Sender {
-    /// Prepares to send to `to`; with `segment`, in trains where the kernel can.
+    /// Prepares to send to `to`; with `segment`, in trains if the kernel can split them.
     ///
     /// # Errors
     ///
-    /// `Socket` where no socket can be had.
+    /// `Socket` if no socket can be opened.
     pub fn open(to: SocketAddr, segment: bool) -> Result<Self> {
         Self::open_from(0, to, segment)
     }
 
-    /// The same, from a port of this machine; 0 finds a free one.
+    /// As [`Sender::open`], from a given local port; 0 selects a free one.
     ///
     /// # Errors
     ///
-    /// As [`Sender::open`], and where the port is taken.
+    /// As [`Sender::open`], and if the port is in use.
     pub fn open_from(port: u16, to: SocketAddr, segment: bool) -> Result<Self> {
         let mut from = unspecified(to);
         from.set_port(port);
         let socket = UdpSocket::bind(from).map_err(Error::socket(format!("UDP from port {port} to {to}")))?;
-        // Not connected: a connected socket fails while there is no receiver, and a board sends regardless.
+        // The socket is not connected: a connected socket returns errors while there is no receiver, and a board sends
+        // regardless.
         let segmenting =
             segment && super::socket::set(socket.as_raw_fd(), libc::SOL_UDP, libc::UDP_SEGMENT, &0).is_ok();
         let counts = SendCounts { segmenting, ..SendCounts::default() };
         Ok(Self { socket, to, train: Vec::with_capacity(LARGEST), segment: 0, datagrams: 0, counts })
     }
 
-    /// What was sent.
+    /// Counts of what was sent.
     #[must_use]
     pub fn counts(&self) -> SendCounts {
         self.counts
@@ -95,7 +97,7 @@ impl Sender {
     ///
     /// # Errors
     ///
-    /// `Socket` where the system refuses to send, as for a datagram that is too long.
+    /// `Socket` if the system refuses to send, for example because a datagram is too long.
     pub fn push(&mut self, datagram: &[u8]) -> Result<()> {
         let joins = self.counts.segmenting
             && self.datagrams > 0
@@ -113,12 +115,12 @@ impl Sender {
         if self.counts.segmenting { Ok(()) } else { self.flush() }
     }
 
-    /// Sends datagrams over and over, `each` of them every `period_us`, for `seconds` or until asked to stop: for
+    /// Sends datagrams repeatedly, `each` of them every `period_us`, for `seconds` or until asked to stop: for
     /// benchmarks.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` for arguments that make no sense; else as [`Sender::push`].
+    /// `Core(Problem)` if an argument is out of range; otherwise as [`Sender::push`].
     pub fn repeat(
         &mut self,
         datagrams: &[Vec<u8>],
@@ -155,7 +157,7 @@ impl Sender {
     ///
     /// # Errors
     ///
-    /// `Socket` where the system refuses to send.
+    /// `Socket` if the system refuses to send.
     pub fn flush(&mut self) -> Result<()> {
         if self.datagrams == 0 {
             return Ok(());
@@ -169,8 +171,8 @@ impl Sender {
         Ok(())
     }
 
-    /// Adds to an error that the datagram is too long where that is its cause: "message too long", or "invalid argument" of a train
-    /// on older kernels.
+    /// Adds to an error that the datagram is too long, if that is its cause: "message too long", or "invalid argument"
+    /// for a train on older kernels.
     fn explained(&self, error: io::Error) -> io::Error {
         let too_long = match error.raw_os_error() {
             Some(libc::EMSGSIZE) => true,
@@ -191,7 +193,7 @@ impl Sender {
         io::Error::new(io::ErrorKind::InvalidInput, text)
     }
 
-    /// The largest packet of the route as far as the kernel knows, bytes; it is known of connected sockets only.
+    /// The path MTU as far as the kernel knows it, bytes; the kernel knows it only for connected sockets.
     fn path_mtu(&self) -> Option<usize> {
         let ask = UdpSocket::bind(unspecified(self.to)).ok()?;
         ask.connect(self.to).ok()?;
@@ -207,8 +209,8 @@ impl Sender {
         let to = SockAddr::from(self.to);
         let mut part = libc::iovec { iov_base: self.train.as_mut_ptr().cast::<c_void>(), iov_len: self.train.len() };
         let mut control = Control([0; 64]);
-        // SAFETY: msghdr is plain data, for which all zeros is a valid value; the name, the part and the control
-        // memory that it is given live through the call, and the control memory has room for one u16.
+        // SAFETY: msghdr is plain data, for which all zeros is a valid value; the name, the buffer and the control
+        // memory that it points to live through the call, and the control memory has room for one u16.
         let sent = unsafe {
             let mut message: libc::msghdr = zeroed();
             message.msg_name = to.as_ptr().cast_mut().cast::<c_void>();

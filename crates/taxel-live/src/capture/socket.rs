@@ -13,10 +13,10 @@ use super::options::ReceiverOptions;
 use super::queue::Batch;
 use crate::recording::now_ns;
 
-/// No UDP message, train or single, is longer than this, bytes.
+/// Largest UDP message, single or train, bytes.
 pub(super) const LARGEST: usize = 1 << 16;
 
-/// Where the drop count stands among the numbers of `SO_MEMINFO` (`SK_MEMINFO_DROPS` of linux/sock_diag.h).
+/// Index of the drop count among the numbers of `SO_MEMINFO` (`SK_MEMINFO_DROPS` of linux/sock_diag.h).
 const MEMINFO_DROPS: usize = 8;
 const MEMINFO_NUMBERS: usize = 9;
 
@@ -38,14 +38,14 @@ impl Socket {
         let socket = UdpSocket::bind(address)?;
         let fd = socket.as_raw_fd();
         let bytes = c_int::try_from(options.kernel_buffer_bytes).unwrap_or(c_int::MAX);
-        // With CAP_NET_ADMIN beyond net.core.rmem_max, without it up to there.
+        // With CAP_NET_ADMIN the size may exceed net.core.rmem_max; without it, that is the limit.
         if set(fd, libc::SOL_SOCKET, libc::SO_RCVBUFFORCE, &bytes).is_err() {
             set(fd, libc::SOL_SOCKET, libc::SO_RCVBUF, &bytes)?;
         }
         set(fd, libc::SOL_SOCKET, libc::SO_TIMESTAMPNS, &1_i32)?;
         set(fd, libc::SOL_SOCKET, libc::SO_RXQ_OVFL, &1_i32)?;
         socket.set_nonblocking(true)?;
-        // Kernels before 5.0 have no UDP_GRO: then each datagram costs a call of its own, and `gro` is false.
+        // Kernels before 5.0 have no UDP_GRO: then each datagram needs its own call, and `gro` is false.
         let gro = options.gro && set(fd, libc::SOL_UDP, libc::UDP_GRO, &1_i32).is_ok();
         Ok(Self { socket, gro, dropped: 0 })
     }
@@ -58,7 +58,7 @@ impl Socket {
         self.gro
     }
 
-    /// Messages that the kernel has dropped, as far as is known.
+    /// Number of messages that the kernel has dropped, as last read.
     pub(super) fn dropped(&self) -> u64 {
         self.dropped
     }
@@ -69,7 +69,7 @@ impl Socket {
         if got.is_ok() { u64::from(bytes[0]) } else { 0 }
     }
 
-    /// Waits for a message, at most for `timeout`; false where none arrived.
+    /// Waits for a message, at most for `timeout`; returns false if none arrived.
     pub(super) fn wait(&self, timeout: Duration) -> io::Result<bool> {
         let mut asked = libc::pollfd { fd: self.socket.as_raw_fd(), events: libc::POLLIN, revents: 0 };
         let timeout = libc::timespec {
@@ -88,19 +88,19 @@ impl Socket {
         }
     }
 
-    /// Appends the next message to `batch`, which has room for [`LARGEST`] bytes; false where there is none.
+    /// Appends the next message to `batch`, which must have room for [`LARGEST`] bytes; returns false if there is none.
     pub(super) fn receive(&mut self, batch: &mut Batch) -> io::Result<bool> {
         let start = batch.bytes.len();
         let room = batch.bytes.spare_capacity_mut();
         let mut part = libc::iovec { iov_base: room.as_mut_ptr().cast::<c_void>(), iov_len: room.len() };
         let mut control = Control([0; CONTROL_BYTES]);
-        // SAFETY: msghdr is plain data, for which all zeros is a valid value (no name, no parts, no control).
+        // SAFETY: msghdr is plain data, for which all zeros is a valid value (no name, no buffers, no control memory).
         let mut message: libc::msghdr = unsafe { zeroed() };
         message.msg_iov = &raw mut part;
         message.msg_iovlen = 1;
         message.msg_control = from_mut(&mut control).cast::<c_void>();
         message.msg_controllen = CONTROL_BYTES as _;
-        // SAFETY: `message` names memory that lives through the call: the spare room of `batch`, and `control`.
+        // SAFETY: `message` points to memory that lives through the call: the spare capacity of `batch`, and `control`.
         let got = unsafe { libc::recvmsg(self.socket.as_raw_fd(), &raw mut message, 0) };
         let Ok(got) = usize::try_from(got) else {
             let error = io::Error::last_os_error();
@@ -109,7 +109,7 @@ impl Socket {
                 _ => Err(error),
             };
         };
-        // SAFETY: the kernel wrote `got` bytes into the spare room, which is at least as long.
+        // SAFETY: the kernel wrote `got` bytes into the spare capacity, which is at least as long.
         unsafe { batch.bytes.set_len(start + got) };
         let mut arrived_ns = None;
         let mut segment = 0;
@@ -138,7 +138,7 @@ impl Socket {
         Ok(true)
     }
 
-    /// Reads the count from the kernel: the one that comes with a message only counts drops before that message.
+    /// Reads the drop count from the kernel: the count in a message only includes drops before that message.
     pub(super) fn ask_dropped(&mut self) -> io::Result<()> {
         let mut numbers = [0_u32; MEMINFO_NUMBERS];
         get(self.socket.as_raw_fd(), libc::SO_MEMINFO, &mut numbers)?;
@@ -146,11 +146,11 @@ impl Socket {
         Ok(())
     }
 
-    /// The kernel counts in 32 bits and starts again at 0.
+    /// Adds the kernel's count, which has 32 bits and wraps around.
     #[allow(clippy::cast_possible_truncation)]
     fn note_dropped(&mut self, total: u32) {
         let more = total.wrapping_sub(self.dropped as u32);
-        // A message may carry an older count than the one that was read last.
+        // A message may contain an older count than the one that was last read.
         if more <= u32::MAX / 2 {
             self.dropped += u64::from(more);
         }
@@ -164,7 +164,7 @@ pub(super) fn set(fd: RawFd, level: c_int, name: c_int, value: &c_int) -> io::Re
     if done == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
-/// One of the numbers that the kernel stores for a socket.
+/// Reads one of the socket's numbers from the kernel.
 pub(super) fn number(fd: RawFd, level: c_int, name: c_int) -> io::Result<c_int> {
     let mut value: c_int = 0;
     let mut length = size_of::<c_int>() as libc::socklen_t;

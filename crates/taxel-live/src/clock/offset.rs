@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-/// What the host's clock shows when the board's shows a time: a line.
+/// The relation of the host's clock to the board's: a line.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Offset {
-    /// A time of the board, us ...
+    /// The board's time of a point on the line, us.
     pub board_us: i64,
-    /// ... and what the host's clock showed then, ns since 1970.
+    /// The host's time of that point, ns since 1970.
     pub host_ns: i64,
-    /// How much faster the host's clock runs, parts per million.
+    /// Drift of the host's clock relative to the board's, parts per million.
     pub drift_ppm: f64,
 }
 

@@ -1,19 +1,19 @@
-//! Quantile regression: the line that a share of the points lies below.
+//! Quantile regression: the line with a given fraction of the points below it.
 
-/// How well a slope is known when it is searched no further, ns/us.
+/// Precision to which a slope is searched, ns/us.
 const FINE: f64 = 2e-6;
-/// How far from the last one a slope is looked for first, ns/us.
+/// Initial search range around the last slope, ns/us.
 const NEAR: f64 = 2e-3;
 
-/// Points, times from their mean time on, of which so many may lie below a line.
+/// Points with times relative to their mean time, and the number of them that may be below a line.
 pub(super) struct Points {
     pub(super) all: Vec<(f64, f64)>,
     pub(super) early: f64,
 }
 
 impl Points {
-    /// The line of a slope that so many points lie below: its height at the mean time, and to which side of that those below
-    /// it lie, the sum of their times.
+    /// The line with a given slope and the allowed number of points below it: its height at the mean time, and the sum
+    /// of the times of the points below, whose sign shows on which side of the mean they are.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn under(&self, slope: f64) -> (f64, f64) {
         let mut above: Vec<(f64, f64)> = self.all.iter().map(|&(t, late)| (late - slope * t, t)).collect();
@@ -23,7 +23,8 @@ impl Points {
         (height, sum + self.early.fract() * at)
     }
 
-    /// The slope within `most` of 0 at which those below the line are balanced; `last` is where it was.
+    /// The slope, at most `most` in magnitude, at which the points below the line are balanced about the mean time; the
+    /// search starts at `last`.
     pub(super) fn slope(&self, last: f64, most: f64) -> f64 {
         let (mut low, mut high) = (-most, most);
         let mut narrow = |slope: f64| {
@@ -40,7 +41,7 @@ impl Points {
         while high - low > FINE {
             (low, high) = narrow(f64::midpoint(low, high));
         }
-        // No finer than it was searched, and 0 where it is as good as that.
+        // Rounds to the precision of the search, so that a slope of practically 0 becomes exactly 0.
         (f64::midpoint(low, high) / FINE).round() * FINE + 0.0
     }
 }

@@ -1,22 +1,23 @@
-//! A stretch of arrivals, of which the quick ones are stored.
+//! A stretch of arrivals, of which the fastest are stored.
 
 use super::offset::Offset;
 
-/// Of each such part of a stretch the quickest points are stored, us: within it no drift of a quartz changes which are quick ...
+/// Duration of a part of a stretch, in which the fastest points are stored, us. Within it the drift of a quartz cannot
+/// change which points are the fastest.
 pub(super) const PART_US: i64 = 10_000;
-/// ... so many of them.
+/// Number of points stored for each part.
 pub(super) const QUICK: usize = 2;
 
-/// Which share of the points may lie below the line.
+/// Fraction of the points that may be below the line.
 const EARLY: f64 = 0.01;
 
-/// Board time us, arrival less board time ns.
+/// Board time in us, and arrival minus board time in ns.
 pub(super) type Point = (i64, i64);
 
-/// The quick points of a stretch, and the mean time of all.
+/// The fastest points of a stretch, and the mean time of all its points.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Stretch {
-    /// Those of a part stand beside one another where they came in order.
+    /// The fastest points; those of one part are adjacent if they arrived in order.
     pub(super) quick: Vec<Point>,
     pub(super) points: u64,
     /// Sum of board times since the first, us.
@@ -28,7 +29,7 @@ pub(super) struct Stretch {
 impl Stretch {
     pub(super) fn push(&mut self, point: Point) {
         if self.points > 0 && point.0 == self.last {
-            // A train of datagrams that could leave at one time is one point: its quickest.
+            // Datagrams of a train, which could all be sent at one time, form one point: the fastest of them.
             if let Some(same) = self.quick.iter_mut().rev().find(|quick| quick.0 == point.0) {
                 same.1 = same.1.min(point.1);
                 return;
@@ -64,13 +65,13 @@ impl Stretch {
         self.quick.iter().copied().min_by_key(|quick| quick.1)
     }
 
-    /// How many points may lie below the line: where so many came that few were kept, as many as can be told.
+    /// How many points may lie below the line: where so many came that few were stored, as many as the stored ones can show.
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn early(&self) -> f64 {
         (EARLY * self.points as f64).min(self.quick.len() as f64 / 2.0)
     }
 
-    /// Leaves out what lies far above a line.
+    /// Removes points far above a line.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub(super) fn thin(&mut self, line: Offset) {
         self.quick.sort_unstable_by_key(|&(t, late)| late + t * 1000 - line.host_ns(t));

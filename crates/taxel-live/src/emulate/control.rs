@@ -40,7 +40,7 @@ impl Control {
         self.send(&board.greeting());
     }
 
-    /// Carries out received commands and answers them; never waits.
+    /// Executes received commands and answers them; never waits.
     pub(super) fn serve(&mut self, board: &mut Board) {
         if let Some((listener, _)) = &self.listener
             && let Ok((mut cable, _)) = listener.accept()
@@ -78,7 +78,7 @@ impl Control {
     }
 }
 
-/// A status line without a reader is lost, as on a UART; a closed connection is dropped.
+/// Sends status lines. They are lost if nothing reads them, as on a UART; a closed connection is dropped.
 fn send(cable: &mut Option<TcpStream>, lines: &str) {
     if let Some(there) = cable
         && let Err(error) = there.write_all(lines.as_bytes())

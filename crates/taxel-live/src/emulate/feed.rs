@@ -1,4 +1,4 @@
-//! Frames of any other sensor, from a pipe: 16-bit numbers, little-endian, frame after frame.
+//! Reads frames of any other sensor from a pipe: 16-bit numbers, little-endian, frame after frame.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
@@ -9,27 +9,28 @@ use taxel_core::Stop;
 use super::Touch;
 use crate::{Error, Result};
 
-/// How long to wait for data before the board reads commands again, ms.
+/// Longest wait for data before the board reads commands again, ms.
 const LOOK_EVERY_MS: i32 = 10;
 
-/// A pipe as a touch. The board's time is the pipe's: a frame a frame.
+/// Frames from a pipe as the input of a board. The pipe determines the pace: the board scans a frame whenever one is
+/// complete.
 #[derive(Debug)]
 pub struct Feed {
     from: File,
-    /// Bytes of frames that were read together with the line before them.
+    /// Bytes of frames that were already read together with the preceding header line.
     bytes: Vec<u8>,
     /// Number of bits by which values are shifted right, so that they fit the ramp.
     shift: u32,
     most: u16,
-    /// Bytes of a frame.
+    /// Size of a frame, bytes.
     wanted: usize,
     frames: u64,
     ended: bool,
 }
 
 impl Feed {
-    /// Reads frames of so many taxels from a file or pipe, after some bytes of theirs that were read already. Values are
-    /// shifted right by `shift` and end at `most`.
+    /// Reads frames of `taxels` taxels from a file or pipe, preceded by bytes that were read already. Values are
+    /// shifted right by `shift` and limited to `most`.
     #[must_use]
     pub fn new(taxels: usize, from: File, ahead: Vec<u8>, shift: u32, most: u16) -> Self {
         Self { from, bytes: ahead, shift, most, wanted: 2 * taxels, frames: 0, ended: false }
@@ -41,7 +42,7 @@ impl Touch for Feed {
         let mut piece = [0; 1 << 16];
         while !self.ended && self.bytes.len() < self.wanted {
             let mut poll = libc::pollfd { fd: self.from.as_raw_fd(), events: libc::POLLIN, revents: 0 };
-            // SAFETY: one entry, on our stack, of a descriptor that is ours.
+            // SAFETY: one entry, on our stack, with a descriptor that we own.
             if unsafe { libc::poll(&raw mut poll, 1, LOOK_EVERY_MS) } == 0 {
                 return Ok(false);
             }

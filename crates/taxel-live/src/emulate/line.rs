@@ -1,4 +1,4 @@
-//! An emulated serial line: a pseudo-terminal under a stable name, with the throughput of its baud rate.
+//! An emulated serial line: a pseudo-terminal with a stable name, limited to the throughput of its baud rate.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -9,24 +9,24 @@ use std::time::Instant;
 
 use crate::{Error, Result};
 
-/// Bits on the line for a byte: start, 8 of data, stop.
+/// Number of bits on the line per byte: start, 8 of data, stop.
 const BITS_A_BYTE: f64 = 10.0;
 
-/// What a UART buffers at most while nothing reads it, bytes.
+/// Size of the buffer of a UART, bytes: the most that can pass at once after a pause.
 const GATHERS: f64 = 64.0;
 
-/// What waits to be sent at most, bytes; more is lost, as on a UART.
+/// Capacity of the send buffer, bytes; more is lost, as on a UART.
 const WAITING: usize = 4096;
 
-/// One end of a pseudo-terminal; the other has a name in the file system, as a serial device has.
+/// One end of a pseudo-terminal; the other end has a name in the file system, as a serial device has.
 #[derive(Debug)]
 pub(super) struct Line {
     ours: File,
-    /// Held open, so that the line stays up while no program has it open.
+    /// Kept open, so that the line stays up while no other program has it open.
     _theirs: OwnedFd,
     link: PathBuf,
     bytes_per_s: f64,
-    /// Bytes that may pass now, each way.
+    /// Number of bytes that may be transferred now, in each direction.
     into: f64,
     out: f64,
     looked: Instant,
@@ -34,28 +34,29 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Opens a line and puts its name at `link`; an earlier link there is replaced, a file is not.
+    /// Opens a line and creates a link to it at `link`; replaces an earlier link, but not a file.
     ///
     /// # Errors
     ///
-    /// `File` where there is no pseudo-terminal to be had, or something else stands at `link`.
+    /// `File` if no pseudo-terminal is available, or something other than a link exists at `link`.
     pub(super) fn open(link: &Path, baud: u32) -> Result<Self> {
         let (mut ours, mut theirs) = (-1, -1);
         let mut name = [0 as libc::c_char; 128];
-        // SAFETY: openpty writes two descriptors and a name of some 12 bytes into the room given; no settings are passed.
+        // SAFETY: openpty writes two descriptors and a name of some 12 bytes into the buffers given; no settings are
+        // passed.
         let opened = unsafe {
             libc::openpty(&raw mut ours, &raw mut theirs, name.as_mut_ptr(), std::ptr::null(), std::ptr::null())
         };
         if opened != 0 {
             return Err(Error::file(link)(std::io::Error::last_os_error()));
         }
-        // SAFETY: both are open and belong to this function alone; the name ends within its room.
+        // SAFETY: both descriptors are open and owned by this function alone; the name ends within its buffer.
         let (ours, theirs, name) = unsafe {
             let name = std::ffi::CStr::from_ptr(name.as_ptr()).to_string_lossy().into_owned();
             (File::from_raw_fd(ours), OwnedFd::from_raw_fd(theirs), name)
         };
-        // Raw before a program can open it: else what the board sends would be echoed back to it.
-        // SAFETY: a descriptor of ours, settings on our stack.
+        // Set to raw mode before a program can open it: otherwise the board's output would be echoed back to it.
+        // SAFETY: a descriptor that we own, and settings on our stack.
         let ready = unsafe {
             let mut settings = std::mem::zeroed();
             libc::tcgetattr(theirs.as_raw_fd(), &raw mut settings) == 0
@@ -71,7 +72,7 @@ impl Line {
         if std::fs::symlink_metadata(link).is_ok_and(|there| !there.file_type().is_symlink()) {
             return Err(Error::file(link)(std::io::Error::from_raw_os_error(libc::EEXIST)));
         }
-        // By way of another name, so that there is always a whole link.
+        // The link is created under another name and renamed, so that a valid link exists at all times.
         let mut other = link.as_os_str().to_owned();
         other.push(format!(".{}", std::process::id()));
         let made = std::os::unix::fs::symlink(&name, &other).and_then(|()| std::fs::rename(&other, link));
@@ -81,7 +82,7 @@ impl Line {
         Ok(Self { ours, _theirs: theirs, link, bytes_per_s, into: 0.0, out: 0.0, looked, waiting })
     }
 
-    /// Bytes that arrived since the last call, at the rate of the line.
+    /// The bytes received since the last call, limited by the rate of the line.
     pub(super) fn read(&mut self) -> Vec<u8> {
         self.pass();
         let mut bytes = vec![0; self.into as usize];
@@ -96,7 +97,7 @@ impl Line {
         bytes
     }
 
-    /// Sends bytes, at the rate of the line.
+    /// Sends bytes, limited by the rate of the line.
     pub(super) fn send(&mut self, lines: &str) {
         let room = WAITING - self.waiting.len();
         self.waiting.extend(lines.bytes().take(room));
@@ -106,7 +107,7 @@ impl Line {
             let n = match self.ours.write(&now) {
                 Ok(n) => n,
                 Err(error) if error.kind() == ErrorKind::Interrupted => 0,
-                // The terminal is full because nothing reads it: lost, as on a UART.
+                // The terminal's buffer is full because nothing reads it: the bytes are lost, as on a UART.
                 Err(_) => now.len(),
             };
             self.out -= n as f64;
@@ -117,7 +118,8 @@ impl Line {
     fn pass(&mut self) {
         let passed = self.looked.elapsed().as_secs_f64() * self.bytes_per_s;
         self.looked = Instant::now();
-        // A machine that polls late must not slow the line down permanently.
+        // The limit grows with the time since the last call, so that late polling does not slow the line down
+        // permanently.
         let most = GATHERS.max(passed);
         (self.into, self.out) = ((self.into + passed).min(most), (self.out + passed).min(most));
     }

@@ -1,11 +1,11 @@
-//! A recording played again: its events as they were, or its pictures by the board's rules.
+//! Replays a recording: its events with their values, or its pictures by the board's rules.
 
 use taxel_core::{Array, EventsView, Stop, problem};
 
 use super::Touch;
 use crate::Result;
 
-/// What is played.
+/// The content that is replayed.
 #[derive(Debug)]
 enum What {
     /// Taxel and value of each event.
@@ -14,10 +14,11 @@ enum What {
     Pictures(Vec<u16>),
 }
 
-/// A recording as a touch: each frame holds what had arrived up to its start, by the recording's clock times a speed.
+/// Replays a recording to a board: each frame contains what had arrived by its start, by the recording's clock times a
+/// speed.
 #[derive(Debug)]
 pub struct Replay {
-    /// us from the first, ascending.
+    /// Times, us from the first, ascending.
     times: Vec<i64>,
     what: What,
     held: Vec<u16>,
@@ -28,11 +29,12 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Plays events. One without a value moves its taxel by `step` ticks, up or down, from half of `ramp`.
+    /// Replays events. An event without a value changes its taxel by `step` ticks, up or down, starting from half of
+    /// `ramp`.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where a speed is not above 0 or events make no sense.
+    /// `Core(Problem)` if the speed is not above 0 or the events are not valid.
     pub fn events(events: EventsView<'_>, (frame_us, speed): (f64, f64), step: u16, ramp: u16) -> Result<Self> {
         events.check()?;
         let valued = |k: usize| events.intensity.and_then(|i| i.present[k].then_some(i.ticks[k]));
@@ -54,11 +56,11 @@ impl Replay {
         Self::new(times, What::Events(played), held, frame_us, speed)
     }
 
-    /// Plays pictures of ticks, one after the other in `values`, at `times` us; each is held until the next.
+    /// Replays pictures of ticks, one after the other in `values`, at `times` us; each holds until the next.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where there is not one time a picture, in order, or a speed is not above 0.
+    /// `Core(Problem)` if there is not one time per picture, in order, or the speed is not above 0.
     pub fn pictures(array: &Array, times: Vec<i64>, values: Vec<u16>, frame_us: f64, speed: f64) -> Result<Self> {
         if values.len() != times.len() * array.len() || !times.is_sorted() {
             let (n, taxels) = (times.len(), array.len());

@@ -1,4 +1,4 @@
-//! Acts one after the other, each made ready while those before it are played.
+//! Plays acts one after the other; later acts are prepared meanwhile.
 
 use std::time::Duration;
 
@@ -9,10 +9,10 @@ use taxel_core::{Array, Stop};
 use super::Touch;
 use crate::{Error, Result};
 
-/// How many acts are made ready ahead of the one that is played.
+/// Number of acts that are prepared ahead of the current one.
 const AHEAD: usize = 4;
 
-/// How long to wait before looking whether to stop.
+/// Interval at which a waiting board checks whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Acts without an end, or with one.
@@ -21,16 +21,16 @@ pub struct Scenes {
     stage: Stage,
     coming: channel::Receiver<Result<Prepared>>,
     over: bool,
-    /// Touches that were not asked for yet.
+    /// Number of touches that were already returned by `take_contacts`.
     reported: usize,
 }
 
 impl Scenes {
-    /// Begins to make acts ready, in a thread of its own that ends with this.
+    /// Starts to prepare acts, in a thread that ends when this is dropped.
     ///
     /// # Errors
     ///
-    /// As [`Stage::new`]; what is wrong with an act shows when it is to be played.
+    /// As [`Stage::new`]; an error in an act is returned when the act is to be played.
     pub fn new(
         array: &Array,
         taxels: Taxels,
@@ -58,7 +58,7 @@ impl Scenes {
         Ok(Self { stage, coming, over: false, reported: 0 })
     }
 
-    /// Touches of acts that were made ready since this was asked last, us from the first frame's start.
+    /// Touches of the acts that were prepared since the last call, us from the first frame's start.
     pub fn take_contacts(&mut self) -> Vec<Contact> {
         let contacts = self.stage.contacts();
         let new = contacts[self.reported..].to_vec();
@@ -66,7 +66,7 @@ impl Scenes {
         new
     }
 
-    /// Waits until there is a frame to play; false where there is none any more, or the caller stops.
+    /// Waits until there is a frame to play; returns false if there are no more, or if the caller stops.
     fn is_ready(&mut self, stop: Stop<'_>) -> Result<bool> {
         while !self.over && self.stage.is_over() {
             match self.coming.recv_timeout(LOOK_EVERY) {

@@ -1,4 +1,4 @@
-//! The board's sync line as lines of text: a line an edge, written as it comes.
+//! Writes the edges of the board's sync line as lines of text.
 
 use std::fs::File;
 use std::io::Write;
@@ -8,7 +8,7 @@ use std::path::Path;
 use crate::recording::now_ns;
 use crate::{Error, Result};
 
-/// Where edges are written.
+/// The destination of the edges.
 #[derive(Debug)]
 pub(super) struct Sync {
     out: File,
@@ -20,14 +20,15 @@ impl Sync {
     ///
     /// # Errors
     ///
-    /// `File` where it cannot be opened, or a file is there and may not be replaced.
+    /// `File` if the file cannot be opened, or if it exists and may not be replaced.
     pub(super) fn open(path: &Path, overwrite: bool) -> Result<Self> {
         let there = std::fs::metadata(path).ok();
         let pipe = there.is_some_and(|m| m.file_type().is_fifo() || m.file_type().is_char_device());
         let mut options = File::options();
         options.write(true);
         if pipe {
-            // For reading too, so that a pipe opens before it has a reader; and never waiting for a slow reader.
+            // Opened for reading too, so that a pipe opens before it has a reader; non-blocking, so that a slow reader
+            // never delays the board.
             options.read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY);
         } else if overwrite {
             options.create(true).truncate(true);
@@ -40,7 +41,7 @@ impl Sync {
         Ok(sync)
     }
 
-    /// Writes the level of the line at a time of the board, us, where it has changed.
+    /// Writes the level of the line at a time of the board, us, if it has changed.
     pub(super) fn follow(&mut self, time_us: f64, high: bool) {
         if high != self.high {
             self.high = high;
@@ -48,10 +49,10 @@ impl Sync {
         }
     }
 
-    /// The board's time in us, 1 or 0, the host's time in ns since 1970.
+    /// Writes an edge: the board's time in us, the level 1 or 0, the host's time in ns since 1970.
     fn edge(&mut self, time_us: f64) {
         let line = format!("{time_us} {} {}\n", u8::from(self.high), now_ns());
-        // A line without a reader is lost, as an edge that no input samples.
+        // Without a reader the line of text is lost, as an edge is that no input samples.
         let _ = self.out.write_all(line.as_bytes());
     }
 }

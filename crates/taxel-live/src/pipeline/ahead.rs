@@ -1,4 +1,4 @@
-//! A readout that runs ahead in silence: what it detects from the events alone is the same as without that.
+//! A readout that advances during silence: its detections from the events alone are the same as without advancing.
 
 use taxel_core::detect::{Detection, ReadoutStream};
 use taxel_core::encode::Zeroing;
@@ -22,7 +22,7 @@ impl Ahead {
         Self { certain, ahead: None, early: vec![], wrong: 0, found: vec![] }
     }
 
-    /// Takes the next events; adds to `out` the detections that are certain now and were not output before.
+    /// Processes the next events; adds to `out` the detections that are certain now and were not output before.
     pub(super) fn push(&mut self, events: EventsView<'_>, out: &mut Vec<Detection>) -> Result<()> {
         if !events.is_empty() {
             self.ahead = None;
@@ -42,11 +42,11 @@ impl Ahead {
                 out.push(detection);
             }
         }
-        // A silence is certain once no event can fall into it that would still be accepted as late.
+        // A silence is certain once it ends so long ago that an event in it would be too late to be accepted.
         self.advance(t - FARTHEST_BACK_US, out)
     }
 
-    /// Knows that no data arrive before `t` us.
+    /// Advances on the certainty that no data arrive before `t` us.
     pub(super) fn advance(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.certain.advance(t, &mut self.found)?;
         self.settle(out);
@@ -59,17 +59,17 @@ impl Ahead {
         self.certain.zero(zeroing)
     }
 
-    /// What each taxel rests at, as [`ReadoutStream::rest`].
+    /// The rest of each taxel, as [`ReadoutStream::rest`].
     pub(super) fn rest(&self) -> Vec<Option<f64>> {
         self.certain.rest()
     }
 
-    /// How many events arrived out of order, or later than a silence that was certain.
+    /// Number of events that arrived out of order, or later than a silence that was certain.
     pub(super) fn late(&self) -> u64 {
         self.certain.late()
     }
 
-    /// How many detections were output in a silence that an event then interrupted.
+    /// Number of detections that were output during a silence that an event then interrupted.
     pub(super) fn wrong(&self) -> u64 {
         self.wrong
     }
@@ -102,7 +102,7 @@ mod tests {
 
     use super::*;
 
-    /// Detects once, some 7 ms after a change at taxel 0.
+    /// A readout that detects once, some 7 ms after a change at taxel 0.
     fn readout() -> Ahead {
         let neuron = Neuron { tau: 20.0, refractory: 500.0, theta_0: 0.3, ..Neuron::default() };
         let one = TrainedNeuron { delay_ms: 0.0, weights: vec![1.2; 8], neuron };
@@ -167,7 +167,8 @@ mod tests {
         ahead.push(event(1000, 20).view(), &mut out).unwrap();
         ahead.quiet(20_000, &mut out).unwrap();
         let early = out.clone();
-        // It came before the crossing, which therefore lay earlier: output again, as from the recording.
+        // The event was before the crossing, which therefore was earlier: the detection is output again, as from the
+        // recording.
         ahead.push(event(2000, 30).view(), &mut out).unwrap();
         ahead.advance(40_000, &mut out).unwrap();
         assert_eq!((early.len(), out.len(), ahead.wrong(), ahead.late()), (1, 2, 1, 0));

@@ -1,7 +1,7 @@
 //! Copies for other computers: datagrams as they arrived, the low-rate picture, detections.
 //!
-//! The decoding thread gathers datagrams into parcels and hands them over where there is room; it never waits. What finds
-//! no room is counted in the parcels that follow.
+//! The decoding thread gathers datagrams into parcels and queues them if there is room; it never waits. Parcels that do
+//! not fit are counted in those that follow.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -12,31 +12,28 @@ use serde_json::json;
 use super::shared::Shared;
 use super::sink::OutputDetection;
 use crate::capture::{Batch, Packer};
-use crate::recording::now_ns;
+use crate::recording::{PICTURE_EVERY, now_ns};
 
-/// So long a parcel gathers ...
+/// Longest time for which a parcel gathers datagrams.
 pub(super) const GATHER: Duration = Duration::from_millis(5);
-/// ... and after so long without one an empty parcel states up to when nothing arrived.
+/// Interval without datagrams after which an empty parcel states the time before which nothing arrived.
 const STILL_HERE: Duration = Duration::from_millis(10);
 
-/// From picture to picture.
-const PICTURE_EVERY: Duration = Duration::from_millis(100);
-
-/// Parcels that wait at most: 64 MiB.
+/// Capacity of the queue of parcels: 64 MiB.
 const WAITING: usize = 1 << 8;
 
-/// Something that goes to other computers.
+/// A copy for other computers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Copied {
     /// Datagrams.
     Parcel(Vec<u8>),
-    /// What the taxels hold: JSON.
+    /// The taxels' values, as JSON.
     Picture(Vec<u8>),
     /// A detection: a line of JSON.
     Detection(Vec<u8>),
 }
 
-/// The receiving end.
+/// The receiving end of the copies.
 pub struct Copies {
     shared: Arc<Shared>,
     parcels: channel::Receiver<Vec<u8>>,
@@ -66,13 +63,13 @@ impl Copies {
         }
     }
 
-    /// Whether the pipeline has ended, and every copy was taken.
+    /// Whether the pipeline has ended, and every copy was read.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.shared.has_ended() && self.parcels.is_empty() && self.detections.is_empty()
     }
 
-    /// A picture, where it is time and something came since the last.
+    /// A picture, if it is due and events have arrived since the last one.
     fn picture(&mut self) -> Option<Copied> {
         if self.pictured.elapsed() < PICTURE_EVERY {
             return None;
@@ -98,23 +95,23 @@ fn detection(output: OutputDetection) -> Option<Copied> {
     output.line().ok().map(Copied::Detection)
 }
 
-/// The decoding thread's end.
+/// The decoding thread's end of the copies.
 pub(super) struct Copier {
     parcels: channel::Sender<Vec<u8>>,
     packer: Packer,
-    /// When the parcel that gathers was begun, or the last one was closed.
+    /// When the current parcel was begun, or the last one was closed.
     since: Instant,
 }
 
-/// A copier that begins after so many datagrams, and the receiver of its parcels.
+/// A copier that starts after this number of received datagrams, and the receiver of its parcels.
 pub(super) fn copier(received: u64) -> (Copier, channel::Receiver<Vec<u8>>) {
     let (give, parcels) = channel::bounded(WAITING);
     (Copier { parcels: give, packer: Packer::after(received), since: Instant::now() }, parcels)
 }
 
 impl Copier {
-    /// Takes what arrived.
-    pub(super) fn take(&mut self, batch: &Batch, dropped_by_kernel: u64) {
+    /// Adds what arrived.
+    pub(super) fn push(&mut self, batch: &Batch, dropped_by_kernel: u64) {
         for (datagram, bytes) in batch.iter() {
             if self.packer.waiting() == 0 {
                 self.since = Instant::now();
@@ -127,8 +124,8 @@ impl Copier {
         }
     }
 
-    /// Closes a parcel that has gathered for long enough, or states that nothing arrived before `silent_until`; false where no
-    /// receiver is left.
+    /// Closes a parcel that is due, or states that nothing arrived before `silent_until`; returns false if there is no
+    /// receiver any more.
     pub(super) fn tick(&mut self, silent_until: Option<i64>, dropped_by_kernel: u64) -> bool {
         let since = self.since.elapsed();
         let due =
@@ -141,10 +138,11 @@ impl Copier {
         self.give(parcel)
     }
 
-    /// The last parcel, with what still waits.
+    /// Sends the last parcel, with the datagrams that still wait.
     pub(super) fn finish(&mut self, dropped_by_kernel: u64) {
         let parcel = self.packer.close(now_ns(), dropped_by_kernel, true);
-        // It waits for room, as its counts of losses are nowhere else; without a receiver it is dropped at once.
+        // Waits for room, because only this parcel contains the last counts of losses; without a receiver it is dropped
+        // at once.
         let _ = self.parcels.send_timeout(parcel, STILL_HERE * 10);
     }
 

@@ -1,4 +1,4 @@
-//! What the pipeline counts, and how it ended.
+//! The counts of the pipeline, and how it ended.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,10 +13,10 @@ use crate::capture;
 use crate::clock::Offset;
 use crate::latency::Quantiles;
 
-/// What arrived, what became of it, and what was lost where.
+/// Counts of what arrived, how it was processed, and what was lost at which stage.
 ///
 /// Once [`Live::stop`](super::Live::stop) has returned, `capture.datagrams = decoded + capture.dropped_by_queue` and
-/// `wire.bytes = 5 wire.words + wire.skipped`; `events = read_out + events_dropped` where there is a readout.
+/// `wire.bytes = 5 wire.words + wire.skipped`; if there is a readout, `events = read_out + events_dropped`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Counters {
     /// Counts of the socket and of the queue behind it.
@@ -25,65 +25,67 @@ pub struct Counters {
     pub bridged: Option<Bridged>,
     /// Datagrams that were decoded.
     pub decoded: u64,
-    /// What the decoder saw in them.
+    /// Counts of the decoder of version 1.
     pub wire: wire::Counts,
-    /// The version of the wire that the board speaks.
+    /// The board's version of the wire.
     pub wire_version: u8,
-    /// What arrived and what was missing of version 2.
+    /// Counts of the decoder of version 2.
     pub wire_v2: wire::v2::Counts,
-    /// Bytes of version 1 that were refused, because the board speaks version 2.
+    /// Bytes of version 1 that were refused because the board sends version 2.
     pub wire_refused: u64,
-    /// How often the board changed its version.
+    /// Number of times that the board changed its version.
     pub wire_changes: u64,
-    /// Events of version 2 that arrived when time had gone on without them: their datagram was overtaken by more than a gap is
-    /// waited for.
+    /// Events of version 2 that arrived after time had advanced without them: their datagram was delayed longer than
+    /// the pipeline waits at a gap.
     pub wire_late: u64,
-    /// Events that it gave.
+    /// Number of decoded events.
     pub events: u64,
     /// Events that the readout has processed.
     pub read_out: u64,
-    /// Events that found no room before the readout.
+    /// Events that did not fit in the queue before the readout.
     pub events_dropped: u64,
-    /// Events that arrived out of order, or more than 0.1 s after a silence that was assumed: the readout took them at
-    /// the time that it had arrived to.
+    /// Events that arrived out of order, or more than 0.1 s after a silence that was assumed: the readout counted them
+    /// at the time that it had come to.
     pub late: u64,
     /// Detections that were output.
     pub detections: u64,
-    /// Those among them that were output in a silence which an event then interrupted: it came later than the guard, and the
-    /// detections of the recording were output after them.
+    /// Detections among these that were output during a silence which an event then interrupted, because it arrived
+    /// later than the guard time; the detections of the recording were output after them.
     pub wrong: u64,
-    /// Detections that [`Live::next`](super::Live::next) was too slow for; the sinks had them.
+    /// Detections that [`Live::next`](super::Live::next) did not read in time; the sinks received them.
     pub detections_dropped: u64,
-    /// What went to each destination: `sent + lost + waiting = detections`.
+    /// Counts of each destination: `sent + lost + waiting = detections`.
     pub sent: Vec<Sent>,
-    /// What arrived of the recording's other sources.
+    /// Counts of the recording's other sources.
     pub sources: BTreeMap<String, SourceCounts>,
-    /// From the kernel's stamp to the end of decoding, a datagram each.
+    /// Latency from the kernel's stamp to the end of decoding, per datagram.
     pub decode_latency: Quantiles,
-    /// From `known` to the output, by the board's clock.
-    pub said_latency: Quantiles,
-    /// What the host's clock shows when the board's shows a time; from the first datagram on.
+    /// Latency from `known` to the output, by the board's clock.
+    #[serde(rename = "said_latency")]
+    pub output_latency: Quantiles,
+    /// The relation of the host's clock to the board's; from the first datagram on.
     pub offset: Option<Offset>,
     /// The latest stamp, us.
     pub board_us: Option<i64>,
-    /// Starts and stops that the board marked.
+    /// Number of start and stop markers.
     pub markers: u64,
     /// Whether the last marker was a start; `None` before the first.
     pub marked_start: Option<bool>,
-    /// Since the socket was opened, s.
+    /// Time since the socket was opened, s.
     pub seconds: f64,
-    /// Whether a tare is being taken.
+    /// Whether a tare is being measured.
     pub taring: bool,
 }
 
 impl Counters {
-    /// Whether not even a datagram that was lost has arrived.
+    /// Whether no datagram has arrived, not even one that was lost.
     #[must_use]
     pub fn nothing_came(&self) -> bool {
         self.capture.messages + self.capture.dropped_by_kernel == 0
     }
 
-    /// The counts since an earlier time. Clocks, versions and latencies are those of now; what waits at the end is left out.
+    /// The difference from earlier counts. Clocks, versions and latencies are the current ones; datagrams that still
+    /// wait are left out.
     #[must_use]
     pub(super) fn since(&self, earlier: &Self) -> Self {
         let decoded = self.decoded - earlier.decoded;
@@ -91,7 +93,7 @@ impl Counters {
         let dropped_by_queue = now.dropped_by_queue - before.dropped_by_queue;
         let datagrams = decoded + dropped_by_queue;
         let capture = capture::Counts {
-            // A message may have arrived whose datagrams wait.
+            // A message may have arrived whose datagrams still wait.
             messages: if datagrams == 0 { 0 } else { (now.messages - before.messages).max(1) },
             datagrams,
             bytes: now.bytes - before.bytes,
@@ -127,29 +129,29 @@ impl Counters {
 /// How a [`Live`](super::Live) ended.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// At the end, with closed sums.
+    /// The final counts, whose sums are complete.
     pub counters: Counters,
-    /// One line: nothing lost after arrival, what was lost where, or that nothing arrived.
+    /// The verdict in one line: nothing lost after arrival, what was lost where, or that nothing arrived.
     pub verdict: String,
-    /// The file, where something was recorded: one to which nothing arrived is removed, and replaces none.
+    /// The file, if something was recorded: if nothing arrived, a new file is removed and an earlier one is unchanged.
     pub path: Option<PathBuf>,
     /// The fresh tare, where one was completed.
     pub tare: Option<Tare>,
 }
 
-/// What arrived of a source, and what was lost.
+/// Counts of what arrived from a source, and of what was lost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum SourceCounts {
-    /// Of a board all that is counted of one.
+    /// The counts of a board's pipeline.
     Board(Box<Counters>),
-    /// Of numbers.
+    /// The counts of a stream of numbers.
     Numbers {
-        /// Lines, or samples given.
+        /// Number of lines, or of samples passed by a program.
         lines: u64,
-        /// Those that could not be parsed; they are recorded as they arrived.
+        /// Number of lines that could not be parsed; they are recorded as they arrived.
         strange: u64,
-        /// The system's last error, where the line broke.
+        /// The system's last error, if reading failed.
         trouble: Option<String>,
     },
 }

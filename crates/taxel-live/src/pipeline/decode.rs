@@ -1,10 +1,10 @@
-//! The second stage: datagrams to events, the values that the taxels hold, and the board's clock.
+//! The second stage: decodes datagrams to events, and tracks the taxels' values and the board's clock.
 
 use std::time::Duration;
 
 use taxel_core::Events;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Decoder, Receiver};
+use taxel_core::wire::{DatagramInfo, Decoder, SenderDecoder};
 
 use super::counters::Counters;
 use super::options::LiveOptions;
@@ -12,14 +12,15 @@ use super::readout_queue::Quiet;
 use crate::capture::Datagram;
 use crate::clock::{BoardClock, leaves};
 
-/// In silence the readout's time is moved on this often at most, and once a frame where frames are longer.
+/// Shortest interval at which the readout's time is advanced during silence; if frames are longer, it is advanced once
+/// per frame.
 const TICK: Duration = Duration::from_micros(500);
 
 pub(super) struct DecodeStage {
-    decoder: Receiver,
+    decoder: SenderDecoder,
     promise: Promise,
     clock: BoardClock,
-    /// Decoded and not handed on yet.
+    /// Events that were decoded and not passed on yet.
     events: Events,
     held: Held,
     /// The board's time of the latest datagram, us.
@@ -38,7 +39,7 @@ pub(super) struct Decoded {
     pub(super) info: DatagramInfo,
     pub(super) arrived_ns: i64,
     bytes: usize,
-    /// Where its events and markers begin among those that were not handed on.
+    /// Indices of the datagram's first event and first marker among those that were not passed on.
     first: (usize, usize),
 }
 
@@ -46,13 +47,14 @@ pub(super) struct Decoded {
 #[derive(Debug, Clone, Copy, Default)]
 struct Promise {
     until: Option<i64>,
-    /// Numbers that had not come when a gap was last waited for, and until when (us, host) it is.
+    /// Missing sequence numbers at the last gap for which the pipeline waited, and until when it waits (us, host).
     missing: u64,
     waits: Option<i64>,
 }
 
 impl Promise {
-    /// Notes a datagram. At a gap its promise waits for a frame: the missing datagrams may only be late.
+    /// Processes a datagram's promise. At a gap the promise takes effect a frame later: the missing datagrams may only
+    /// be late.
     fn note(&mut self, info: &DatagramInfo, arrived_us: i64, gap_us: i64) {
         if info.reset || info.missing < self.missing {
             (self.missing, self.waits) = (info.missing, None);
@@ -68,9 +70,9 @@ impl Promise {
     }
 }
 
-/// A decoder of either version of the wire that has seen nothing yet.
-pub(super) fn fresh_decoder(options: &LiveOptions) -> Receiver {
-    Receiver::new(Decoder::new(options.array.clone()).differences(options.differences), 1)
+/// A decoder of either version of the wire in its initial state.
+pub(super) fn fresh_decoder(options: &LiveOptions) -> SenderDecoder {
+    SenderDecoder::new(Decoder::new(options.array.clone()).differences(options.differences), 1)
 }
 
 impl DecodeStage {
@@ -91,8 +93,8 @@ impl DecodeStage {
         }
     }
 
-    /// Decodes a datagram. After a reset ([`DatagramInfo::reset`]) the caller hands on the events before it
-    /// ([`DecodeStage::split_at_reset`]) and goes on with [`DecodeStage::note`], as for every datagram.
+    /// Decodes a datagram. After a reset ([`DatagramInfo::reset`]) the caller must first pass on the events before it
+    /// ([`DecodeStage::split_at_reset`]), and then continue with [`DecodeStage::note`], as for every datagram.
     pub(super) fn push(&mut self, datagram: &Datagram, bytes: &[u8]) -> Decoded {
         let first = (self.events.len(), self.events.markers.len());
         let arrived_ns = datagram.arrived_ns;
@@ -100,20 +102,20 @@ impl DecodeStage {
         Decoded { info, arrived_ns, bytes: bytes.len(), first }
     }
 
-    /// Takes the events of a datagram that followed a reset away; those before it stay.
+    /// Removes and returns the events after a reset; those before it stay.
     pub(super) fn split_at_reset(&mut self, decoded: &mut Decoded) -> Events {
         let (rows, markers) = std::mem::take(&mut decoded.first);
         self.events.split_off(rows, markers)
     }
 
-    /// The board was reset: no value that a taxel held is valid; goes on with the events that followed.
+    /// Handles a reset of the board: the taxels' values become unknown; continues with the events after it.
     pub(super) fn reset(&mut self, later: &Events) {
         self.held.clear();
         self.events.append(later, later.len());
     }
 
     /// Counts a datagram, and takes from it the board's clock and its promise. `announced` is the time up to which the readout was
-    /// told that no more events will follow, us: events before it are late.
+    /// informed that no more events will follow, us: events before it are late.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn note(&mut self, decoded: &Decoded, announced: Option<i64>) {
         let Decoded { info, arrived_ns, bytes, first: (row, _) } = decoded;
@@ -137,13 +139,13 @@ impl DecodeStage {
         (self.events.t.get(row).copied(), self.events.markers.get(marker).map(|marker| marker.t))
     }
 
-    /// Takes the values of the events that are about to be handed on.
+    /// Holds the values of the events that are about to be handed on.
     pub(super) fn hold(&mut self) {
         self.has_intensities |= self.events.intensity.is_some();
         self.held.push(self.events.view());
     }
 
-    /// The time before which the board has newly promised to send no more events, us.
+    /// The time before which the board has newly promised no more events, us.
     pub(super) fn take_promise(&mut self) -> Option<i64> {
         self.promise.until.take()
     }
@@ -156,7 +158,7 @@ impl DecodeStage {
         &mut self.events
     }
 
-    /// The events were handed on.
+    /// Clears the events that were passed on.
     pub(super) fn clear(&mut self) {
         self.events.clear();
         if self.has_intensities {
@@ -169,7 +171,7 @@ impl DecodeStage {
         self.decoder.finish_into(&mut self.events);
     }
 
-    /// Writes its counts.
+    /// Writes the stage's counts.
     pub(super) fn publish(&self, counters: &mut Counters) {
         counters.decoded = self.decoded;
         counters.wire = *self.decoder.counts();
@@ -185,7 +187,7 @@ impl DecodeStage {
         counters.marked_start = self.events.markers.last().map(|m| m.start).or(counters.marked_start);
     }
 
-    /// Expects a version of the wire that the board was set to; returns whether that is another one.
+    /// Sets the version of the wire to which the board was set; returns whether it is a different one.
     pub(super) fn expect(&mut self, version: u8) -> bool {
         let other = version != self.decoder.version();
         if other {
@@ -194,12 +196,12 @@ impl DecodeStage {
         other
     }
 
-    /// How many datagrams were decoded.
+    /// Number of decoded datagrams.
     pub(super) fn decoded(&self) -> u64 {
         self.decoded
     }
 
-    /// The values that the taxels hold.
+    /// The taxels' values.
     pub(super) fn held(&self) -> &Held {
         &self.held
     }
@@ -218,19 +220,19 @@ impl DecodeStage {
         self.frame_us = frame_us;
     }
 
-    /// Version 1 promises nothing: only there does silence mean anything. How often the readout's time is moved on then.
+    /// The interval at which the readout's time is advanced during silence; only for version 1, which has no promises.
     pub(super) fn tick(&self) -> Option<Duration> {
         (self.decoder.version() == 1).then(|| TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)))
     }
 
-    /// The board's time before which all has arrived, by the host's clock, where nothing arrived up to `until_ns`.
+    /// The board's time before which everything has arrived, by the host's clock, if nothing arrived until `until_ns`.
     #[allow(clippy::cast_possible_truncation)]
     pub(super) fn quiet(&self, until_ns: Option<i64>) -> Option<Quiet> {
         if self.decoder.version() != 1 {
             return None;
         }
         let guard = (self.guard_frames * self.frame_us) as i64;
-        // What a frame sees leaves at its end: all events before the start of the frame that ends now have arrived.
+        // Events of a frame are sent at its end: all events before the start of the frame that ends now have arrived.
         Some(Quiet::Believed(self.clock.offset()?.board_us(until_ns?) - self.frame_us() - guard))
     }
 }

@@ -1,4 +1,4 @@
-//! What other parts may do with a pipeline while it runs: get its events, record, announce what was written to the board.
+//! Operations on a running pipeline: receiving its events, recording, announcing what was written to the board.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -19,10 +19,10 @@ use crate::Result;
 use crate::capture::Origin;
 use crate::locked::lock;
 
-/// Detections that wait for another computer at most.
+/// Capacity of the queue of detections for another computer.
 const COPIED_WAITING: usize = 1 << 12;
 
-/// What others may do with a [`Live`](super::Live) while it runs, and after.
+/// A handle to a [`Live`](super::Live), for other threads, valid while it runs and after.
 #[derive(Clone)]
 pub struct Handle {
     pub(super) shared: Arc<Shared>,
@@ -30,19 +30,19 @@ pub struct Handle {
 }
 
 impl Handle {
-    /// How the [`Live`](super::Live) was begun.
+    /// The options of the [`Live`](super::Live).
     #[must_use]
     pub fn options(&self) -> &LiveOptions {
         &self.shared.options
     }
 
-    /// The address that it receives on; unspecified, with port 0, where a bridge feeds it.
+    /// The address on which it receives; unspecified, with port 0, if a bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
     }
 
-    /// Where datagrams come from.
+    /// The source of datagrams.
     #[must_use]
     pub fn place(&self) -> &Origin {
         self.shared.receiver.place()
@@ -66,7 +66,7 @@ impl Handle {
         *lock(&self.shared.registers)
     }
 
-    /// Announces what was written to the board's registers: it is recorded, and the version of the wire is expected.
+    /// Announces a write of the board's registers: it is recorded, and its version of the wire is expected.
     pub fn wrote(&self, registers: Registers) {
         *lock(&self.shared.registers) = registers;
         self.shared.request(Request::Registers(registers));
@@ -76,10 +76,10 @@ impl Handle {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the pipeline has ended.
+    /// `Core(Problem)` if the pipeline has ended.
     pub fn events(&self) -> Result<ViewerEvents> {
-        let (give, events) = channel::bounded(1);
-        self.shared.request(Request::View(give));
+        let (answer, events) = channel::bounded(1);
+        self.shared.request(Request::View(answer));
         self.shared.wait(&events)
     }
 
@@ -87,15 +87,15 @@ impl Handle {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the pipeline has ended.
+    /// `Core(Problem)` if the pipeline has ended.
     pub fn copy(&self) -> Result<Copies> {
-        let (give, parcels) = channel::bounded(1);
+        let (answer, parcels) = channel::bounded(1);
         let detections = self.detections(COPIED_WAITING);
-        self.shared.request(Request::Copy(give));
+        self.shared.request(Request::Copy(answer));
         Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, detections))
     }
 
-    /// Returns a queue of the detections from now on; at most `waiting` wait, and a slow receiver misses some.
+    /// Returns a queue of the detections from now on with capacity `waiting`; a slow receiver misses some.
     #[must_use]
     pub fn detections(&self, waiting: usize) -> channel::Receiver<OutputDetection> {
         let (sender, receiver) = channel::bounded(waiting);
@@ -103,36 +103,36 @@ impl Handle {
         receiver
     }
 
-    /// Records what arrives from now on, of all sources, beginning with the registers and the held values. A recording that
-    /// runs ends with what arrived before: each datagram, and each line, belongs to one of the two.
+    /// Starts a recording of all sources, which begins with the registers and the taxels' values. A recording that runs
+    /// ends with what arrived before: each datagram, and each line, belongs to one of the two.
     ///
     /// # Errors
     ///
-    /// `File` where the file exists or cannot be created: then the one that runs goes on. What ended that one early, or `File`
-    /// where its end cannot be written. `Core(Problem)` where all is over.
+    /// `File` if the file exists or cannot be created: then the one that runs goes on. What ended that one early, or `File`
+    /// if its end cannot be written. `Core(Problem)` if all is over.
     pub fn record(&self, record: &Record) -> Result<Option<Summary>> {
         self.recordings.record(record)
     }
 
-    /// Ends the recording that [`Handle::record`] began: what it contains, and the file, where anything arrived.
+    /// Ends the recording that [`Handle::record`] started; returns its summary, with the file if anything arrived.
     ///
     /// # Errors
     ///
-    /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
+    /// What ended it early, or `File` if its end cannot be written; `Core(Problem)` if there is none.
     pub fn end_recording(&self) -> Result<Summary> {
         self.recordings.end()
     }
 
-    /// Whether a recording that [`Handle::record`] began runs, and has not been ended by an error.
+    /// Whether a recording that [`Handle::record`] started is running, and was not ended by an error.
     #[must_use]
     pub fn records(&self) -> bool {
         self.recordings.run()
     }
 
-    /// Whether anything is recorded, also from the beginning on.
+    /// Whether any recording is running, including one from the pipeline's beginning.
     #[must_use]
     pub fn is_recording(&self) -> bool {
-        lock(&self.shared.recorder).is_some()
+        lock(&self.shared.recording.recorder).is_some()
     }
 
     /// As [`Live::note`](super::Live::note).
@@ -144,7 +144,8 @@ impl Handle {
         self.shared.note(text, true)
     }
 
-    /// Writes a note that holds for the whole recording, such as the name of a trial: a note without a time, which is no event.
+    /// Writes a note about the whole recording, such as the name of a trial: a note without a time, which is not an
+    /// event.
     ///
     /// # Errors
     ///
@@ -153,27 +154,27 @@ impl Handle {
         self.shared.note(text, false)
     }
 
-    /// Takes the values that these taxels (column, row) hold for their rest from now on, in the readout and in the recording's
+    /// Makes the values that these taxels (column, row) hold their rest from now on, in the readout and in the recording's
     /// pictures; the recording states when that was, and the rests before and after. Only done on request.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where a taxel does not exist or has had no event so far, a tare is being taken, or a `.lsa` is recorded, which
+    /// `Core(Problem)` where a taxel does not exist or has had no event so far, a tare is being measured, or a `.lsa` is recorded, which
     /// cannot hold it: then none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
-        let (give, zeroed) = channel::bounded(1);
-        self.shared.request(Request::Zero(taxels.to_vec(), give));
+        let (answer, zeroed) = channel::bounded(1);
+        self.shared.request(Request::Zero(taxels.to_vec(), answer));
         self.shared.wait(&zeroed).and_then(std::convert::identity)
     }
 
-    /// The latest zeroing of each taxel that was zeroed, by taxel index; and how often taxels were.
+    /// The latest zeroing of each zeroed taxel, by taxel index; and the number of zeroings.
     #[must_use]
     pub fn zeroed(&self) -> (Vec<Zeroing>, u64) {
         let published = self.shared.published();
         (published.zeroed.values().copied().collect(), published.zeroings)
     }
 
-    /// How often taxels were zeroed.
+    /// Number of zeroings.
     #[must_use]
     pub fn zeroings(&self) -> u64 {
         self.shared.published().zeroings

@@ -11,15 +11,13 @@ use super::copies::{Copier, GATHER, copier};
 use super::shared::Shared;
 use super::viewer_queue::{ViewerEvents, ViewerQueue, viewer_queue};
 use crate::capture::Batch;
-
-/// How often a new picture is published.
-const PICTURE_EVERY: Duration = Duration::from_millis(100);
+use crate::recording::PICTURE_EVERY;
 
 pub(super) struct Observers {
     shared: Arc<Shared>,
     viewers: Vec<ViewerQueue>,
     copiers: Vec<Copier>,
-    /// How many datagrams were received before the next one.
+    /// Number of datagrams that were received before the next one.
     received: u64,
     pictured: Instant,
 }
@@ -29,34 +27,34 @@ impl Observers {
         Self { shared, viewers: vec![], copiers: vec![], received: 0, pictured: Instant::now() }
     }
 
-    /// Adds a viewer of the events, where it still waits for that.
-    pub(super) fn add_viewer(&mut self, give: &channel::Sender<ViewerEvents>, held: &Held) {
+    /// Adds a viewer of the events, if it is still connected.
+    pub(super) fn add_viewer(&mut self, answer: &channel::Sender<ViewerEvents>, held: &Held) {
         let counters = &self.shared.published().counters;
         let (queue, events) = viewer_queue(&self.shared.options.array, held, counters.board_us, counters.events);
-        if give.send(events).is_ok() {
+        if answer.send(events).is_ok() {
             self.viewers.push(queue);
         }
     }
 
-    /// Adds another computer that gets the datagrams.
-    pub(super) fn add_copier(&mut self, give: &channel::Sender<channel::Receiver<Vec<u8>>>) {
+    /// Adds another computer that receives the datagrams.
+    pub(super) fn add_copier(&mut self, answer: &channel::Sender<channel::Receiver<Vec<u8>>>) {
         let (copier, parcels) = copier(self.received);
-        if give.send(parcels).is_ok() {
+        if answer.send(parcels).is_ok() {
             self.copiers.push(copier);
         }
     }
 
-    /// How long datagrams may be waited for at most, so that parcels leave in time.
+    /// Longest time that the pipeline may wait for datagrams, so that parcels are sent in time.
     pub(super) fn longest_wait(&self, wait: Duration) -> Duration {
         if self.copiers.is_empty() { wait } else { wait.min(GATHER) }
     }
 
-    /// Copies events, whose values are among those that the taxels hold.
+    /// Copies events, whose values are already applied to `held`.
     pub(super) fn events(&mut self, events: &Events, held: &Held) {
         self.viewers.iter_mut().for_each(|queue| queue.push(events, held));
     }
 
-    /// The board was reset, and its taxels hold no value.
+    /// Handles a reset of the board, after which the taxels' values are unknown.
     pub(super) fn reset(&mut self, held: &Held) {
         self.viewers.iter_mut().for_each(|queue| queue.reset(held));
     }
@@ -71,7 +69,7 @@ impl Observers {
         }
         let dropped = self.shared.receiver.counts().dropped_by_kernel;
         self.copiers.retain_mut(|copier| {
-            copier.take(batch, dropped);
+            copier.push(batch, dropped);
             copier.tick(silent_until, dropped)
         });
     }
@@ -81,7 +79,7 @@ impl Observers {
         self.viewers.retain_mut(|queue| queue.tick(held));
     }
 
-    /// Publishes the picture where it is time; returns whether it was.
+    /// Publishes the picture if it is due; returns whether it was.
     pub(super) fn picture(&mut self, held: &Held) -> bool {
         if self.pictured.elapsed() < PICTURE_EVERY {
             return false;
@@ -91,7 +89,7 @@ impl Observers {
         true
     }
 
-    /// Sends the last of what waits.
+    /// Sends the last data that wait.
     pub(super) fn finish(&mut self, held: &Held) {
         self.tick(held);
         let dropped = self.shared.receiver.counts().dropped_by_kernel;

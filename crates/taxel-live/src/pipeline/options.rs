@@ -11,28 +11,30 @@ use super::source::Source;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
 
-/// How a [`Live`](super::Live) works.
+/// The options of a [`Live`](super::Live).
 #[derive(Debug, Clone)]
 pub struct LiveOptions {
     /// The sensor.
     pub array: Array,
-    /// The board's registers, as far as they are known: they state how long a frame lasts.
+    /// The board's registers, as far as they are known: they define the length of a frame.
     pub registers: Registers,
     /// Whether the board sends differences for intensities (the panel's "delta intensity").
     pub differences: bool,
-    /// In silence the readout's time follows the host's clock, this many frames behind it.
+    /// During silence the readout's time follows the host's clock, this number of frames behind it.
     pub guard_frames: f64,
-    /// At a gap in the sequence of version 2 time waits so many frames: the missing datagrams may only be late.
+    /// Number of frames for which time waits at a gap in the sequence of version 2: the missing datagrams may only be
+    /// late.
     pub gap_frames: f64,
-    /// How many events may wait for the readout.
+    /// Capacity of the queue before the readout, events.
     pub readout_events: usize,
     /// The socket and the queue behind it.
     pub capture: ReceiverOptions,
     /// The recording from the beginning, if any.
     pub record: Option<Record>,
-    /// Whether recordings begin and end while it runs ([`Live::record`](super::Live::record)); then none from the beginning.
+    /// Whether recordings start and end while the pipeline runs ([`Live::record`](super::Live::record)); then none
+    /// starts with it.
     pub record_later: bool,
-    /// Where detections go as lines, besides to the sinks.
+    /// Destinations to which detections are sent as lines, in addition to the sinks.
     pub send: Vec<Destination>,
     /// The board's name in a recording.
     pub name: String,
@@ -41,7 +43,7 @@ pub struct LiveOptions {
 }
 
 impl LiveOptions {
-    /// The usual ones for an array: the first preset's registers, 5 frames' guard, nothing recorded.
+    /// The default options for an array: the first preset's registers, 5 frames' guard, no recording.
     #[must_use]
     pub fn new(array: Array) -> Self {
         Self {
@@ -60,19 +62,19 @@ impl LiveOptions {
         }
     }
 
-    /// How long the board's frames last, and the unit of their stamps, by its registers.
+    /// The length of the board's frames, and the unit of their stamps, by its registers.
     #[must_use]
     pub fn frames(&self) -> FrameTime {
         FrameTime::on_wire(self.registers.frame_us(), self.registers.wire_version)
     }
 }
 
-/// Where and how to record: `.lsa` for the manual's raw bytes, `.mcap` for all that is known.
+/// The file of a recording: `.lsa` for the manual's raw bytes, `.mcap` for everything.
 #[derive(Debug, Clone)]
 pub struct Record {
     /// The file.
     pub path: PathBuf,
-    /// Of the chunks of `.mcap`.
+    /// Compression of the chunks of `.mcap`.
     pub compression: Compression,
     /// Whether an existing file may be replaced.
     pub overwrite: bool,

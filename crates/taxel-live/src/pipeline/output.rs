@@ -1,4 +1,4 @@
-//! Hands detections to their sinks, to the recording and to waiting receivers: one after the other, by any thread that is
+//! Hands detections to their sinks, to the recording and to waiting callers: one after the other, by any thread that is
 //! free to.
 
 use std::collections::VecDeque;
@@ -13,34 +13,35 @@ use crate::locked::lock;
 use crate::recording::now_ns;
 use crate::{Error, Result};
 
-/// How many detections wait while a sink is slow; more are lost, and counted.
+/// Capacity of the queue of detections while a sink is slow; more are lost, and counted.
 const WAITING: usize = 1 << 14;
 
-/// Outputs detections in order, one at a time; a thread that finds another one outputting leaves them to it.
+/// Outputs detections in order, one at a time; a thread that finds another one outputting leaves its detections to that
+/// thread.
 pub(super) struct DetectionOutput(Mutex<State>);
 
 struct State {
     waiting: VecDeque<Detection>,
     /// `None` while a thread uses them.
-    receivers: Option<Receivers>,
+    targets: Option<Targets>,
 }
 
-/// Where detections go.
-struct Receivers {
+/// The receivers of detections.
+struct Targets {
     sinks: Vec<Box<dyn Sink>>,
     /// The queue of [`Live::next`](super::Live::next).
     queue: Sender<OutputDetection>,
-    /// A sink has failed, which ends the pipeline: nothing more is output.
+    /// Whether a sink has failed, which ends the pipeline: nothing more is output.
     failed: bool,
 }
 
 impl DetectionOutput {
     pub(super) fn new(sinks: Vec<Box<dyn Sink>>, queue: Sender<OutputDetection>) -> Self {
-        let receivers = Some(Receivers { sinks, queue, failed: false });
-        Self(Mutex::new(State { waiting: VecDeque::new(), receivers }))
+        let targets = Some(Targets { sinks, queue, failed: false });
+        Self(Mutex::new(State { waiting: VecDeque::new(), targets }))
     }
 
-    /// Adds detections; returns whether no thread is outputting any.
+    /// Adds detections; returns whether no thread is outputting at present.
     pub(super) fn add(&self, shared: &Shared, found: &mut Vec<Detection>) -> bool {
         let mut state = lock(&self.0);
         let room = WAITING.saturating_sub(state.waiting.len()).min(found.len());
@@ -51,30 +52,30 @@ impl DetectionOutput {
             counters.detections += lost as u64;
             counters.detections_dropped += lost as u64;
         }
-        state.receivers.is_some()
+        state.targets.is_some()
     }
 
-    /// Hands on what waits, and what arrives in the meantime, unless another thread does.
+    /// Outputs the waiting detections, and those that are added meanwhile, unless another thread is outputting.
     pub(super) fn run(&self, shared: &Shared) {
         let mut state = lock(&self.0);
-        let Some(mut receivers) = state.receivers.take() else { return };
+        let Some(mut targets) = state.targets.take() else { return };
         while let Some(detection) = state.waiting.pop_front() {
             drop(state);
-            if !receivers.failed
-                && let Err(error) = receivers.take(shared, detection)
+            if !targets.failed
+                && let Err(error) = targets.output(shared, detection)
             {
-                receivers.failed = true;
+                targets.failed = true;
                 shared.fail(error);
             }
             state = lock(&self.0);
         }
-        state.receivers = Some(receivers);
+        state.targets = Some(targets);
     }
 }
 
-impl Receivers {
-    /// To the sinks first, then into the recording and to those that wait for it.
-    fn take(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
+impl Targets {
+    /// Passes a detection to the sinks first, then to the recording and the receivers.
+    fn output(&mut self, shared: &Shared, detection: Detection) -> Result<()> {
         let output_ns = now_ns();
         let offset = shared.published().counters.offset;
         let output = OutputDetection {
@@ -82,9 +83,9 @@ impl Receivers {
             detection,
             output_ns,
         };
-        self.sinks.iter_mut().try_for_each(|sink| sink.take(&output)).map_err(Error::Sink)?;
-        if let Some(recorder) = &*lock(&shared.recorder) {
-            // An error that ends only the recording is found, and kept, by the decoding thread too.
+        self.sinks.iter_mut().try_for_each(|sink| sink.output(&output)).map_err(Error::Sink)?;
+        if let Some(recorder) = &*lock(&shared.recording.recorder) {
+            // An error that ends only the recording is found, and reported, by the decoding thread too.
             recorder
                 .detection(&output)
                 .or_else(|error| if recorder.since().is_some() { Ok(()) } else { Err(error) })?;
@@ -98,7 +99,7 @@ impl Receivers {
         let mut published = shared.published();
         published.counters.detections += 1;
         published.counters.detections_dropped += u64::from(dropped);
-        published.said_latency.note(late_ns);
+        published.output_latency.note(late_ns);
         Ok(())
     }
 }

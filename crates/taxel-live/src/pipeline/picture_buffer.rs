@@ -3,16 +3,16 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// How often a recording gets a picture where something comes.
-const PICTURE_EVERY: Duration = Duration::from_millis(100);
+use crate::recording::PICTURE_EVERY;
 
-/// How often a picture is stored until it is decided: a recording never gets more.
+/// Interval at which pictures are buffered until it is known whether they are recorded: the largest rate in a
+/// recording.
 const BUFFERED_EVERY: Duration = Duration::from_millis(10);
 
-/// How many are stored: half a second. An event of longer ago gets no picture before it.
+/// Number of buffered pictures: half a second. For an event longer ago there is no picture before it.
 const BUFFERED: usize = 50;
 
-/// The pictures of the last half second, a hundredth of a second apart, until it is known whether the recording gets them.
+/// The pictures of the last half second, 10 ms apart, until it is known whether they are recorded.
 #[derive(Debug)]
 pub(super) struct PictureBuffer {
     pictures: VecDeque<BufferedPicture>,
@@ -22,12 +22,12 @@ pub(super) struct PictureBuffer {
     wanted: Option<Instant>,
 }
 
-/// What the taxels held at a time.
+/// The taxels' values at a time.
 #[derive(Debug)]
 pub(super) struct BufferedPicture {
-    /// When it was pushed, ns since 1970.
+    /// Time when it was added, ns since 1970.
     pub(super) at_ns: i64,
-    /// The board's time of the last event in it, us.
+    /// The board's time of the last event in the picture, us.
     pub(super) t_us: i64,
     /// Ticks by taxel index; 0 of a taxel without any event so far.
     pub(super) held: Vec<u16>,
@@ -54,18 +54,18 @@ impl PictureBuffer {
         Self { pictures: VecDeque::new(), awaited: vec![], pushed: None, wanted: None }
     }
 
-    /// Whether the next may be pushed.
+    /// Whether the next picture is due.
     pub(super) fn is_due(&self, now: Instant) -> bool {
         self.pushed.is_none_or(|pushed| now.saturating_duration_since(pushed) >= BUFFERED_EVERY)
     }
 
-    /// Nothing is recorded: discards all.
+    /// Discards all pictures, because nothing is recorded.
     pub(super) fn clear(&mut self) {
         self.pictures.clear();
         self.awaited.clear();
     }
 
-    /// Stores the values that the taxels hold.
+    /// Adds a picture of the taxels' values.
     pub(super) fn push(&mut self, now: Instant, at_ns: i64, t_us: i64, held: impl Iterator<Item = u16>) {
         let mut memory =
             if self.pictures.len() >= BUFFERED { self.pictures.pop_front().map(|old| old.held) } else { None };
@@ -87,7 +87,7 @@ impl PictureBuffer {
         self.pictures.push_back(picture);
     }
 
-    /// For an event at `t` us the recording gets the last picture before it and the first from it on.
+    /// Selects for an event at `t` us the last picture before it and the first one at or after it.
     pub(super) fn around(&mut self, t: i64) {
         if let Some(before) = self.pictures.iter_mut().rev().find(|picture| picture.t_us < t) {
             before.want();
@@ -99,7 +99,7 @@ impl PictureBuffer {
         }
     }
 
-    /// Those that the recording is to get, in order of time, once each.
+    /// The selected pictures, in order of time, each once.
     pub(super) fn take_wanted(&mut self) -> impl Iterator<Item = &BufferedPicture> {
         self.pictures.iter_mut().filter(|picture| picture.state == PictureState::Wanted).map(|picture| {
             picture.state = PictureState::Recorded;
@@ -112,20 +112,20 @@ impl PictureBuffer {
 mod tests {
     use super::*;
 
-    /// Takes a picture each 10 ms in `from..to` (hundredths of a second) and gives the board's times of those that are recorded.
+    /// Pushes a picture each 10 ms in `from..to` (hundredths of a second) and gives the board's times of those that are recorded.
     fn recorded(picture_buffer: &mut PictureBuffer, begun: Instant, times: std::ops::Range<i64>) -> Vec<i64> {
-        let mut taken = vec![];
+        let mut recorded_now = vec![];
         for k in times {
             let now = begun + BUFFERED_EVERY * u32::try_from(k).unwrap();
             assert!(picture_buffer.is_due(now));
             picture_buffer.push(now, k, 10_000 * k, std::iter::once(k as u16));
             assert!(!picture_buffer.is_due(now + BUFFERED_EVERY / 2));
-            taken.extend(picture_buffer.take_wanted().map(|picture| {
+            recorded_now.extend(picture_buffer.take_wanted().map(|picture| {
                 assert_eq!((picture.at_ns * 10_000, i64::from(picture.held[0]) * 10_000), (picture.t_us, picture.t_us));
                 picture.t_us
             }));
         }
-        taken
+        recorded_now
     }
 
     #[test]
@@ -136,8 +136,8 @@ mod tests {
         picture_buffer.around(123_456);
         picture_buffer.around(150_000);
         picture_buffer.around(365_000);
-        let taken: Vec<i64> = picture_buffer.take_wanted().map(|picture| picture.t_us).collect();
-        assert_eq!(taken, [120_000, 130_000, 140_000, 150_000, 360_000]);
+        let recorded_now: Vec<i64> = picture_buffer.take_wanted().map(|picture| picture.t_us).collect();
+        assert_eq!(recorded_now, [120_000, 130_000, 140_000, 150_000, 360_000]);
         picture_buffer.around(123_456);
         assert_eq!(picture_buffer.take_wanted().count(), 0, "each once");
         assert_eq!(recorded(&mut picture_buffer, begun, 37..45), [370_000, 400_000]);
@@ -146,13 +146,13 @@ mod tests {
     #[test]
     fn events_of_long_ago_and_many_of_them_cost_no_more_than_a_hundred_pictures_a_second() {
         let (mut picture_buffer, begun) = (PictureBuffer::new(), Instant::now());
-        let mut taken = recorded(&mut picture_buffer, begun, 0..100).len();
-        assert_eq!(taken, 10);
+        let mut recorded_now = recorded(&mut picture_buffer, begun, 0..100).len();
+        assert_eq!(recorded_now, 10);
         for t in 0..1_200_000 {
             picture_buffer.around(t);
         }
-        taken = picture_buffer.take_wanted().count() + recorded(&mut picture_buffer, begun, 100..200).len();
-        assert!(taken <= BUFFERED + 100, "{taken}");
+        recorded_now = picture_buffer.take_wanted().count() + recorded(&mut picture_buffer, begun, 100..200).len();
+        assert!(recorded_now <= BUFFERED + 100, "{recorded_now}");
         assert!(picture_buffer.pictures.len() <= BUFFERED && picture_buffer.awaited.len() <= BUFFERED);
         picture_buffer.clear();
         assert_eq!(picture_buffer.take_wanted().count(), 0);

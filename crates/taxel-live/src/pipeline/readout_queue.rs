@@ -7,7 +7,7 @@ use taxel_core::{Array, Events};
 
 use crate::locked::lock;
 
-/// Events that wait for the readout, and how far the board's time has arrived without any.
+/// Events that wait for the readout, and the time up to which there are no more.
 #[derive(Debug)]
 pub(super) struct ReadoutQueue {
     state: Mutex<Waiting>,
@@ -24,17 +24,17 @@ struct Waiting {
     closed: bool,
 }
 
-/// After the events that were handed over no data arrive before this time, us.
+/// A time before which no data follow the queued events, us.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Quiet {
-    /// By the host's clock: an event that comes late may contradict it.
+    /// By the host's clock: an event that arrives late may contradict it.
     Believed(i64),
     /// As the board has promised.
     Promised(i64),
 }
 
 impl Quiet {
-    /// us.
+    /// The time, us.
     pub(super) fn until(self) -> i64 {
         match self {
             Self::Believed(t) | Self::Promised(t) => t,
@@ -42,10 +42,10 @@ impl Quiet {
     }
 }
 
-/// What the readout processes at once, beside the events.
+/// What follows the events that the readout processes at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Taken {
-    /// How far time has arrived after the events.
+pub(super) struct BatchEnd {
+    /// The time before which no more events follow.
     pub quiet: Option<Quiet>,
     /// No more data will arrive.
     pub last: bool,
@@ -58,9 +58,9 @@ impl ReadoutQueue {
         Self { state: Mutex::new(state), came: Condvar::new(), limit }
     }
 
-    /// Adds events, with the board's promise after them, and leaves `events` empty; those that find no room are dropped. Returns how
-    /// many were so far. One wake-up.
-    pub(super) fn put(&self, events: &mut Events, promised: Option<i64>) -> u64 {
+    /// Adds events, with the board's promise after them, and leaves `events` empty; those that do not fit are dropped.
+    /// Returns the number dropped so far. Wakes the reader once.
+    pub(super) fn push(&self, events: &mut Events, promised: Option<i64>) -> u64 {
         let mut state = self.state();
         let room = self.limit.saturating_sub(state.events.len());
         if state.events.is_empty() && state.events.markers.is_empty() && events.len() <= room {
@@ -78,7 +78,7 @@ impl ReadoutQueue {
         dropped
     }
 
-    /// Sets up to when no data arrive after the events that wait.
+    /// Sets the time before which no data follow the queued events.
     pub(super) fn quiet(&self, quiet: Quiet) {
         self.state().quiet = Some(quiet);
         self.came.notify_one();
@@ -90,7 +90,7 @@ impl ReadoutQueue {
         self.came.notify_one();
     }
 
-    /// Ends it; `quiet` is up to when nothing arrived.
+    /// Ends the queue; `quiet` is the time before which nothing arrived.
     pub(super) fn close(&self, quiet: Option<Quiet>) {
         let mut state = self.state();
         state.quiet = quiet.or(state.quiet);
@@ -99,8 +99,8 @@ impl ReadoutQueue {
         self.came.notify_one();
     }
 
-    /// Waits until something is there and takes all of it; adds to `zeroings`.
-    pub(super) fn take(&self, events: &mut Events, zeroings: &mut Vec<Zeroing>) -> Taken {
+    /// Waits until something is there and removes all of it; adds to `zeroings`.
+    pub(super) fn pop(&self, events: &mut Events, zeroings: &mut Vec<Zeroing>) -> BatchEnd {
         events.clear();
         let nothing = |s: &mut Waiting| {
             let silent = s.events.is_empty() && s.events.markers.is_empty() && s.zeroings.is_empty();
@@ -109,10 +109,11 @@ impl ReadoutQueue {
         let mut state = self.came.wait_while(self.state(), nothing).unwrap_or_else(PoisonError::into_inner);
         std::mem::swap(&mut state.events, events);
         zeroings.append(&mut state.zeroings);
-        Taken { quiet: state.quiet.take(), last: state.closed }
+        BatchEnd { quiet: state.quiet.take(), last: state.closed }
     }
 
-    /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
+    /// Locks the state. No holder of the lock can panic half-way through a change, so a poisoned lock still guards a
+    /// valid state.
     fn state(&self) -> MutexGuard<'_, Waiting> {
         lock(&self.state)
     }
@@ -132,44 +133,44 @@ mod tests {
     }
 
     #[test]
-    fn what_was_handed_over_in_pieces_is_taken_as_one() {
+    fn what_was_pushed_in_pieces_is_popped_as_one() {
         let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
         for (t, ticks) in [(&[1, 2][..], None), (&[3], Some(7)), (&[4], None)] {
             let mut piece = events(t, ticks);
-            assert_eq!(readout_queue.put(&mut piece, None), 0);
+            assert_eq!(readout_queue.push(&mut piece, None), 0);
             assert!(piece.is_empty());
         }
-        let mut taken = Events::empty(Array::thesis());
-        assert_eq!(readout_queue.take(&mut taken, &mut vec![]), Taken { quiet: None, last: false });
-        assert_eq!(taken.t, [1, 2, 3, 4]);
-        let intensity = taken.intensity.as_ref().expect("one had an intensity");
+        let mut popped = Events::empty(Array::thesis());
+        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]), BatchEnd { quiet: None, last: false });
+        assert_eq!(popped.t, [1, 2, 3, 4]);
+        let intensity = popped.intensity.as_ref().expect("one had an intensity");
         assert_eq!(intensity.ticks, [0, 0, 7, 0]);
         assert_eq!(intensity.present, [false, false, true, false]);
-        taken.view().check().expect("columns are equally long");
+        popped.view().check().expect("columns are equally long");
     }
 
     #[test]
     fn what_finds_no_room_is_counted() {
         let readout_queue = ReadoutQueue::new(&Array::thesis(), 3);
-        assert_eq!(readout_queue.put(&mut events(&[1, 2], None), None), 0);
-        assert_eq!(readout_queue.put(&mut events(&[3, 4, 5], None), None), 2);
-        let mut taken = Events::empty(Array::thesis());
-        readout_queue.take(&mut taken, &mut vec![]);
-        assert_eq!(taken.t, [1, 2, 3]);
+        assert_eq!(readout_queue.push(&mut events(&[1, 2], None), None), 0);
+        assert_eq!(readout_queue.push(&mut events(&[3, 4, 5], None), None), 2);
+        let mut popped = Events::empty(Array::thesis());
+        readout_queue.pop(&mut popped, &mut vec![]);
+        assert_eq!(popped.t, [1, 2, 3]);
     }
 
     #[test]
-    fn silence_is_taken_once_and_only_where_nothing_came_after_it() {
+    fn silence_is_popped_once_and_only_where_nothing_came_after_it() {
         let readout_queue = ReadoutQueue::new(&Array::thesis(), 10);
-        let mut taken = Events::empty(Array::thesis());
+        let mut popped = Events::empty(Array::thesis());
         readout_queue.quiet(Quiet::Believed(100));
-        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Believed(100)));
+        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(Quiet::Believed(100)));
         readout_queue.quiet(Quiet::Believed(200));
-        readout_queue.put(&mut events(&[150], None), None);
-        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, None);
-        readout_queue.put(&mut events(&[], None), Some(300));
-        assert_eq!(readout_queue.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Promised(300)));
+        readout_queue.push(&mut events(&[150], None), None);
+        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, None);
+        readout_queue.push(&mut events(&[], None), Some(300));
+        assert_eq!(readout_queue.pop(&mut popped, &mut vec![]).quiet, Some(Quiet::Promised(300)));
         readout_queue.close(None);
-        assert!(readout_queue.take(&mut taken, &mut vec![]).last);
+        assert!(readout_queue.pop(&mut popped, &mut vec![]).last);
     }
 }

@@ -1,5 +1,5 @@
-//! The third stage: into the recording that runs, where one does, go datagrams as they arrived, what became of the board, markers,
-//! pictures and counts.
+//! The third stage: writes datagrams as they arrived, changes of the board, markers, pictures and counts to the running
+//! recording, if there is one.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use taxel_core::encode::Zeroing;
 use taxel_core::held::Held;
-use taxel_core::wire::{DatagramInfo, Receiver, Registers};
+use taxel_core::wire::{DatagramInfo, Registers, SenderDecoder};
 use taxel_core::{Events, Marker};
 
 use super::counters::Counters;
@@ -20,20 +20,20 @@ use crate::capture::Batch;
 use crate::locked::lock;
 use crate::recording::{BoardChange, Change, now_ns};
 
-/// How often an unfinished recording learns what was lost.
+/// Interval at which the counts are written to an unfinished recording.
 const COUNTS_EVERY: Duration = Duration::from_secs(1);
 
 pub(super) struct RecordStage {
     shared: Arc<Shared>,
-    /// Decodes from a recording's first datagram on, as a reader will, until the offset between its clock and the pipeline's is
-    /// known.
-    origin: Option<Box<Receiver>>,
+    /// Decodes from a recording's first datagram on, as a reader of the file will, until the offset between the
+    /// recording's clock and the pipeline's is known.
+    origin: Option<Box<SenderDecoder>>,
     picture_buffer: PictureBuffer,
-    /// Datagrams that had been decoded when the last picture was considered.
+    /// Number of decoded datagrams when the last picture was considered.
     considered: u64,
     /// Whether the recording has the fresh tare.
     tared: bool,
-    /// When the recording got its counts last.
+    /// When the counts were last written.
     counted: Instant,
 }
 
@@ -50,19 +50,19 @@ impl RecordStage {
     }
 
     pub(super) fn runs(&self) -> bool {
-        lock(&self.shared.recorder).is_some()
+        lock(&self.shared.recording.recorder).is_some()
     }
 
-    /// Works with the recording that runs. An error ends the pipeline where the recording was asked for from its beginning, and the
-    /// recording alone where it began later.
+    /// Calls `work` with the running recording. An error ends the pipeline if the recording was requested at its start,
+    /// and only the recording if it began later.
     fn with(&self, work: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<()> {
-        let mut slot = lock(&self.shared.recorder);
+        let mut slot = lock(&self.shared.recording.recorder);
         let Some(recorder) = &mut *slot else { return Ok(()) };
         match work(recorder) {
             Err(error) if recorder.since().is_some() => {
                 *slot = None;
-                lock(&self.shared.broken).get_or_insert(error);
-                self.shared.records.store(false, Ordering::Release);
+                lock(&self.shared.recording.broken).get_or_insert(error);
+                self.shared.recording.runs.store(false, Ordering::Release);
                 Ok(())
             }
             outcome => outcome,
@@ -73,14 +73,14 @@ impl RecordStage {
         self.with(|recorder| recorder.datagrams(batch))
     }
 
-    /// What a datagram showed of the board: a reset, or another version of the wire.
+    /// Records a change of the board that a datagram showed: a reset, or another version of the wire.
     pub(super) fn board(&self, info: &DatagramInfo, at_ns: i64) -> Result<()> {
         if info.version == 1 && !info.changed {
             return Ok(());
         }
         let wire = info.changed.then_some(Change::Wire { version: info.version, asked: false });
         self.with(|recorder| {
-            recorder.takes(info.version)?;
+            recorder.check_version(info.version)?;
             for change in wire.into_iter().chain(info.reset.then_some(Change::Reset)) {
                 recorder.board_change(&BoardChange { at_ns, t_us: info.now, change })?;
             }
@@ -88,7 +88,7 @@ impl RecordStage {
         })
     }
 
-    /// The board was set to another version of the wire; `t_us` is its latest time.
+    /// Records that the board was set to another version of the wire; `t_us` is its latest time.
     pub(super) fn asked_for_version(&self, version: u8, t_us: Option<i64>) -> Result<()> {
         let change = Change::Wire { version, asked: true };
         self.with(|recorder| recorder.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))
@@ -107,8 +107,9 @@ impl RecordStage {
         Ok(())
     }
 
-    /// Decodes a datagram by the recording's own clock, which begins with its first stamp: once that has arrived, of an event or a
-    /// marker, the offset to the pipeline's clock is known. `stamps` are the first of each as the pipeline decoded them.
+    /// Decodes a datagram by the recording's own clock, which begins with its first stamp. Once an event or a marker
+    /// has arrived, the offset to the pipeline's clock is known. `stamps` are the first of each as the pipeline decoded
+    /// them.
     pub(super) fn find_origin(&mut self, bytes: &[u8], at_ns: i64, stamps: (Option<i64>, Option<i64>)) -> Result<()> {
         let Some(origin) = &mut self.origin else { return Ok(()) };
         let mut events = Events::empty(self.shared.options.array.clone());
@@ -125,30 +126,30 @@ impl RecordStage {
         if timed { Ok(()) } else { self.earlier_zeroings() }
     }
 
-    /// Ends the recording that runs, and begins the next one, where there is one, with the values that the taxels hold. What has
-    /// come so far belongs to the former, what arrives from now on to the latter.
+    /// Ends the running recording, and starts the next one, if there is one, with the taxels' values. What was decoded
+    /// so far belongs to the former, what arrives from now on to the latter.
     pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &Held) -> Result<Ended> {
         let now = self.shared.counters();
-        let ended = lock(&self.shared.recorder).take();
+        let ended = lock(&self.shared.recording.recorder).take();
         self.origin = None;
         if let Some(mut next) = next {
             if let Err(error) = next.begin(&now, held.values()) {
-                *lock(&self.shared.recorder) = ended;
+                *lock(&self.shared.recording.recorder) = ended;
                 return Err(error);
             }
             self.origin = Some(Box::new(fresh_decoder(&self.shared.options)));
             self.tared = false;
             let timed = next.is_timed();
-            *lock(&self.shared.recorder) = Some(*next);
+            *lock(&self.shared.recording.recorder) = Some(*next);
             if timed {
                 self.earlier_zeroings()?;
             }
         }
-        self.shared.records.store(self.origin.is_some(), Ordering::Release);
+        self.shared.recording.runs.store(self.origin.is_some(), Ordering::Release);
         Ok((ended, now))
     }
 
-    /// Taxels that were zeroed before the recording began stay zeroed in it.
+    /// Records earlier zeroings, which remain valid in a new recording.
     fn earlier_zeroings(&self) -> Result<()> {
         let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
         self.with(|recorder| zeroed.iter().try_for_each(|one| recorder.zeroing(one)))
@@ -156,19 +157,19 @@ impl RecordStage {
 
     /// Records zeroings; on an error the caller zeroes nothing.
     pub(super) fn zeroings(&self, zeroings: &[Zeroing]) -> Result<()> {
-        match &*lock(&self.shared.recorder) {
+        match &*lock(&self.shared.recording.recorder) {
             Some(recorder) => zeroings.iter().try_for_each(|zeroing| recorder.zeroing(zeroing)),
             None => Ok(()),
         }
     }
 
-    /// Buffers a picture where it is time for one, and records those that the recording gets; at its end the last one.
+    /// Buffers a picture if one is due, and records the selected ones; with `last` also the final one.
     pub(super) fn pictures(&mut self, decoded: u64, held: &Held, last: bool) -> Result<()> {
         let now = Instant::now();
         if !(last || self.picture_buffer.is_due(now)) {
             return Ok(());
         }
-        let times = std::mem::take(&mut *lock(&self.shared.picture_times));
+        let times = std::mem::take(&mut *lock(&self.shared.recording.picture_times));
         if !self.runs() {
             self.picture_buffer.clear();
             return Ok(());
@@ -188,7 +189,7 @@ impl RecordStage {
         outcome
     }
 
-    /// Ten times a second: the tare once it is complete, and, once a second, the counts.
+    /// Runs ten times a second: writes the tare once it is complete and, once a second, the counts.
     pub(super) fn progress(&mut self) -> Result<()> {
         if !self.runs() {
             return Ok(());
@@ -209,7 +210,7 @@ impl RecordStage {
                 recorder.tare(&tare)?;
             }
             recorder.flush()?;
-            if due { recorder.so_far(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
+            if due { recorder.counts(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
         })
     }
 }

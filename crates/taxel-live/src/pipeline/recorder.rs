@@ -1,4 +1,4 @@
-//! One recording of a [`Live`](super::Live): to a `.mcap` of its own, to a part of another pipeline's, or to a raw `.lsa`.
+//! One recording of a [`Live`](super::Live): to its own `.mcap`, to a part of another pipeline's, or to a raw `.lsa`.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,49 +18,50 @@ use crate::locked::lock;
 use crate::recording::{self, BoardChange, Header, LsaWriter, OutputFile, Track, Writer, now_ns};
 use crate::{Error, Result};
 
-/// One recording, from its reservation to its end. Raw `.lsa` holds bytes and nothing else: notes, markers and the like are left
-/// out of it.
+/// One recording, from its reservation to its end. A raw `.lsa` contains bytes only: notes, markers and the like are
+/// left out.
 ///
-/// The file is locked from the reservation on. One that is to be replaced is changed when there is something to replace it with,
-/// and not before: where no data arrive, it stays.
+/// The file is locked from the reservation on. An existing file is replaced only when there is data to replace it: if
+/// no data arrive, it stays.
 pub(super) struct Recorder {
     record: Record,
     header: Header,
-    noted: AtomicBool,
-    /// Whether data came that the file cannot hold, and whether any data came.
+    has_notes: AtomicBool,
+    /// Whether data arrived that the file cannot store, and whether any data arrived.
     refused: AtomicBool,
-    begun: AtomicBool,
-    kind: OnceLock<Kind>,
+    has_data: AtomicBool,
+    file: OnceLock<RecordingFile>,
     /// The reserved file until it is begun; locked by the caller who begins it.
     reserved: Mutex<Option<OutputFile>>,
-    /// The counters at its beginning, where it began while the pipeline was running.
+    /// The counters at the recording's beginning, if it began while the pipeline was running.
     since: Option<Box<Counters>>,
     clock: Mutex<Clock>,
-    /// The pipeline whose file it is, where it is another's.
+    /// The pipeline that owns the file, if it is another one.
     host: Option<Part>,
 }
 
-/// How the recording's clock, which begins with its first stamp, relates to the pipeline's.
+/// The relation of the recording's clock, which begins with its first stamp, to the pipeline's.
 #[derive(Clone, Copy)]
 enum Clock {
-    /// It is behind by so many us.
+    /// The recording's clock is this many us behind.
     Behind(i64),
-    /// The file is not begun before the offset is known, and then states it in its header: times are the pipeline's.
+    /// The file is begun only when the offset is known, and states it in its header: its times are then those of the
+    /// pipeline.
     Waits,
-    /// The first stamp has not come.
+    /// The first stamp has not arrived.
     Unknown,
 }
 
-enum Kind {
+enum RecordingFile {
     Mcap(Box<Writer>),
-    /// A part of another's.
+    /// A part of another pipeline's recording.
     Track(Track),
-    /// Locked for the borrow only: one thread writes.
+    /// The lock is needed for the borrow only: one thread writes.
     Lsa(Mutex<LsaWriter>),
 }
 
-impl Kind {
-    /// The messages' writer; a raw file has none.
+impl RecordingFile {
+    /// The writer of messages; a raw file has none.
     fn track(&self) -> Option<&Track> {
         match self {
             Self::Mcap(writer) => Some(writer),
@@ -70,9 +71,9 @@ impl Kind {
     }
 }
 
-/// The pipeline whose recording others are parts of.
+/// The pipeline whose recording contains the parts of others.
 pub(super) trait Host: Send + Sync {
-    /// Opens another source's part of it.
+    /// Opens the part of another source.
     fn part(&self, name: &str) -> Result<Track>;
 
     /// Ends the pipeline because of an error.
@@ -87,7 +88,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Opens it: the file is begun from then on.
+    /// Opens the part: the file is begun from then on.
     pub(super) fn open(&self) -> Result<Track> {
         let host = self.host.upgrade().ok_or_else(|| problem!("source {}: the recording has ended", self.name))?;
         host.part(&self.name)
@@ -99,10 +100,10 @@ impl Recorder {
         Self {
             record: record.clone(),
             header,
-            noted: AtomicBool::new(false),
+            has_notes: AtomicBool::new(false),
             refused: AtomicBool::new(false),
-            begun: AtomicBool::new(false),
-            kind: OnceLock::new(),
+            has_data: AtomicBool::new(false),
+            file: OnceLock::new(),
             reserved: Mutex::default(),
             since: None,
             clock: Mutex::new(Clock::Behind(0)),
@@ -117,54 +118,56 @@ impl Recorder {
         Self { host: Some(host), ..Self::of(record, Header { name, ..board }) }
     }
 
-    /// A part of another pipeline's recording that begins while this one's board is received.
+    /// A part of another pipeline's recording that begins while this pipeline's board is being received.
     pub(super) fn part_of(&self, host: Part, options: &LiveOptions, place: &Origin) -> Result<Self> {
-        let track = self.writer(&host.name)?;
+        let track = self.track_of(&host.name)?;
         let part = Self::join(host, &self.record, options, place);
         Ok(Self {
-            kind: OnceLock::from(Kind::Track(track)),
+            file: OnceLock::from(RecordingFile::Track(track)),
             since: Some(Box::default()),
             clock: Mutex::new(Clock::Unknown),
             ..part
         })
     }
 
-    /// Another source's part of this recording.
-    pub(super) fn writer(&self, name: &str) -> Result<Track> {
-        match self.kind()? {
-            Kind::Mcap(writer) => writer.track(name),
-            Kind::Track(_) | Kind::Lsa(_) => Err(problem!("source {name}: only a .mcap holds several sources").into()),
+    /// The writer of another source's part of this recording.
+    pub(super) fn track_of(&self, name: &str) -> Result<Track> {
+        match self.create_once()? {
+            RecordingFile::Mcap(writer) => writer.track(name),
+            RecordingFile::Track(_) | RecordingFile::Lsa(_) => {
+                Err(problem!("source {name}: only a .mcap holds several sources").into())
+            }
         }
     }
 
     /// A recording from the pipeline's beginning: a new file is begun at once.
     pub(super) fn create(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
-        let (recorder, file) = Self::reserved(record, options, place)?;
+        let (recorder, file) = Self::open(record, options, place)?;
         let new = file.is_new();
         *lock(&recorder.reserved) = Some(file);
         if new {
-            recorder.kind()?;
+            recorder.create_once()?;
         }
         Ok(recorder)
     }
 
-    /// A recording that begins while the pipeline runs: the file is reserved, and written later.
+    /// A recording that begins while the pipeline runs: the file is reserved now, and written later.
     pub(super) fn reserve(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
-        let (recorder, file) = Self::reserved(record, options, place)?;
+        let (recorder, file) = Self::open(record, options, place)?;
         let recorder = Self { since: Some(Box::default()), ..recorder };
         if kind_of_name(&record.path)? == "lsa" {
             *lock(&recorder.reserved) = Some(file);
             return Ok(recorder);
         }
-        // Without other sources it waits for the board's first stamp, so that its times are the pipeline's.
+        // Without other sources the file waits for the board's first stamp, so that its times are the pipeline's.
         let for_clock = recorder.header.sources.is_empty();
         let writer = Writer::plan(file, &recorder.header, record.compression, for_clock);
         let clock = Mutex::new(if for_clock { Clock::Waits } else { Clock::Unknown });
-        Ok(Self { kind: OnceLock::from(Kind::Mcap(Box::new(writer))), clock, ..recorder })
+        Ok(Self { file: OnceLock::from(RecordingFile::Mcap(Box::new(writer))), clock, ..recorder })
     }
 
-    /// A recording whose file is opened and locked, and not changed.
-    fn reserved(record: &Record, options: &LiveOptions, place: &Origin) -> Result<(Self, OutputFile)> {
+    /// A recording whose file is opened and locked, but not changed.
+    fn open(record: &Record, options: &LiveOptions, place: &Origin) -> Result<(Self, OutputFile)> {
         let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
         let sources = options.sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
         let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
@@ -187,44 +190,45 @@ impl Recorder {
             self.registers(registers)?;
         }
         let t_us = now.board_us.and_then(|t| self.timed(t));
-        self.track(|track| track.held(now_ns(), t_us, held))
+        self.with_track(|track| track.held(now_ns(), t_us, held))
     }
 
-    /// Begins anew where it holds nothing yet; returns whether it does.
-    pub(super) fn again(&mut self, now: &Counters) -> bool {
+    /// Restarts the recording if it is still empty; returns whether it does.
+    pub(super) fn restart_if_empty(&mut self, now: &Counters) -> bool {
         if self.holds_anything() {
             return false;
         }
         self.since = Some(Box::new(now.clone()));
-        if let Some(Kind::Mcap(writer)) = self.kind.get() {
+        if let Some(RecordingFile::Mcap(writer)) = self.file.get() {
             writer.set_started(now_ns());
         }
         true
     }
 
-    /// Whether anything came of any source, or was noted.
+    /// Whether any source passed data, or a note was written.
     pub(super) fn holds_anything(&self) -> bool {
-        let others = matches!(self.kind.get(), Some(Kind::Mcap(writer)) if writer.holds_anything());
-        others || self.begun.load(Ordering::Relaxed) || self.noted.load(Ordering::Relaxed)
+        let others = matches!(self.file.get(), Some(RecordingFile::Mcap(writer)) if writer.holds_anything());
+        others || self.has_data.load(Ordering::Relaxed) || self.has_notes.load(Ordering::Relaxed)
     }
 
-    /// The counters at its beginning, where it began while the pipeline was running: then an error ends it alone.
+    /// The counters at the recording's beginning, if it began while the pipeline was running; an error then ends only
+    /// the recording.
     pub(super) fn since(&self) -> Option<&Counters> {
         self.since.as_deref()
     }
 
-    /// Sets by how much a clock that begins with the recording's first stamp is behind the pipeline's, us: a file that waits for
-    /// that can be written.
+    /// Sets the offset between a clock that begins with the recording's first stamp and the pipeline's, us; a file that
+    /// waits for it can then be written.
     pub(super) fn set_origin(&mut self, origin_us: i64) -> Result<()> {
-        let in_header = match self.kind.get() {
-            Some(Kind::Mcap(writer)) => writer.begin(origin_us)?,
+        let in_header = match self.file.get() {
+            Some(RecordingFile::Mcap(writer)) => writer.begin(origin_us)?,
             _ => false,
         };
         *lock(&self.clock) = Clock::Behind(if in_header { 0 } else { origin_us });
         Ok(())
     }
 
-    /// A time of the pipeline's clock on the recording's clock; none where that is not known yet.
+    /// Converts a time of the pipeline's clock to the recording's clock; none if the offset is not known yet.
     fn timed(&self, t: i64) -> Option<i64> {
         match *lock(&self.clock) {
             Clock::Behind(us) => Some(t - us),
@@ -233,12 +237,12 @@ impl Recorder {
         }
     }
 
-    /// Writes messages, which a raw file leaves out.
-    fn track(&self, work: impl FnOnce(&Track) -> Result<()>) -> Result<()> {
+    /// Writes messages, which a raw file omits.
+    fn with_track(&self, work: impl FnOnce(&Track) -> Result<()>) -> Result<()> {
         if kind_of_name(&self.record.path)? == "lsa" {
             return Ok(());
         }
-        self.kind()?.track().map_or(Ok(()), work)
+        self.create_once()?.track().map_or(Ok(()), work)
     }
 
     /// Whether times of the pipeline's clock can be converted to the recording's.
@@ -246,49 +250,52 @@ impl Recorder {
         self.timed(0).is_some()
     }
 
-    /// The file, which is begun where it was not.
-    fn kind(&self) -> Result<&Kind> {
+    /// Creates the file unless that was done before; returns it.
+    fn create_once(&self) -> Result<&RecordingFile> {
         let mut reserved = lock(&self.reserved);
-        if let Some(kind) = self.kind.get() {
-            return Ok(kind);
+        match self.file.get() {
+            Some(file) => Ok(file),
+            None => self.create_file(reserved.take()).map(|file| self.file.get_or_init(|| file)),
         }
+    }
+
+    /// Begins the file that was reserved, or this part in the file of the host.
+    fn create_file(&self, reserved: Option<OutputFile>) -> Result<RecordingFile> {
         if let Some(host) = &self.host {
-            let track = host.open()?;
-            return Ok(self.kind.get_or_init(|| Kind::Track(track)));
+            return Ok(RecordingFile::Track(host.open()?));
         }
         let path = &self.record.path;
-        let file = reserved.take().ok_or_else(|| problem!("{}: could not be begun", path.display()))?;
-        let kind = match kind_of_name(path)? {
+        let file = reserved.ok_or_else(|| problem!("{}: could not be begun", path.display()))?;
+        Ok(match kind_of_name(path)? {
             "mcap" => {
                 let writer = Writer::plan(file, &self.header, self.record.compression, false);
                 writer.begin(self.header.origin_us)?;
-                Kind::Mcap(Box::new(writer))
+                RecordingFile::Mcap(Box::new(writer))
             }
-            _ => Kind::Lsa(Mutex::new(LsaWriter::begin(file)?)),
-        };
-        Ok(self.kind.get_or_init(|| kind))
+            _ => RecordingFile::Lsa(Mutex::new(LsaWriter::begin(file)?)),
+        })
     }
 
     pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
-        self.begun.store(true, Ordering::Relaxed);
-        let kind = self.kind()?;
-        if let Some(track) = kind.track() {
+        self.has_data.store(true, Ordering::Relaxed);
+        let file = self.create_once()?;
+        if let Some(track) = file.track() {
             batch.iter().try_for_each(|(d, bytes)| track.datagram(d.arrived_ns, d.number, bytes))?;
         }
-        if let Kind::Lsa(writer) = kind {
+        if let RecordingFile::Lsa(writer) = file {
             let mut writer = lock(writer);
             batch.iter().try_for_each(|(_, bytes)| writer.bytes(bytes))?;
         }
         Ok(())
     }
 
-    /// The board's registers as they are from now on.
+    /// Writes the board's registers, valid from now on.
     pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
-        self.track(|track| track.registers(now_ns(), registers))
+        self.with_track(|track| track.registers(now_ns(), registers))
     }
 
     /// Refuses version 2 in a raw file: its bytes alone do not show where a datagram ends.
-    pub(super) fn takes(&self, version: u8) -> Result<()> {
+    pub(super) fn check_version(&self, version: u8) -> Result<()> {
         if version == 1 || kind_of_name(&self.record.path)? == "mcap" {
             return Ok(());
         }
@@ -300,23 +307,23 @@ impl Recorder {
 
     pub(super) fn board_change(&self, change: &BoardChange) -> Result<()> {
         let t_us = change.t_us.and_then(|t| self.timed(t));
-        self.track(|track| track.board_change(&BoardChange { t_us, ..*change }))
+        self.with_track(|track| track.board_change(&BoardChange { t_us, ..*change }))
     }
 
     pub(super) fn marker(&self, marker: Marker) -> Result<()> {
         let Some(t) = self.timed(marker.t) else { return Ok(()) };
-        self.track(|track| track.marker(now_ns(), Marker { t, ..marker }))
+        self.with_track(|track| track.marker(now_ns(), Marker { t, ..marker }))
     }
 
     pub(super) fn detection(&self, output: &OutputDetection) -> Result<()> {
         let found = &output.detection;
         let (Some(t), Some(known)) = (self.timed(found.t), self.timed(found.known)) else { return Ok(()) };
-        self.track(|track| track.detection(output.output_ns, &Detection { t, known, ..found.clone() }))
+        self.with_track(|track| track.detection(output.output_ns, &Detection { t, known, ..found.clone() }))
     }
 
-    /// The rest that is subtracted from the pictures from now on.
+    /// Sets the rest that is subtracted from the pictures from now on.
     pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
-        self.track(|track| {
+        self.with_track(|track| {
             track.tare(tare);
             Ok(())
         })
@@ -324,22 +331,22 @@ impl Recorder {
 
     pub(super) fn picture(&self, at_ns: i64, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
         // A file that is not begun has no pictures.
-        let there = !matches!(self.kind()?, Kind::Mcap(writer) if !writer.has_begun());
+        let there = !matches!(self.create_once()?, RecordingFile::Mcap(writer) if !writer.has_begun());
         let Some(t_us) = self.timed(board_us).filter(|_| there) else { return Ok(()) };
-        self.track(|track| track.picture(at_ns, t_us, columns, held))
+        self.with_track(|track| track.picture(at_ns, t_us, columns, held))
     }
 
-    /// Writes the losses up to now, which an unfinished recording then states; a raw one cannot hold them.
-    pub(super) fn so_far(&self, counters: &Counters) -> Result<()> {
-        let track = self.kind.get().and_then(Kind::track);
+    /// Writes the losses so far, which an unfinished recording then states; a raw file cannot store them.
+    pub(super) fn counts(&self, counters: &Counters) -> Result<()> {
+        let track = self.file.get().and_then(RecordingFile::track);
         track.map_or(Ok(()), |track| track.counts(now_ns(), &self.losses(counters)))
     }
 
-    /// Hands waiting bytes to the system: they must not wait in memory for long. `.mcap` does so by itself.
+    /// Passes buffered bytes to the system, so that they do not wait in memory for long; `.mcap` does so itself.
     pub(super) fn flush(&self) -> Result<()> {
-        match self.kind.get() {
-            Some(Kind::Mcap(_) | Kind::Track(_)) | None => Ok(()),
-            Some(Kind::Lsa(writer)) => lock(writer).flush(),
+        match self.file.get() {
+            Some(RecordingFile::Mcap(_) | RecordingFile::Track(_)) | None => Ok(()),
+            Some(RecordingFile::Lsa(writer)) => lock(writer).flush(),
         }
     }
 
@@ -347,50 +354,50 @@ impl Recorder {
         if kind_of_name(&self.record.path)? == "lsa" {
             return Err(problem!("a .lsa holds raw bytes and no notes: record to a .mcap file").into());
         }
-        self.noted.store(true, Ordering::Relaxed);
-        self.track(|track| track.note(now_ns(), board_us.and_then(|t| self.timed(t)), text))
+        self.has_notes.store(true, Ordering::Relaxed);
+        self.with_track(|track| track.note(now_ns(), board_us.and_then(|t| self.timed(t)), text))
     }
 
-    /// Writes that a person zeroed a taxel.
+    /// Writes a taxel's zeroing by a user.
     pub(super) fn zeroing(&self, zeroing: &Zeroing) -> Result<()> {
         if kind_of_name(&self.record.path)? == "lsa" {
             return Err(problem!("a .lsa cannot keep that a taxel was zeroed: record to a .mcap file").into());
         }
         let Some(t) = self.timed(zeroing.t) else { return Ok(()) };
-        self.track(|track| track.zeroing(now_ns(), &Zeroing { t, ..*zeroing }))
+        self.with_track(|track| track.zeroing(now_ns(), &Zeroing { t, ..*zeroing }))
     }
 
-    /// What was lost, as the file states it.
+    /// The losses, as the file states them.
     pub(super) fn losses(&self, counters: &Counters) -> recording::Counts {
         losses(counters, self.since())
     }
 
-    /// Closes the file and returns its path; a file that would hold nothing is not kept.
+    /// Closes the file and returns its path; a file that would hold nothing is removed.
     pub(super) fn finish(self, counters: &Counters) -> Result<Option<PathBuf>> {
         let lost = self.losses(counters);
         if let Some(host) = &self.host {
-            if let Some(track) = self.kind.get().and_then(Kind::track) {
+            if let Some(track) = self.file.get().and_then(RecordingFile::track) {
                 track.end(&host.name, lost);
             }
             return Ok(None);
         }
         let nothing = !self.holds_anything() && (self.since.is_some() || counters.nothing_came());
         let refused = self.refused.into_inner();
-        if nothing || (refused && !self.begun.into_inner()) {
-            match self.kind.into_inner() {
-                Some(Kind::Mcap(writer)) => writer.discard()?,
-                Some(Kind::Lsa(writer)) => unpoisoned(writer).discard()?,
-                Some(Kind::Track(_)) | None => {}
+        if nothing || (refused && !self.has_data.into_inner()) {
+            match self.file.into_inner() {
+                Some(RecordingFile::Mcap(writer)) => writer.discard()?,
+                Some(RecordingFile::Lsa(writer)) => unpoisoned(writer).discard()?,
+                Some(RecordingFile::Track(_)) | None => {}
             }
             let reserved = self.reserved.into_inner().unwrap_or_else(PoisonError::into_inner);
             return reserved.map_or(Ok(()), OutputFile::discard).map(|()| None);
         }
-        match self.kind.into_inner() {
-            Some(Kind::Mcap(writer)) => drop(writer.finish(lost)?),
-            // Without its .lss, as it is not whole.
-            Some(Kind::Lsa(writer)) if refused => unpoisoned(writer).end()?,
-            Some(Kind::Lsa(writer)) => unpoisoned(writer).finish()?,
-            Some(Kind::Track(_)) | None => {}
+        match self.file.into_inner() {
+            Some(RecordingFile::Mcap(writer)) => drop(writer.finish(lost)?),
+            // Ended without an .lss, because the file is not complete.
+            Some(RecordingFile::Lsa(writer)) if refused => unpoisoned(writer).end()?,
+            Some(RecordingFile::Lsa(writer)) => unpoisoned(writer).finish()?,
+            Some(RecordingFile::Track(_)) | None => {}
         }
         Ok(Some(self.record.path))
     }
@@ -400,7 +407,7 @@ fn unpoisoned(writer: Mutex<LsaWriter>) -> LsaWriter {
     writer.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Where datagrams come from, as it is written into files.
+/// The source of datagrams, as text for files.
 fn origin_text(place: &Origin) -> String {
     match place {
         Origin::Udp(address) => format!("udp {address}"),
@@ -408,7 +415,7 @@ fn origin_text(place: &Origin) -> String {
     }
 }
 
-/// The kind of file, by the ending of its name.
+/// The kind of file, by its extension.
 fn kind_of_name(path: &Path) -> Result<&str> {
     match path.extension().and_then(|e| e.to_str()) {
         Some(kind @ ("mcap" | "lsa")) => Ok(kind),
@@ -419,9 +426,9 @@ fn kind_of_name(path: &Path) -> Result<&str> {
     }
 }
 
-/// What was lost, as recordings state it; since `since` where a recording began then.
+/// The losses, as recordings state them; with `since`, those since a recording began.
 pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::Counts {
-    // What waits at its end belongs to a later recording.
+    // Datagrams that wait at the end belong to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
     let mut decoder = recording::damage(&now.wire);
     decoder.insert("bytes_of_version_1_refused".to_owned(), now.wire_refused);
@@ -429,7 +436,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         decoder.extend(causes);
         missing
     });
-    // Version 1 numbers no datagrams: a recording that holds any of it cannot state that none is missing.
+    // Version 1 does not number datagrams: a recording with any of it cannot state that none is missing.
     let knows = now.wire_v2.intact > 0 && now.wire.bytes == 0;
     recording::Counts {
         received: now.capture.datagrams,
@@ -454,7 +461,7 @@ mod tests {
         assert_eq!(losses(&now, None).missing, Some(0));
         assert_eq!(losses(&now, None).verdict(), "nothing lost");
         let begun = now.clone();
-        // Since it began the board has spoken version 1.
+        // The board has sent version 1 since the recording began.
         now.wire.bytes = 50;
         assert_eq!(losses(&now, Some(&begun)).missing, None);
         (now.wire_v2.datagrams, now.wire_v2.intact) = (110, 110);

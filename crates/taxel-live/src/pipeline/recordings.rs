@@ -17,13 +17,13 @@ use crate::locked::lock;
 use crate::recording::Counts;
 use crate::{Error, Result};
 
-/// Begins and ends the recordings of a pipeline.
+/// Starts and ends the recordings of a pipeline.
 pub(super) struct Recordings {
     shared: Arc<Shared>,
     /// The other sources of a recording, by name.
     boards: Vec<(String, Arc<Shared>)>,
     numbers: Vec<(String, Arc<Numbers>)>,
-    /// Held while one recording replaces another.
+    /// Locked while one recording replaces another.
     replacing: Mutex<()>,
 }
 
@@ -38,8 +38,8 @@ impl Recordings {
 
     /// As [`Handle::record`](super::Handle::record).
     pub(super) fn record(&self, record: &Record) -> Result<Option<Summary>> {
-        if !self.shared.records.load(Ordering::Acquire) {
-            // An error that ended an earlier recording and that nobody has been given.
+        if !self.shared.recording.runs.load(Ordering::Acquire) {
+            // Returns an error that ended an earlier recording and that no call has returned yet.
             self.take_error()?;
         }
         let options = &self.shared.options;
@@ -55,18 +55,18 @@ impl Recordings {
 
     /// As [`Handle::records`](super::Handle::records).
     pub(super) fn run(&self) -> bool {
-        let whole = |board: &Arc<Shared>| lock(&board.broken).is_none();
-        self.shared.records.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| whole(board))
+        let whole = |board: &Arc<Shared>| lock(&board.recording.broken).is_none();
+        self.shared.recording.runs.load(Ordering::Acquire) && self.boards.iter().all(|(_, board)| whole(board))
     }
 
     /// The error that ended a recording early, of this board or another one.
     fn take_error(&self) -> Result<()> {
         let all = self.boards.iter().map(|(_, board)| board).chain([&self.shared]);
-        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.broken).take()).collect();
+        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.recording.broken).take()).collect();
         errors.into_iter().next().map_or(Ok(()), Err)
     }
 
-    /// Ends the recording that runs and begins the next one, where there is one; returns how the first ended.
+    /// Ends the running recording and starts the next one, if there is one; returns how the first ended.
     fn replace(&self, next: Option<Recorder>) -> Result<Option<Summary>> {
         let replacing = lock(&self.replacing);
         let mut sources = BTreeMap::new();
@@ -83,11 +83,11 @@ impl Recordings {
             ended.push((recorder, counts));
         }
         for (name, numbers) in &self.numbers {
-            let track = next.as_ref().map(|next| next.writer(name)).transpose()?;
-            sources.insert(name.clone(), numbers.keep_in(track));
+            let track = next.as_ref().map(|next| next.track_of(name)).transpose()?;
+            sources.insert(name.clone(), numbers.record_into(track));
         }
         let (recorder, counters) = replace_of(&self.shared, next)?;
-        // Parts end before the whole.
+        // The parts must end before the whole recording.
         for (part, counts) in ended {
             part.map_or(Ok(None), |part| part.finish(&counts))?;
         }
@@ -104,15 +104,15 @@ impl Recordings {
     }
 }
 
-/// Has the decoding thread of one board record into `next`, or into nothing; returns the recorder before it.
+/// Makes the decoding thread of one board record into `next`, or not at all; returns the previous recorder.
 fn replace_of(shared: &Shared, next: Option<Recorder>) -> Result<Ended> {
     // Set before the request, so that the recording runs for callers that ask after this call.
-    shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
-    let (give, ended) = channel::bounded(1);
-    shared.request(Request::Record(next.map(Box::new), give));
+    shared.recording.runs.fetch_or(next.is_some(), Ordering::AcqRel);
+    let (answer, ended) = channel::bounded(1);
+    shared.request(Request::Record(next.map(Box::new), answer));
     let ended = shared.wait(&ended).and_then(std::convert::identity);
     if ended.is_err() {
-        shared.records.store(lock(&shared.recorder).is_some(), Ordering::Release);
+        shared.recording.runs.store(lock(&shared.recording.recorder).is_some(), Ordering::Release);
     }
     ended
 }
@@ -128,7 +128,7 @@ pub(super) fn verdict(place: &Origin, counters: &Counters, nothing: bool, lost: 
     std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ")
 }
 
-/// What to check where nothing arrived.
+/// What a user should check if nothing arrived.
 fn nothing_arrived(place: &Origin, seconds: f64) -> String {
     let ask = match place {
         Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),

@@ -1,11 +1,11 @@
-//! A sensor at rest: what a fresh tare is made of.
+//! A sensor at rest, from which a tare is computed.
 
 use taxel_core::detect::{FrameTime, Readout, ReadoutStream};
 use taxel_core::encode::{Tare, TareBuilder};
 use taxel_core::{Events, Intensities, Result};
 
-/// Takes a tare from the first event on for a stretch of the board's time, or until the board marks a start. However
-/// long that is, it stores only the last event of each taxel, and so the value that it holds.
+/// Gathers a tare from the first event on for an interval of the board's time, or until the board marks a start. For
+/// any duration, it stores only the last event of each taxel, that is, the taxel's value.
 pub(super) struct Rest {
     stretch_us: i64,
     readout: Box<Readout>,
@@ -28,7 +28,8 @@ impl Rest {
         Self { stretch_us, readout, builder, first: None, last: vec![None; array.len()], array: array.clone() }
     }
 
-    /// Takes the next events; once the rest is over, returns when it ended (us) and how many of them belong to it.
+    /// Processes the next events; once the interval is over, returns its end (us) and the number of these events that
+    /// belong to it.
     pub(super) fn push(&mut self, events: &Events, quiet_until: Option<i64>) -> Result<Option<(i64, usize)>> {
         if self.first.is_none() {
             self.first = events.t.first().copied();
@@ -51,7 +52,7 @@ impl Rest {
         Ok(over.then_some((stop, inside)))
     }
 
-    /// The tare, and the readout that uses it and knows what the taxels hold at `stop` us.
+    /// The tare, and the readout that uses it and is initialised with the taxels' values at `stop` us.
     pub(super) fn finish(self, stop: i64, frames: FrameTime) -> Result<(Tare, ReadoutStream)> {
         let tare = self.builder.finish(stop, "taken live")?;
         let mut stream = self.readout.stream(&self.array, frames, Some(&tare))?;
@@ -59,7 +60,7 @@ impl Rest {
             self.last.iter().enumerate().filter_map(|(taxel, last)| last.map(|last| (taxel, last))).collect();
         held.sort_by_key(|(_, last)| last.t);
         let columns = usize::from(self.array.columns);
-        // A taxel's index lies on the array, whose sides fit.
+        // A taxel's index is on the array, so its row and column fit.
         #[allow(clippy::cast_possible_truncation)]
         let events = Events {
             t: held.iter().map(|(_, last)| last.t).collect(),
@@ -72,7 +73,7 @@ impl Rest {
             }),
             ..Events::empty(self.array)
         };
-        // Detections in the rest itself are discarded: the sensor was at rest.
+        // Detections in the interval itself are discarded, because the sensor was at rest.
         let mut discarded = vec![];
         stream.push_events(events.view(), &mut discarded)?;
         stream.advance(stop, &mut discarded)?;

@@ -1,7 +1,7 @@
 //! Sends detections to other programs and machines: each as a line of JSON, by UDP, into a pipe or over a serial line.
 //!
-//! The thread that made a line writes it where there is room; other lines wait in a bounded queue for a separate thread.
-//! A reader that is too slow, or absent, loses lines, which are counted; the pipeline never waits for it.
+//! The thread that made a line writes it if the destination has room; other lines wait in a bounded queue for a
+//! separate thread. If a reader is too slow, or absent, lines are lost and counted; the pipeline never waits for it.
 
 use std::collections::VecDeque;
 use std::fmt::{self, Display, Formatter};
@@ -23,26 +23,26 @@ use super::sink::{OutputDetection, Sink};
 use crate::locked::lock;
 use crate::{Error, Result, address};
 
-/// Lines that wait at most.
+/// Capacity of the queue of lines.
 const WAITING: usize = 1024;
 
-/// How often a line that broke is tried again, and the end looked for.
+/// Interval at which a failed destination is opened again, and the end is checked.
 const AGAIN: Duration = Duration::from_millis(250);
 
-/// How long a slow reader is waited for at the end.
+/// Longest wait for a slow reader at the end.
 const LAST: Duration = Duration::from_secs(1);
 
-/// Of a serial line, where no speed is named.
-const BAUD: u32 = 115_200;
+/// Default speed of a serial line, baud.
+pub(super) const BAUD: u32 = 115_200;
 
-/// Where detections go: `udp:HOST:PORT`, `pipe:PATH` (a named pipe), `serial:PATH` or `serial:PATH@BAUD`.
+/// A destination of detections: `udp:HOST:PORT`, `pipe:PATH` (a named pipe), `serial:PATH` or `serial:PATH@BAUD`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Destination {
-    /// A datagram a line.
+    /// One datagram per line.
     Udp(SocketAddr),
     /// A named pipe, which must exist; lines are lost while it has no reader.
     Pipe(PathBuf),
-    /// A serial line, 8 data bits, no parity, 1 stop bit; opened again where it was pulled.
+    /// A serial line, 8 data bits, no parity, 1 stop bit; opened again after it was unplugged.
     Serial(PathBuf, u32),
 }
 
@@ -78,18 +78,18 @@ impl Display for Destination {
     }
 }
 
-/// What went to a destination.
+/// Counts of what was sent to a destination.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Sent {
-    /// Which.
+    /// The destination.
     pub to: String,
-    /// Lines that the system took whole.
+    /// Lines that were written whole.
     pub sent: u64,
-    /// Lines that found no room, or no reader.
+    /// Number of lines that were lost because there was no room, or no reader.
     pub lost: u64,
-    /// Lines that wait.
+    /// Number of lines that wait.
     pub waiting: u64,
-    /// The system's last error, where lines were lost for another reason than a slow reader.
+    /// The system's last error, if lines were lost for another reason than a slow reader.
     pub trouble: Option<String>,
 }
 
@@ -99,7 +99,7 @@ pub(super) struct Sending {
     thread: Option<JoinHandle<()>>,
 }
 
-/// What the thread that makes detections shares with the one that sends what waits.
+/// State shared by the thread that makes detections and the one that sends waiting lines.
 pub(super) struct Line {
     to: Destination,
     state: Mutex<SendingState>,
@@ -109,7 +109,7 @@ pub(super) struct Line {
 struct SendingState {
     device: Option<Device>,
     waiting: VecDeque<Vec<u8>>,
-    /// Bytes of the first that have gone already.
+    /// Number of bytes of the first line that were already written.
     gone: usize,
     counts: Sent,
     closed: bool,
@@ -122,11 +122,11 @@ enum Device {
 }
 
 impl Sending {
-    /// Opens the destination and begins.
+    /// Opens the destination and starts.
     ///
     /// # Errors
     ///
-    /// `File` or `Socket` where it cannot be opened, `Core(Problem)` where it is no pipe. A pipe without a reader is no error.
+    /// `File` or `Socket` if it cannot be opened, `Core(Problem)` if it is no pipe. A pipe without a reader is no error.
     pub(super) fn open(to: &Destination) -> Result<Self> {
         let device = Device::open(to)?;
         let counts = Sent { to: to.to_string(), ..Sent::default() };
@@ -137,17 +137,17 @@ impl Sending {
         Ok(Self { line, thread: Some(thread.map_err(Error::socket("thread"))?) })
     }
 
-    /// The counts, readable while it works and afterwards.
+    /// The counts, readable while it runs and afterwards.
     pub(super) fn line(&self) -> Arc<Line> {
         Arc::clone(&self.line)
     }
 }
 
 impl Sink for Sending {
-    fn take(&mut self, detection: &OutputDetection) -> io::Result<()> {
+    fn output(&mut self, detection: &OutputDetection) -> io::Result<()> {
         let mut state = lock(&self.line.state);
         if state.device.is_none() && matches!(self.line.to, Destination::Pipe(_)) {
-            // It may have a reader by now; a serial line takes longer to open, which the other thread does.
+            // A pipe may have a reader by now; a serial line takes longer to open, which is left to the other thread.
             state.opened(Device::open(&self.line.to));
         }
         if state.device.is_none() || state.waiting.len() >= WAITING {
@@ -176,13 +176,13 @@ impl Drop for Sending {
 }
 
 impl Line {
-    /// What went there up to now.
+    /// The counts of the destination so far.
     pub(super) fn counts(&self) -> Sent {
         let state = lock(&self.state);
         Sent { waiting: state.waiting.len() as u64, ..state.counts.clone() }
     }
 
-    /// The thread's whole life: wait until something waits, then until there is room for it.
+    /// The sending thread: waits until a line waits, then until there is room for it.
     fn send_what_waits(&self) {
         let mut closed_at = None;
         let mut state = lock(&self.state);
@@ -217,7 +217,7 @@ impl Line {
 }
 
 impl SendingState {
-    /// The destination was tried again.
+    /// Handles the result of another attempt to open the destination.
     fn opened(&mut self, tried: Result<Option<Device>>) {
         match tried {
             Ok(Some(device)) => self.device = Some(device),
@@ -226,7 +226,7 @@ impl SendingState {
         }
     }
 
-    /// Writes as many lines as there is room for.
+    /// Writes as many lines as fit.
     fn write(&mut self) {
         while let (Some(device), Some(line)) = (&mut self.device, self.waiting.front()) {
             match device.write(&line[self.gone..]) {
@@ -318,11 +318,11 @@ pub(super) fn serial(path: &Path, baud: u32) -> Result<serialport::TTYPort> {
     Ok(port)
 }
 
-/// Waits until something can be written, or will fail; no longer than `most`.
+/// Waits until data can be written, or writing will fail; at most `most`.
 fn wait_for_room(descriptor: RawFd, most: Duration) {
     let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLOUT, revents: 0 };
     let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);
-    // SAFETY: one entry, on our stack. A descriptor that was closed meanwhile is an answer of its own, and nothing is done
+    // SAFETY: one entry, on our stack. If the descriptor was closed meanwhile, poll reports that, and nothing is done
     // with it here.
     unsafe { libc::poll(&raw mut asked, 1, most) };
 }

@@ -2,23 +2,23 @@
 
 use taxel_core::detect::Detection;
 
-/// A detection, and when it was output.
+/// A detection, and the time of its output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutputDetection {
-    /// What was detected.
+    /// The detection.
     pub detection: Detection,
-    /// When it was output by the host's clock, ns since 1970.
+    /// Time of the output by the host's clock, ns since 1970.
     pub output_ns: i64,
-    /// The same by the board's clock, as far as the host can tell: `output_ns` minus the estimated offset; us.
+    /// Time of the output by the board's clock: `output_ns` converted with the estimated offset; us.
     pub output_us: i64,
 }
 
 impl OutputDetection {
-    /// A line of JSON with the keys of `taxel detect --json` and the time of the output, its end included.
+    /// A line of JSON with the keys of `taxel detect --json` and the time of the output, including the line end.
     ///
     /// # Errors
     ///
-    /// Where it cannot be written as JSON.
+    /// If the detection cannot be written as JSON.
     pub fn line(&self) -> std::io::Result<Vec<u8>> {
         let Self { detection, output_ns, output_us } = self;
         let mut line = serde_json::to_vec(&serde_json::json!({
@@ -35,18 +35,18 @@ impl OutputDetection {
     }
 }
 
-/// Receives detections in the thread that made them; the next one waits until it returns.
+/// Receives detections in the thread that made them; the next detection waits until the call returns.
 pub trait Sink: Send {
     /// Outputs a detection.
     ///
     /// # Errors
     ///
-    /// Where it cannot be output: then the pipeline ends.
-    fn take(&mut self, detection: &OutputDetection) -> std::io::Result<()>;
+    /// If the detection cannot be output; the pipeline then ends.
+    fn output(&mut self, detection: &OutputDetection) -> std::io::Result<()>;
 }
 
 impl<F: FnMut(&OutputDetection) -> std::io::Result<()> + Send> Sink for F {
-    fn take(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
+    fn output(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
         self(detection)
     }
 }
@@ -56,7 +56,7 @@ impl<F: FnMut(&OutputDetection) -> std::io::Result<()> + Send> Sink for F {
 pub struct Lines<W>(pub W);
 
 impl<W: std::io::Write + Send> Sink for Lines<W> {
-    fn take(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
+    fn output(&mut self, detection: &OutputDetection) -> std::io::Result<()> {
         self.0.write_all(&detection.line()?)?;
         self.0.flush()
     }

@@ -1,5 +1,5 @@
-//! What a further source of a recording is, as it is written: another board, lines of numbers from a serial line or a pipe, numbers
-//! that a program gives; and its lines, as they arrive.
+//! The specification of a further source of a recording, and its parser: another board, lines of numbers from a serial
+//! line or a pipe, or numbers that a program passes; and a reader of lines as they arrive.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -15,54 +15,51 @@ use std::time::{Duration, Instant};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
-use super::sending::serial;
+use super::sending::{BAUD, serial};
 use crate::locked::lock;
 use crate::recording::{Header, Stream, fields, now_ns};
 use crate::{Error, Result, address};
 
-/// How long the first line of a source is waited for, from which its columns are known.
+/// Timeout for the first line of a source, which defines its columns, if they are not given.
 const FIRST_LINE: Duration = Duration::from_secs(3);
 
-/// How often a line that broke is opened again, and the end checked.
+/// Interval at which a failed line is opened again, and the end is checked.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// The longest line, bytes; more is no line of numbers.
+/// Longest line, bytes; a longer one is not a line of numbers.
 const LONGEST: usize = 1 << 16;
-
-/// Of a serial line, where no speed is named.
-const BAUD: u32 = 115_200;
 
 /// A further source of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
-    /// What it is called.
+    /// Name of the source.
     pub name: String,
-    /// What it is.
+    /// Kind of the source.
     pub kind: SourceKind,
 }
 
-/// What a further source is.
+/// The kind of a further source.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SourceKind {
-    /// A board that sends to this address of ours.
+    /// A board that sends to this local address.
     Board(SocketAddr, Box<Array>, Registers),
-    /// Lines of numbers; opened already where their columns had to be read from the first one.
+    /// Lines of numbers; already open if the columns were read from the first line.
     Lines(Place, Stream, Opened),
-    /// Numbers that a program gives ([`Live::sample`](super::Live::sample)).
+    /// Numbers that a program passes ([`Live::sample`](super::Live::sample)).
     Given(Stream),
 }
 
-/// Where lines of numbers come from.
+/// The place from which lines of numbers are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// A serial line and its speed, 8 data bits, no parity, 1 stop bit.
     Serial(PathBuf, u32),
-    /// A named pipe, or any file that is read to its end and then waited at; `-` is the standard input.
+    /// A named pipe, or any file that is read to its end and then watched for more; `-` is the standard input.
     Pipe(PathBuf),
 }
 
-/// Lines that were opened to read their columns, with the bytes after the first one. The reader continues there: reopening would lose
-/// those bytes, and a pipe without a reader ends the program that writes to it.
+/// Lines that were opened to read their columns, with the bytes after the first line. The reader continues there:
+/// reopening would lose those bytes, and closing a pipe ends the program that writes to it.
 #[derive(Clone, Default)]
 pub struct Opened(Arc<Mutex<Option<LineReader>>>);
 
@@ -78,7 +75,7 @@ impl std::fmt::Debug for Opened {
     }
 }
 
-/// Lines that were read already do not make two sources different.
+/// Two sources are equal whether or not their lines were read already.
 impl PartialEq for Opened {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -95,7 +92,7 @@ impl std::fmt::Display for Place {
 }
 
 impl Source {
-    /// Its header in the recording.
+    /// The source's header in the recording.
     pub(super) fn header(&self) -> taxel_core::Result<Header> {
         match &self.kind {
             SourceKind::Board(address, array, registers) => {
@@ -112,8 +109,9 @@ impl Source {
     }
 }
 
-/// `udp:HOST:PORT`, `serial:PATH@BAUD`, `pipe:PATH` or `given`, then options after commas: `array=RxC` and `preset=NAME` of a
-/// board, `columns=A:B:C` and `time=NAME:UNIT` of numbers. Lines without `columns` are waited for, to see what they hold.
+/// Parses `udp:HOST:PORT`, `serial:PATH@BAUD`, `pipe:PATH` or `given`, followed by options after commas: `array=RxC`
+/// and `preset=NAME` for a board, `columns=A:B:C` and `time=NAME:UNIT` for numbers. Without `columns` the first line is
+/// awaited, which defines them.
 impl FromStr for SourceKind {
     type Err = Error;
 
@@ -169,7 +167,7 @@ impl FromStr for SourceKind {
     }
 }
 
-/// The array of rows x columns, at the thesis' pitch.
+/// Parses an array of rows x columns, with the thesis' pitch.
 fn array_of(text: &str, size: &str) -> Result<Array> {
     let sides = size.split_once('x').and_then(|(rows, columns)| Some((rows.parse().ok()?, columns.parse().ok()?)));
     let Some((rows, columns)) = sides else {
@@ -182,7 +180,7 @@ fn array_of(text: &str, size: &str) -> Result<Array> {
     Ok(Array::new(rows, columns, thesis.pitch_mm, size)?)
 }
 
-/// The columns that the options name, if they do.
+/// The columns that the options define, if any.
 fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<Stream>> {
     let columns = options.remove("columns").map(|names| names.split(':').map(str::to_owned).collect());
     let time = options.remove("time");
@@ -205,16 +203,17 @@ fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<St
     Ok(Some(stream))
 }
 
-/// The columns that were named, or those of the first line.
+/// The given columns, or those of the first line.
 fn named_or_read(named: Option<Stream>, place: &Place) -> Result<(Stream, Opened)> {
     named.map_or_else(|| first_line(place), |stream| Ok((stream, Opened::default())))
 }
 
-/// Opens lines and waits for the first that states the columns: a line of names, or of numbers, which are then called a, b, c ...
+/// Opens lines and waits for the first one that defines the columns: a line of names, or of numbers, whose columns are
+/// then named a, b, c and so on.
 fn first_line(place: &Place) -> Result<(Stream, Opened)> {
     let mut reader = LineReader::open(place)?;
     let until = Instant::now() + FIRST_LINE;
-    // A serial line that is opened in the middle of a line gives the rest of that line first.
+    // After opening, a serial line may start in the middle of a line: the rest of that line is skipped.
     let mut skip = matches!(place, Place::Serial(..));
     let mut numbers = None;
     while Instant::now() < until {
@@ -229,7 +228,7 @@ fn first_line(place: &Place) -> Result<(Stream, Opened)> {
             }
             if found.iter().all(|field| field.parse::<f64>().is_ok()) {
                 numbers = Some(found.len());
-                // It is data, too.
+                // The first line contains data, so it is processed again.
                 reader.bytes.splice(0..0, format!("{line}\n").into_bytes());
                 break;
             }
@@ -257,7 +256,7 @@ pub(super) struct LineReader {
     place: Place,
     file: Option<Box<dyn ReadsAsItComes>>,
     bytes: Vec<u8>,
-    /// When the last of them came, ns since 1970.
+    /// When the last bytes arrived, ns since 1970.
     pub(super) came_ns: i64,
 }
 
@@ -273,7 +272,7 @@ impl LineReader {
         matches!(self.place, Place::Serial(..))
     }
 
-    /// Waits a little for more; returns whether no more data can arrive.
+    /// Waits briefly for more bytes; returns whether no more can arrive.
     pub(super) fn fill(&mut self) -> io::Result<bool> {
         let is_input = self.place == Place::Pipe(PathBuf::from("-"));
         let Some(file) = &mut self.file else {
@@ -285,7 +284,7 @@ impl LineReader {
         }
         let mut piece = [0; 4096];
         match file.read(&mut piece) {
-            // A pipe without a writer, or the end of a file: a program may write to it again.
+            // A pipe without a writer, or the end of a file: a program may still write to it.
             Ok(0) if is_input => return Ok(true),
             Ok(0) if matches!(self.place, Place::Serial(..)) => return Err(ErrorKind::BrokenPipe.into()),
             Ok(0) => std::thread::sleep(LOOK_EVERY),
@@ -300,7 +299,7 @@ impl LineReader {
         Ok(false)
     }
 
-    /// The next whole line of what arrived; of one that is too long what there is.
+    /// The next whole line; of a line that is too long, the part that has arrived.
     pub(super) fn line(&mut self) -> Option<String> {
         let end =
             self.bytes.iter().position(|&byte| byte == b'\n').or((self.bytes.len() > LONGEST).then_some(LONGEST))?;
@@ -313,7 +312,7 @@ impl LineReader {
         Error::file(path)(error)
     }
 
-    /// Opens the line again, and discards the part of a line that had arrived.
+    /// Opens the line again, and discards an incomplete line.
     pub(super) fn again(&mut self) {
         self.bytes.clear();
         self.file = open(&self.place).ok();
@@ -328,7 +327,7 @@ fn open(place: &Place) -> Result<Box<dyn ReadsAsItComes>> {
     match place {
         Place::Serial(path, baud) => Ok(Box::new(serial(path, *baud)?)),
         Place::Pipe(path) if path == Path::new("-") => {
-            // Not through the program's own buffer: `poll` does not see what that holds.
+            // Bypasses the program's own buffer, whose content `poll` does not see.
             let input = io::stdin().as_fd().try_clone_to_owned().map_err(Error::file(path))?;
             Ok(Box::new(File::from(input)))
         }
@@ -339,7 +338,7 @@ fn open(place: &Place) -> Result<Box<dyn ReadsAsItComes>> {
     }
 }
 
-/// Waits until something can be read, or an end was reached.
+/// Waits until data can be read, or the end was reached.
 fn comes(descriptor: RawFd, most: Duration) -> bool {
     let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLIN, revents: 0 };
     let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);

@@ -1,7 +1,7 @@
-//! The further sources of a recording, at work.
+//! The running sources of a recording besides the board.
 //!
-//! Each has its own clock beside the host's arrival times, counts of its own and a thread of its own; what that cannot read in
-//! time the system buffers, or drops.
+//! Each source has its own clock, in addition to the host's arrival times, its own counts and its own thread. Data that
+//! the thread does not read in time are buffered or dropped by the system.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -20,12 +20,12 @@ use crate::locked::lock;
 use crate::recording::{self, Stream, Track, fields};
 use crate::{Error, Result};
 
-/// A stream of numbers at work.
+/// A running stream of numbers.
 pub(super) struct Numbers {
     part: Part,
-    /// Whether they are recorded from the first one on; else while a recording runs.
+    /// Whether lines are recorded from the first one on; otherwise only while a recording runs.
     always: bool,
-    track: Mutex<Kept>,
+    track: Mutex<NumbersTrack>,
     stream: Stream,
     lines: AtomicU64,
     strange: AtomicU64,
@@ -33,11 +33,11 @@ pub(super) struct Numbers {
     ends: AtomicBool,
 }
 
-/// Where numbers go.
+/// The part of a recording into which lines are written, if any.
 #[derive(Default)]
-struct Kept {
+struct NumbersTrack {
     track: Option<Track>,
-    /// Lines, and strange ones, that arrived before it.
+    /// Number of lines, and of lines that could not be parsed, before this part.
     before: (u64, u64),
 }
 
@@ -55,46 +55,47 @@ impl Numbers {
         }
     }
 
-    /// Records numbers that arrived.
+    /// Records a line of numbers.
     pub(super) fn sample(&self, arrived_ns: i64, values: &[f64]) -> Result<()> {
-        if !self.stream.takes(values) {
+        if !self.stream.fits(values) {
             let columns = self.stream.columns.join(", ");
             let (name, n) = (&self.part.name, values.len());
             return Err(problem!("source {name}: {n} values; its columns are {columns}").into());
         }
-        self.keep(|track, number| track.sample(arrived_ns, number, values))
+        self.record(|track, number| track.sample(arrived_ns, number, values))
     }
 
-    /// Counts a line, and records it while a recording runs. Each line belongs to one recording.
-    fn keep(&self, keep: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
-        let mut kept = lock(&self.track);
-        if self.always && kept.track.is_none() {
-            kept.track = Some(self.part.open()?);
+    /// Counts a line, and records it if a recording runs. Each line belongs to one recording.
+    fn record(&self, write: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
+        let mut current = lock(&self.track);
+        if self.always && current.track.is_none() {
+            current.track = Some(self.part.open()?);
         }
         let number = self.lines.fetch_add(1, Ordering::Relaxed);
-        kept.track.as_ref().map_or(Ok(()), |track| keep(track, number))
+        current.track.as_ref().map_or(Ok(()), |track| write(track, number))
     }
 
-    /// Records a line that arrived.
+    /// Records a line of text.
     fn line(&self, arrived_ns: i64, line: &str) -> Result<()> {
         match self.stream.parse(line) {
             Some(values) => self.sample(arrived_ns, &values),
-            // A line that names the columns again holds no numbers.
+            // A repeated line of column names contains no numbers.
             None if fields(line).eq(self.stream.columns.iter().map(String::as_str)) || line.trim().is_empty() => Ok(()),
-            None => self.keep(|track, number| {
+            None => self.record(|track, number| {
                 self.strange.fetch_add(1, Ordering::Relaxed);
                 track.strange_line(arrived_ns, number, line)
             }),
         }
     }
 
-    /// Records what arrives from now on into this part of a recording, or none; ends the part before with its counts, and returns
-    /// those.
-    pub(super) fn keep_in(&self, track: Option<Track>) -> SourceCounts {
-        let mut kept = lock(&self.track);
+    /// Records into this part of a recording from now on, or not at all; ends the previous part with its counts, and
+    /// returns them.
+    pub(super) fn record_into(&self, track: Option<Track>) -> SourceCounts {
+        let mut current = lock(&self.track);
         let now = (self.lines.load(Ordering::Relaxed), self.strange.load(Ordering::Relaxed));
-        let Kept { track: ended, before } = std::mem::replace(&mut *kept, Kept { track, before: now });
-        drop(kept);
+        let NumbersTrack { track: ended, before } =
+            std::mem::replace(&mut *current, NumbersTrack { track, before: now });
+        drop(current);
         let (lines, strange) = (now.0 - before.0, now.1 - before.1);
         if let Some(track) = ended {
             let decoder = BTreeMap::from([("lines_that_could_not_be_read".to_owned(), strange)]);
@@ -109,20 +110,20 @@ impl Numbers {
         SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone() }
     }
 
-    /// Takes no more lines: ends its part of the recording with its counts.
+    /// Records no more lines: ends its part of the recording with its counts.
     pub(super) fn end(&self) {
         self.ends.store(true, Ordering::Release);
-        self.keep_in(None);
+        self.record_into(None);
     }
 
-    /// Reads lines until the end, in a thread of its own; a line that breaks is opened again. `begun`: they were opened before,
-    /// and read up to the beginning of a line.
+    /// Reads lines until the end, in a separate thread; a failed line is opened again. `begun` is a reader that was
+    /// opened before and has read up to the start of a line.
     pub(super) fn read(self: &Arc<Self>, place: &Place, begun: Option<LineReader>) -> Result<JoinHandle<()>> {
         let whole = begun.is_some();
         let (numbers, mut reader) = (Arc::clone(self), begun.map_or_else(|| LineReader::open(place), Ok)?);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
-            // A serial line that is opened in the middle of a line gives the rest of that line first.
+            // After opening, a serial line may start in the middle of a line: the rest of that line is skipped.
             let mut first = !whole;
             while !numbers.ends.load(Ordering::Acquire) {
                 let ended = match reader.fill() {
@@ -137,8 +138,8 @@ impl Numbers {
                 let at_ns = reader.came_ns;
                 while let Some(line) = reader.line() {
                     let cut = std::mem::take(&mut first) && numbers.stream.parse(&line).is_none();
-                    let kept = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
-                    if let Err(error) = kept {
+                    let recorded = if cut && reader.is_serial() { Ok(()) } else { numbers.line(at_ns, &line) };
+                    if let Err(error) = recorded {
                         if !numbers.ends.load(Ordering::Acquire)
                             && let Some(host) = numbers.part.host.upgrade()
                         {
@@ -156,16 +157,16 @@ impl Numbers {
     }
 }
 
-/// The other sources of a pipeline, at work.
+/// The running other sources of a pipeline.
 pub(super) struct Others<Board> {
-    /// Other boards, each with a pipeline of its own.
+    /// Other boards, each with its own pipeline.
     pub(super) boards: Vec<(String, Board)>,
     pub(super) numbers: Vec<(String, Arc<Numbers>)>,
     pub(super) threads: Vec<JoinHandle<()>>,
 }
 
 impl<Board> Others<Board> {
-    /// Begins the sources of a pipeline; `begin` begins a board.
+    /// Starts the sources of a pipeline; `begin` starts a board.
     pub(super) fn start(
         shared: &Arc<Shared>,
         begin: impl Fn(SocketAddr, LiveOptions, Part) -> Result<Board>,
@@ -207,7 +208,7 @@ impl<Board> Others<Board> {
         }
     }
 
-    /// Ends them all, and returns their counts.
+    /// Ends all sources, and returns their counts.
     pub(super) fn stop(&mut self, end: impl Fn(Board) -> Result<Counters>) -> Result<BTreeMap<String, SourceCounts>> {
         self.end_lines();
         let mut counts = BTreeMap::new();

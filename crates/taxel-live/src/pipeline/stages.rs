@@ -1,4 +1,4 @@
-//! The stages one after the other, in the thread that has them: receive, decode, record, read out.
+//! Runs the stages in sequence, in the thread that owns them: receive, decode, record, read out.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -12,28 +12,28 @@ use taxel_core::problem;
 use super::decode::DecodeStage;
 use super::observers::Observers;
 use super::read_out::ReadOutStage;
-use super::reader::Reader;
 use super::receive::ReceiveStage;
 use super::record::RecordStage;
 use super::recorder::Recorder;
+use super::running_readout::RunningReadout;
 use super::shared::{Ended, Request, Shared};
 use crate::Result;
 use crate::capture::Batch;
 use crate::locked::lock;
 use crate::recording::now_ns;
 
-/// How long to wait for datagrams where silence means nothing.
+/// Longest wait for datagrams when the readout's time does not depend on silence.
 const IDLE: Duration = Duration::from_millis(20);
 
-/// Events are handed on when so many are there, also in the middle of a large batch.
+/// Number of events after which they are passed on, even in the middle of a large batch.
 const HAND_ON: usize = 1 << 14;
 
 /// Why [`Stages::run`] returned.
 pub(super) enum Next {
     /// Detections wait for output ([`Stages::found`]).
     Output,
-    /// The readout is to continue in a thread of its own.
-    Separate(Box<Reader>),
+    /// The readout must move to its own thread.
+    Separate(Box<RunningReadout>),
     /// No more data will arrive.
     Over,
 }
@@ -49,19 +49,19 @@ pub(super) struct Stages {
 }
 
 impl Stages {
-    pub(super) fn new(shared: &Arc<Shared>, reader: Option<Reader>) -> Self {
+    pub(super) fn new(shared: &Arc<Shared>, readout: Option<RunningReadout>) -> Self {
         Self {
             shared: Arc::clone(shared),
             receive: ReceiveStage::new(Arc::clone(shared)),
             decode: DecodeStage::new(&shared.options),
             record: RecordStage::new(Arc::clone(shared)),
-            read_out: ReadOutStage::new(reader),
+            read_out: ReadOutStage::new(readout),
             observers: Observers::new(Arc::clone(shared)),
             begun: false,
         }
     }
 
-    /// Detections that no thread has taken for output yet.
+    /// Detections that do not wait for output yet.
     pub(super) fn found(&mut self) -> &mut Vec<Detection> {
         self.read_out.found()
     }
@@ -84,8 +84,8 @@ impl Stages {
             }
         }
         loop {
-            if let Some(reader) = self.read_out.take_separated() {
-                return Ok(Next::Separate(reader));
+            if let Some(readout) = self.read_out.take_separated() {
+                return Ok(Next::Separate(readout));
             }
             if !self.found().is_empty() {
                 return Ok(Next::Output);
@@ -98,7 +98,7 @@ impl Stages {
         }
     }
 
-    /// From now on a thread of its own receives, and another one reads out: a disk may hold this one up.
+    /// Moves receiving and reading out to separate threads, because a disk may delay this one.
     fn separate(&mut self) -> Result<()> {
         self.receive.separate(self.read_out.is_on())?;
         self.read_out.separate();
@@ -154,7 +154,7 @@ impl Stages {
             self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
             self.shared.published().decode_latency.note(now - decoded.arrived_ns);
             if self.decode.events().len() >= HAND_ON {
-                // So much waits only where reading out takes longer than what arrives leaves it.
+                // A batch has this many events only if reading out is slower than they arrive.
                 self.read_out.separate();
                 self.hand_on()?;
             }
@@ -162,7 +162,7 @@ impl Stages {
         self.hand_on()
     }
 
-    /// Hands the decoded events on to the other stages.
+    /// Passes the decoded events to the other stages.
     fn hand_on(&mut self) -> Result<()> {
         self.decode.hold();
         self.observers.events(self.decode.events(), self.decode.held());
@@ -178,7 +178,7 @@ impl Stages {
         Ok(())
     }
 
-    /// No more data will arrive: hands on what waits in each stage.
+    /// Ends the input: passes on what waits in each stage.
     fn finish(&mut self) -> Result<()> {
         self.decode.finish();
         self.hand_on()?;
@@ -189,15 +189,15 @@ impl Stages {
         self.answer()
     }
 
-    /// Does what was requested since the last batch. A caller may have gone before its answer.
+    /// Handles the requests since the last batch. A caller may have stopped waiting for the reply.
     fn answer(&mut self) -> Result<()> {
         let requests = std::mem::take(&mut *lock(&self.shared.requests));
         for request in requests {
             match request {
-                Request::Record(next, give) => drop(give.send(self.switch_recording(next))),
-                Request::View(give) => self.observers.add_viewer(&give, self.decode.held()),
-                Request::Copy(give) => self.observers.add_copier(&give),
-                Request::Zero(taxels, give) => drop(give.send(self.zero(&taxels))),
+                Request::Record(next, answer) => drop(answer.send(self.switch_recording(next))),
+                Request::View(answer) => self.observers.add_viewer(&answer, self.decode.held()),
+                Request::Copy(answer) => self.observers.add_copier(&answer),
+                Request::Zero(taxels, answer) => drop(answer.send(self.zero(&taxels))),
                 Request::Registers(registers) => {
                     self.decode.set_frame_us(registers.frame_us());
                     self.expect_version(registers.wire_version)?;
@@ -216,7 +216,7 @@ impl Stages {
         self.record.switch(next, self.decode.held())
     }
 
-    /// The board was set to this version of the wire.
+    /// Notes that the board was set to this version of the wire.
     fn expect_version(&mut self, version: u8) -> Result<()> {
         if self.decode.expect(version) {
             self.record.asked_for_version(version, self.decode.latest())?;
@@ -224,7 +224,7 @@ impl Stages {
         Ok(())
     }
 
-    /// Takes the values that these taxels hold for their rest from now on: where one cannot be zeroed none is.
+    /// Makes the values that these taxels hold their rest from now on: where one cannot be zeroed none is.
     fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let array = &self.shared.options.array;
         let published = self.shared.published();
@@ -250,7 +250,7 @@ impl Stages {
             zeroings.push(zeroing);
         }
         drop(published);
-        // Recorded first: no taxel is zeroed of which the recording does not know.
+        // Recorded first, so that every zeroing is in the recording.
         self.record.zeroings(&zeroings)?;
         let mut published = self.shared.published();
         published.zeroed.extend(zeroings.iter().map(|one| (array.index(one.x, one.y), *one)));

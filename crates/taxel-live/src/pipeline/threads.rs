@@ -4,19 +4,19 @@
 //! again afterwards; where a callback takes longer than [`TAKE_OVER`], the other thread acquires them and continues to receive:
 //! what arrives in the meantime waits in the kernel's buffer.
 //!
-//! A disk may delay a recording, and a readout may be slower than the events arrive: then one thread receives (or reads what a
-//! third one received), decodes and records, and the other reads out from then on.
+//! A disk may delay a recording, and a readout may be slower than the events arrive. In these cases one thread receives
+//! (or reads what a third one received), decodes and records, and the other reads out from then on.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::output::DetectionOutput;
-use super::reader::Reader;
+use super::running_readout::RunningReadout;
 use super::shared::Shared;
 use super::stages::{Next, Stages};
 use crate::locked::lock;
 
-/// How often the follower checks whether the stages were released: a callback may delay receiving by this.
+/// Interval at which the follower checks whether the stages were released: a callback may delay receiving by this time.
 const TAKE_OVER: Duration = Duration::from_millis(2);
 
 /// The stages and the output, which one thread at a time owns.
@@ -27,34 +27,34 @@ pub(super) struct Threads {
 }
 
 struct Turn {
-    /// `None` while a thread, the leader, owns them.
+    /// `None` while a thread, the leader, owns the stages.
     stages: Option<Box<Stages>>,
-    /// A readout that is to continue in a thread of its own.
-    reader: Option<Reader>,
+    /// A readout that must move to its own thread.
+    readout: Option<RunningReadout>,
     over: bool,
-    /// Threads that have not ended.
+    /// Number of threads that have not ended.
     left: usize,
 }
 
 impl Threads {
     pub(super) fn new(stages: Stages, output: DetectionOutput, threads: usize) -> Self {
-        let turn = Turn { stages: Some(Box::new(stages)), reader: None, over: false, left: threads };
+        let turn = Turn { stages: Some(Box::new(stages)), readout: None, over: false, left: threads };
         Self { turn: Mutex::new(turn), changed: Condvar::new(), output }
     }
 
-    /// What each thread does, until the end.
+    /// The loop of each thread, until the end.
     pub(super) fn run(&self, shared: &Arc<Shared>) {
         let _leaving = Leaving { threads: self, shared };
         loop {
-            let nothing = |turn: &mut Turn| turn.stages.is_none() && turn.reader.is_none() && !turn.over;
+            let nothing = |turn: &mut Turn| turn.stages.is_none() && turn.readout.is_none() && !turn.over;
             let waited = self.changed.wait_timeout_while(lock(&self.turn), TAKE_OVER, nothing);
             let (mut turn, waited) = waited.unwrap_or_else(PoisonError::into_inner);
             if waited.timed_out() {
                 continue;
             }
-            if let Some(reader) = turn.reader.take() {
+            if let Some(readout) = turn.readout.take() {
                 drop(turn);
-                reader.run(shared, &self.output);
+                readout.run(shared, &self.output);
                 return;
             }
             let Some(stages) = turn.stages.take() else { return };
@@ -70,10 +70,10 @@ impl Threads {
             let alone = self.output.add(shared, stages.found());
             match next {
                 Next::Output if !alone => continue,
-                // The follower is not woken for it: the callback would wait for that.
+                // The follower is not woken for this, because the callback would have to wait for the wake-up.
                 Next::Output => lock(&self.turn).stages = Some(stages),
-                Next::Separate(reader) => {
-                    lock(&self.turn).reader = Some(*reader);
+                Next::Separate(readout) => {
+                    lock(&self.turn).readout = Some(*readout);
                     self.changed.notify_one();
                     continue;
                 }
@@ -88,7 +88,7 @@ impl Threads {
     }
 }
 
-/// Ends the wait of the other thread, however this one ends.
+/// Ends the other thread's wait when this one ends, in whichever way.
 struct Leaving<'a> {
     threads: &'a Threads,
     shared: &'a Shared,

@@ -1,7 +1,7 @@
 //! Copies of the events for viewers: in pieces, twice as often as pictures while a viewer is connected.
 //!
-//! The decoding thread fills a piece of bounded size and hands it over where there is room; it never waits. What finds no
-//! room is counted, and the next piece begins with the held values, so that a picture is right again within 0.1 s.
+//! The decoding thread fills a piece of bounded size and queues it if there is room; it never waits. Events that do not
+//! fit are counted, and the next piece begins with the taxels' values, so that a picture is correct again within 0.1 s.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -11,58 +11,59 @@ use std::sync::Arc;
 use taxel_core::held::{Held, UNKNOWN};
 use taxel_core::{Array, Events, Marker};
 
-/// From piece to piece while a viewer is connected ...
+/// Interval between pieces while a viewer is connected.
 const WATCHED: Duration = Duration::from_millis(8);
-/// ... and while none is: a viewer that looks back begins where a piece does.
+/// Interval between pieces while no viewer is connected; a later look at the past can begin at the start of a piece
+/// only.
 const UNWATCHED: Duration = Duration::from_millis(100);
 
-/// How often a piece begins with the held values.
+/// Interval at which a piece begins with the taxels' values.
 const HELD_EVERY: Duration = Duration::from_millis(100);
 
-/// Changes that a piece holds at most: 4 MiB.
+/// Largest number of changes in a piece: 4 MiB.
 const MOST: usize = 1 << 18;
 
-/// Markers that a piece holds at most.
+/// Largest number of markers in a piece.
 const MARKERS: usize = 1 << 10;
 
-/// Pieces that wait at most.
+/// Capacity of the queue of pieces.
 const WAITING: usize = 16;
 
 /// A change at a taxel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Change {
-    /// us.
+    /// Time, us.
     pub t: i64,
-    /// Its index.
+    /// Index of the taxel.
     pub taxel: u32,
-    /// The value that arrived with it, ticks; [`UNKNOWN`] where none did.
+    /// The value that arrived with the change, ticks; [`UNKNOWN`] if there was none.
     pub ticks: u16,
-    /// More pressure.
+    /// Whether the pressure rose.
     pub up: bool,
-    /// Whether it comes from a state of version 2, not from an event.
+    /// Whether the change was decoded from a state of version 2, not from an event.
     pub repaired: bool,
 }
 
-/// Changes in the order in which they came.
+/// Changes in order of arrival.
 #[derive(Debug, Clone, Default)]
 pub struct Piece {
     /// The changes.
     pub changes: Vec<Change>,
-    /// The values that the taxels held before the first of them, in some pieces.
+    /// The taxels' values before the first change, in some pieces.
     pub held: Option<Vec<u16>>,
-    /// The board's time before the first of them; `None` before anything came.
+    /// The board's time before the first change; `None` before the first event.
     pub since: Option<i64>,
-    /// Events that arrived before them, those included that are missing.
+    /// Number of events before these changes, including the missing ones.
     pub before: u64,
-    /// Events that are missing between the last piece and this one.
+    /// Number of events that are missing between the last piece and this one.
     pub missing: u64,
-    /// Whether the board was reset before it: what was held before holds no more.
+    /// Whether the board was reset before the piece: earlier values are void.
     pub reset: bool,
-    /// Starts and stops of the board.
+    /// Start and stop markers of the board.
     pub markers: Vec<Marker>,
 }
 
-/// The receiving end.
+/// The receiving end of the queue.
 #[derive(Debug)]
 pub struct ViewerEvents {
     pieces: Receiver<Piece>,
@@ -70,19 +71,20 @@ pub struct ViewerEvents {
 }
 
 impl ViewerEvents {
-    /// The next piece, where one waits.
+    /// The next piece, if one waits.
     #[must_use]
     pub fn next(&self) -> Option<Piece> {
         self.pieces.try_recv().ok()
     }
 
-    /// Sets whether a viewer is connected: then pieces come often enough for sixty pictures a second, else ten times.
+    /// Sets whether a viewer is connected: pieces are then frequent enough for sixty pictures a second, otherwise for
+    /// ten.
     pub fn set_watched(&self, watched: bool) {
         self.watched.store(watched, Ordering::Relaxed);
     }
 }
 
-/// The decoding thread's end.
+/// The decoding thread's end of the queue.
 #[derive(Debug)]
 pub(super) struct ViewerQueue {
     pieces: Sender<Piece>,
@@ -90,13 +92,13 @@ pub(super) struct ViewerQueue {
     piece: Piece,
     latest: Option<i64>,
     events: u64,
-    /// When a piece last began with the held values.
+    /// When a piece last began with the taxels' values.
     held_at: Instant,
     sent: Instant,
     columns: usize,
 }
 
-/// A queue for an array whose taxels hold these values, and its receiving end.
+/// A queue for an array whose taxels have these values, and its receiving end.
 pub(super) fn viewer_queue(
     array: &Array,
     held: &Held,
@@ -121,7 +123,7 @@ pub(super) fn viewer_queue(
 }
 
 impl ViewerQueue {
-    /// Takes the next events, whose values are among those that the taxels hold.
+    /// Copies the next events, whose values are among those that the taxels hold.
     pub(super) fn push(&mut self, events: &Events, held: &Held) {
         let room = MOST - self.piece.changes.len().min(MOST);
         let copied = events.len().min(room);
@@ -133,7 +135,7 @@ impl ViewerQueue {
             };
             self.latest = self.latest.max(Some(events.t[k]));
             if k < copied {
-                // An array has 65 536 positions at most where it is live; files have 2^22.
+                // A live array has at most 65 536 positions; files have up to 2^22.
                 #[allow(clippy::cast_possible_truncation)]
                 let taxel = taxel as u32;
                 self.piece.changes.push(Change {
@@ -149,7 +151,7 @@ impl ViewerQueue {
         let room = MARKERS.saturating_sub(self.piece.markers.len());
         self.piece.markers.extend(events.markers.iter().take(room));
         if copied < events.len() {
-            // Too much waits: it is dropped, and the next piece restarts with the held values.
+            // The piece is full: it is dropped, and the next one restarts with the taxels' values.
             let missing = self.piece.missing + (self.piece.changes.len() + events.len() - copied) as u64;
             let reset = self.piece.reset;
             self.begin(Some(held));
@@ -157,7 +159,7 @@ impl ViewerQueue {
         }
     }
 
-    /// Hands over what waits, where it is time; false where the receiving end is gone.
+    /// Queues the current piece if it is due; returns false if the receiving end was dropped.
     pub(super) fn tick(&mut self, held: &Held) -> bool {
         let every = if self.watched.load(Ordering::Relaxed) { WATCHED } else { UNWATCHED };
         let nothing = self.piece.changes.is_empty() && self.piece.held.is_none() && self.piece.markers.is_empty();
@@ -178,7 +180,7 @@ impl ViewerQueue {
         }
     }
 
-    /// The board was reset: its taxels hold no value until their next event.
+    /// Handles a reset of the board: the taxels' values are unknown until their next event.
     pub(super) fn reset(&mut self, held: &Held) {
         let waits = std::mem::take(&mut self.piece);
         let (missing, markers) = match self.pieces.try_send(waits) {
@@ -189,7 +191,7 @@ impl ViewerQueue {
         self.piece = Piece { missing, markers, reset: true, ..std::mem::take(&mut self.piece) };
     }
 
-    /// Begins a piece, with these held values where there are any.
+    /// Starts a piece, with these values if given.
     fn begin(&mut self, held: Option<&Held>) {
         if held.is_some() {
             self.held_at = Instant::now();

@@ -1,6 +1,6 @@
-//! Base64 with padding (RFC 4648, section 4), as JSON schemas want bytes.
+//! Base64 with padding (RFC 4648, section 4), as JSON schemas require for bytes.
 
-/// The text of bytes.
+/// Encodes bytes.
 pub(super) fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
@@ -14,7 +14,7 @@ pub(super) fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// Bytes of base64 with padding; `None` where it is none.
+/// Decodes base64 with padding; `None` if the text is not base64.
 pub(super) fn unbase64(text: &str) -> Option<Vec<u8>> {
     let digit = |c: u8| match c {
         b'A'..=b'Z' => Some(c - b'A'),

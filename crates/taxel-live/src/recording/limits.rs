@@ -1,34 +1,37 @@
-//! What a recording of the live format may hold at most: asked before memory is asked for, named in the error or the
-//! verdict, documented in docs/files.md. A file comes from strangers or from a damaged disk, and a few bytes can claim 2^64.
+//! Limits of a recording in the live format. They are checked before memory is allocated, named in the error or the
+//! verdict, and documented in docs/files.md. A file may come from an untrusted source or a damaged disk, and a few
+//! bytes can claim a size of 2^64.
 
-/// What one chunk may unpack to: 64 MiB. Ours are of 1 MiB, other tools' of 1 to 8.
+/// Largest unpacked size of a chunk, bytes: 64 MiB. Our chunks have 1 MiB, those of other tools 1 to 8.
 pub(super) const CHUNK: u32 = 1 << 26;
 
-/// Of a metadata record.
+/// Largest metadata record, bytes.
 pub(super) const METADATA: u64 = 1 << 24;
 
-/// Sources of a file.
+/// Largest number of sources in a file.
 pub(super) const SOURCES: usize = 64;
 
-/// Columns of a stream of numbers.
+/// Largest number of columns in a stream of numbers.
 pub(super) const COLUMNS: usize = 1024;
 
-/// Taxels of a sensor: 2048 x 2048.
+/// Largest number of taxels in a sensor: 2048 x 2048.
 pub(super) const TAXELS: usize = 1 << 22;
 
-/// How far from 0 a converted file's time may begin, us: 142 years, so that ns in 64 bits hold it too.
+/// Largest distance from 0 at which a converted file's time may begin, us: 142 years, so that ns fit in 64 bits too.
 pub(super) const TIME_US: i64 = 1 << 52;
 
-/// What all chunks of a file of `length` bytes may unpack to together.
+/// Largest unpacked size of all chunks of a file of `length` bytes together.
 ///
-/// Pictures of a board at rest pack by a few hundred; a thousand is a trap.
+/// Pictures of a board at rest compress by a factor of a few hundred; a factor of a thousand indicates a decompression
+/// bomb.
 pub(super) fn unpacked(length: u64) -> u64 {
     length.saturating_mul(1000).saturating_add(1 << 28)
 }
 
-/// What its datagrams may hold, which become events in memory.
+/// Largest total size of the datagrams in a file of `length` bytes, because they become events in memory.
 ///
-/// Each has 47 bytes beside it that are not packed, so that no sound file comes near a hundred times its own length.
+/// Each datagram has 47 bytes of overhead that are not compressed, so a valid file's datagrams stay far below a hundred
+/// times its length.
 pub(super) fn datagrams(length: u64) -> u64 {
     length.saturating_mul(100).saturating_add(1 << 26)
 }

@@ -1,5 +1,5 @@
-//! The manual's raw recordings (Appendix 1, section 3): `NAME.lsa` holds all bytes as they arrived and nothing else, an empty
-//! `NAME.lss` marks it as complete. The manual's program overwrites without a warning; this one refuses.
+//! The manual's raw recordings (Appendix 1, section 3): `NAME.lsa` contains all bytes as they arrived and nothing else,
+//! an empty `NAME.lss` marks it as complete. The manual's program overwrites files without a warning; this one refuses.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -11,14 +11,14 @@ use taxel_core::{Array, Events, Stop};
 use super::OutputFile;
 use crate::{Error, Result};
 
-/// A `.lsa` being written. Its `.lss` appears with [`LsaWriter::finish`], and only then.
+/// Writes a `.lsa`. Its `.lss` is created by [`LsaWriter::finish`] only.
 #[derive(Debug)]
 pub struct LsaWriter {
     out: BufWriter<RawFile>,
     bytes: u64,
 }
 
-/// The file, to be written through a buffer.
+/// The file, written through a buffer.
 #[derive(Debug)]
 struct RawFile(OutputFile);
 
@@ -37,12 +37,12 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// As [`OutputFile::open`]; `File` where its `.lss` exists (and `overwrite` is not set).
+    /// As [`OutputFile::open`]; `File` if its `.lss` exists (and `overwrite` is not set).
     pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
         Self::begin(Self::reserve(path, overwrite)?)
     }
 
-    /// Opens the file without changing it.
+    /// Opens and locks the file without changing it.
     ///
     /// # Errors
     ///
@@ -55,11 +55,11 @@ impl LsaWriter {
         OutputFile::open(path, overwrite)
     }
 
-    /// Begins a file that is reserved.
+    /// Starts to write a reserved file.
     ///
     /// # Errors
     ///
-    /// `File` where it, or an earlier `.lss`, cannot be replaced.
+    /// `File` if the file, or an earlier `.lss`, cannot be replaced.
     pub(crate) fn begin(file: OutputFile) -> Result<Self> {
         file.begin()?;
         let done = done(file.path());
@@ -74,32 +74,33 @@ impl LsaWriter {
         self.out.get_ref().0.path()
     }
 
-    /// Adds the next bytes.
+    /// Appends the next bytes.
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone.
+    /// `File` if the disk is full or not available.
     pub fn bytes(&mut self, bytes: &[u8]) -> Result<()> {
         self.bytes += bytes.len() as u64;
         let outcome = self.out.write_all(bytes);
         outcome.map_err(|error| Error::file(self.path())(error))
     }
 
-    /// Hands over to the operating system what still waits in memory; call it each 100 ms or so.
+    /// Passes buffered bytes to the operating system; to be called about every 100 ms.
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone.
+    /// `File` if the disk is full or not available.
     pub fn flush(&mut self) -> Result<()> {
         let outcome = self.out.flush();
         outcome.map_err(|error| Error::file(self.path())(error))
     }
 
-    /// Ends a recording that is not complete: all bytes are on the disk, without an `.lss`.
+    /// Ends a recording that is incomplete: all bytes are on the disk, without an `.lss`.
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone, or the file was removed, renamed or replaced while it was written.
+    /// `File` if the disk is full or not available, or if the file was removed, renamed or replaced while it was
+    /// written.
     pub fn end(&mut self) -> Result<()> {
         self.flush()?;
         let file = &self.out.get_ref().0;
@@ -107,46 +108,46 @@ impl LsaWriter {
         file.check(|| format!("{} bytes", self.bytes))
     }
 
-    /// Marks the recording as complete: all bytes are on the disk, then the empty `.lss` appears.
+    /// Marks the recording as complete: syncs all bytes to the disk, then creates the empty `.lss`.
     ///
     /// # Errors
     ///
-    /// As [`LsaWriter::end`]; there is no `.lss` then.
+    /// As [`LsaWriter::end`]; no `.lss` is created then.
     pub fn finish(mut self) -> Result<()> {
         self.end()?;
         let done = done(self.path());
         File::create(&done).map(drop).map_err(Error::file(&done))
     }
 
-    /// Ends a recording that holds nothing: a new file is removed.
+    /// Ends an empty recording: removes a new file.
     ///
     /// # Errors
     ///
-    /// `File` where the file cannot be removed.
+    /// `File` if the file cannot be removed.
     pub(crate) fn discard(self) -> Result<()> {
         let (file, _) = self.out.into_parts();
         file.0.discard()
     }
 }
 
-/// A `.lsa`, read and decoded.
+/// A `.lsa` that was read and decoded.
 #[derive(Debug, Clone)]
 pub struct DecodedLsa {
-    /// As they came.
+    /// The bytes of the file.
     pub bytes: Vec<u8>,
-    /// What changed, when.
+    /// The decoded events.
     pub events: Events,
-    /// What the decoder saw and dropped.
+    /// Counts of the decoder.
     pub counts: wire::Counts,
     /// Whether its `.lss` marks it as complete.
     pub complete: bool,
 }
 
-/// Reads a `.lsa` and decodes it.
+/// Reads and decodes a `.lsa`.
 ///
 /// # Errors
 ///
-/// `File` where it cannot be read; `Core` (format) where it holds datagrams of version 2; `Core(Interrupted)` where asked to
+/// `File` if it cannot be read; `Core` (format) if it contains datagrams of version 2; `Core(Interrupted)` if asked to
 /// stop.
 pub fn decode_lsa(
     path: &Path,
@@ -155,7 +156,7 @@ pub fn decode_lsa(
     differences: bool,
     stop: Stop<'_>,
 ) -> Result<DecodedLsa> {
-    /// Bytes between two looks at `stop`.
+    /// Bytes between two checks of `stop`.
     const PIECE: usize = 1 << 22;
     let bytes = std::fs::read(path).map_err(Error::file(path))?;
     if wire::v2::begins(&bytes) {
@@ -173,7 +174,7 @@ pub fn decode_lsa(
     Ok(DecodedLsa { bytes, events, counts: *decoder.counts(), complete: done(path).exists() })
 }
 
-/// The name of a recording in automatic mode: the index appended to the name, before the extension.
+/// The name of a recording in automatic mode: an index is appended to the name, before the extension.
 #[must_use]
 pub fn numbered(path: &Path, index: u32) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
@@ -185,7 +186,7 @@ pub fn numbered(path: &Path, index: u32) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// Where the `.lss` of a `.lsa` stands.
+/// The path of the `.lss` of a `.lsa`.
 fn done(path: &Path) -> PathBuf {
     path.with_extension("lss")
 }

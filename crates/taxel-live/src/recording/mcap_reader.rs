@@ -1,8 +1,8 @@
 //! Reads the live format, finished or not, whole or damaged.
 //!
-//! The index is rebuilt each time by walking from record to record (a few bytes each, milliseconds a gigabyte), so an
-//! unfinished file needs nothing special: the official readers start from a summary at the end that it does not have.
-//! Where a record makes no sense the walk goes on at the next chunk that does; what lies between is counted.
+//! The index is rebuilt at each opening by walking from record to record (a few bytes each, milliseconds per gigabyte),
+//! so an unfinished file needs no special case: the official readers depend on a summary at the end, which it lacks. At
+//! an invalid record the walk continues at the next valid chunk; the bytes between are counted.
 
 mod blocks;
 mod condition;
@@ -29,19 +29,19 @@ pub use message::Message;
 pub use remarks::{Remarks, begin_with};
 use walk::Walk;
 
-/// A recording of the live format, opened.
+/// An open recording in the live format.
 #[derive(Debug, Clone)]
 pub struct Reader {
     blocks: Arc<Blocks>,
     header: Arc<Header>,
-    /// Which of the file's sources this reads.
+    /// Index of the source that this reader reads.
     source: usize,
     ending: Option<Ending>,
     ends: Arc<BTreeMap<String, Counts>>,
     rebuilt: Rebuilt,
 }
 
-/// What reading some blocks leaves for the next: the file's own channels, where numbers have arrived to.
+/// State between blocks: the file's channels, and the last arrival number.
 #[derive(Debug, Clone, Default)]
 pub struct Place {
     topics: BTreeMap<u16, Option<Topic>>,
@@ -51,44 +51,44 @@ pub struct Place {
 }
 
 impl Place {
-    /// The same place without the memory that reading uses again.
+    /// The same state without the reusable buffer.
     #[must_use]
-    pub fn kept(&self) -> Self {
+    pub fn without_memory(&self) -> Self {
         Self { bytes: vec![], topics: self.topics.clone(), ..*self }
     }
 }
 
-/// A recording's datagrams as they arrived, one after the other.
+/// A recording's datagrams as they arrived, stored one after the other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Datagrams {
-    /// When each came, ns since 1970.
+    /// Arrival time of each datagram, ns since 1970.
     pub arrived_ns: Vec<i64>,
-    /// Our arrival number of each.
+    /// Arrival number of each datagram.
     pub number: Vec<u64>,
-    /// Where each begins, and at last where all end.
+    /// Where each datagram begins, and where the last one ends.
     pub offsets: Vec<i64>,
-    /// Their bytes.
+    /// The bytes of all datagrams.
     pub bytes: Vec<u8>,
 }
 
-/// A recording's datagrams as events, with what belongs to each datagram.
+/// The events decoded from a recording, and the properties of each of its datagrams.
 #[derive(Debug, Clone)]
 pub struct Decoded {
-    /// What changed, when.
+    /// The decoded events.
     pub events: Events,
-    /// What the decoder saw and dropped.
+    /// Counts of the decoder of version 1.
     pub counts: wire::Counts,
-    /// What arrived and what was missing of version 2.
+    /// Counts of the decoder of version 2.
     pub version_2: wire::v2::Counts,
-    /// When each datagram came, ns since 1970.
+    /// Arrival time of each datagram, ns since 1970.
     pub arrived_ns: Vec<i64>,
-    /// Our arrival number of each.
+    /// Arrival number of each datagram.
     pub number: Vec<u64>,
-    /// The first event of each; with pairing by taxel all events come at the end.
+    /// Index of the first event of each datagram; with pairing by taxel all events are decoded after the last datagram.
     pub first: Vec<u64>,
-    /// When each could leave the board at the earliest, us; `i64::MIN` where that is not known.
+    /// Earliest time at which each datagram could leave the board, us; `i64::MIN` if it is not known.
     pub left: Vec<i64>,
-    /// Chunks that could not be used.
+    /// Number of chunks that could not be used.
     pub bad_chunks: u64,
 }
 
@@ -108,7 +108,7 @@ impl Decoded {
     }
 }
 
-/// Marks events as repaired by their numbers; a number that is none of an event is left out.
+/// Marks the events with these indices as repaired; indices beyond the events are ignored.
 fn mark_repaired(events: &mut Events, numbers: &[u64]) {
     if numbers.is_empty() || events.is_empty() {
         return;
@@ -123,11 +123,11 @@ fn mark_repaired(events: &mut Events, numbers: &[u64]) {
 }
 
 impl Reader {
-    /// Opens a file and rebuilds its index; a file that is still being written is read up to now.
+    /// Opens a file and rebuilds its index; of a file that is still being written, the part written so far is read.
     ///
     /// # Errors
     ///
-    /// `File` where it cannot be read; `Core` (format) where it is no MCAP file, or not one of ours.
+    /// `File` if it cannot be read; `Core` (format) if it is not an MCAP file, or not one of ours.
     pub fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(Error::file(path))?;
         let length = file.metadata().map_err(Error::file(path))?.len();
@@ -136,7 +136,7 @@ impl Reader {
         walk.records()?;
         let Walk { begin, end, ending, ends, blocks, rebuilt, .. } = walk;
         let blocks = Blocks { path: path.to_owned(), file, length, places: blocks };
-        // The copy beside the datagrams' channel has a checksum, the others have not.
+        // The copy of the header in the chunk of the datagrams' channel has a checksum; the other copies have none.
         let Some(header) = blocks.header()?.or(end).or(begin) else {
             return Err(Error::format(
                 path,
@@ -148,16 +148,16 @@ impl Reader {
         Ok(Self { blocks, header, source: 0, ending, ends, rebuilt })
     }
 
-    /// The names of the sources; the first is the one that this reads at first.
+    /// The names of the sources; the reader starts with the first.
     pub fn sources(&self) -> impl Iterator<Item = &str> {
         std::iter::once(&*self.header).chain(&self.header.sources).map(|source| source.name.as_str())
     }
 
-    /// The same recording as one of its sources has it.
+    /// A reader of another source of the same file.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where there is none of that name.
+    /// `Core(Problem)` if there is no source of that name.
     pub fn of_source(&self, name: &str) -> Result<Self> {
         let Some(source) = self.sources().position(|known| known == name) else {
             let known: Vec<&str> = self.sources().collect();
@@ -179,23 +179,23 @@ impl Reader {
         if self.source == 0 { &self.header } else { &self.header.sources[self.source - 1] }
     }
 
-    /// How it ended, where it states that.
+    /// How the recording ended, if the file states it.
     #[must_use]
     pub fn ending(&self) -> Option<&Ending> {
         self.ending.as_ref()
     }
 
-    /// Damage found when it was opened; damage inside a chunk is found when that is read.
+    /// Damage found at opening; damage inside a chunk is found when the chunk is read.
     #[must_use]
     pub fn rebuilt(&self) -> Rebuilt {
         self.rebuilt
     }
 
-    /// Hands out all messages in the order of the file; a bad chunk is skipped. Gives how many were.
+    /// Passes all messages to `take` in the order of the file; skips bad chunks, and returns their number.
     ///
     /// # Errors
     ///
-    /// `File` where the file cannot be read, `Core` where `take` returns that or the caller stops.
+    /// `File` if the file cannot be read, `Core` if `take` returns it or the caller stops.
     pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<u64> {
         let (mut place, mut bad) = (Place::default(), 0);
         for block in 0..self.blocks() {
@@ -205,14 +205,14 @@ impl Reader {
         Ok(bad)
     }
 
-    /// How many blocks (chunks) there are.
+    /// Number of blocks (chunks).
     #[must_use]
     pub fn blocks(&self) -> usize {
         self.blocks.places.len()
     }
 
-    /// Hands out the messages of one block; `place` is what reading the blocks before it, or some of them, left. Gives
-    /// whether the block is sound.
+    /// Passes the messages of one block to `take`; `place` is the state after earlier blocks, all or some of them.
+    /// Returns whether the block is valid.
     ///
     /// # Errors
     ///
@@ -262,7 +262,7 @@ impl Reader {
         wrong.map_or(Ok(sound), Err)
     }
 
-    /// Collects everything but the datagrams' bytes and the pictures. Gives how many chunks are bad, too.
+    /// Collects everything except the datagrams' bytes and the pictures; also returns the number of bad chunks.
     ///
     /// # Errors
     ///
@@ -270,7 +270,7 @@ impl Reader {
     pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, u64)> {
         let mut all = Remarks::default();
         let bad = self.messages(stop, |message| {
-            all.take(&message);
+            all.add(&message);
             Ok(())
         })?;
         Ok((all, bad))
@@ -299,7 +299,7 @@ impl Reader {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the source is a board; else as [`Reader::messages`].
+    /// `Core(Problem)` if the source is a board; otherwise as [`Reader::messages`].
     pub fn samples(&self, stop: Stop<'_>) -> Result<Samples> {
         let Some(stream) = &self.header().stream else {
             return Err(problem!("source {}: a board has no samples", self.header().name).into());
@@ -307,7 +307,7 @@ impl Reader {
         let mut sampling = Sampling::new(stream);
         self.messages(stop, |message| {
             if message.topic == Topic::Samples {
-                sampling.take(message.at_ns, message.number, message.data);
+                sampling.push(message.at_ns, message.number, message.data);
             }
             Ok(())
         })?;
@@ -323,7 +323,7 @@ impl Reader {
         let header = self.header();
         let array = header.array.clone();
         let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.difference);
-        let mut sender = wire::Receiver::new(decoder, 1);
+        let mut sender = wire::SenderDecoder::new(decoder, 1);
         let mut decoded = Decoded::empty(Events::empty(array));
         #[allow(clippy::cast_possible_truncation)]
         let frame_us = header.registers.map_or(0, |registers| registers.frame_us() as i64);
@@ -342,7 +342,7 @@ impl Reader {
             if message.topic == Topic::Held {
                 begin_with(&mut sender, message.data);
             }
-            // Commands of the host to the board do not show in its datagrams.
+            // The datagrams do not show commands from the host to the board.
             if message.topic == Topic::Board
                 && let Ok(BoardChange { change: Change::Wire { version, asked: true }, .. }) =
                     serde_json::from_slice(message.data)
@@ -362,7 +362,7 @@ impl Reader {
     }
 }
 
-/// The number with these low 32 bits that is nearest to the last one.
+/// The number with these low 32 bits that is closest to the last one.
 fn unwrap(last: u64, low: u32) -> u64 {
     #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
     let step = i64::from(low.wrapping_sub(last as u32) as i32);

@@ -1,7 +1,8 @@
-//! Writes the live format: what each source of a recording gives, from any thread, without waiting for the disk.
+//! Writes the live format: accepts the data of each source of a recording, from any thread, without waiting for the
+//! disk.
 //!
-//! A [`Writer`] turns what it is given into messages and adds them to a queue in memory ([`write_queue`]); a thread packs them
-//! into chunks ([`chunk_writer`]) and writes those to the file ([`record_file`]).
+//! A [`Writer`] encodes data as messages and adds them to a queue in memory ([`write_queue`]); a thread packs them into
+//! chunks ([`chunk_writer`]) and writes the chunks to the file ([`record_file`]).
 
 mod chunk_writer;
 mod queue;
@@ -18,40 +19,42 @@ use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::base64::base64;
-use super::picture::Pictures;
+use super::grey_picture::GreyScale;
 use super::{BoardChange, Compression, Counts, Header, OutputFile, Stream, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
 use write_queue::{Plan, WriteQueue};
 
-/// How much may wait in memory when the disk stalls; then callers wait too (0.6 s of the sensor's worst case).
+/// Capacity of the queue while the disk stalls, bytes; callers wait while it is full (0.6 s of the sensor's worst
+/// case).
 const QUEUE_BYTES: usize = 64 << 20;
 
-/// How much may wait of a caller who gives all at once: memory that stays in the caches, and is not allocated anew.
+/// Capacity of the queue for a caller who passes everything at once, bytes: small enough to stay in the caches, and
+/// allocated only once.
 const BULK_BYTES: usize = 4 << 20;
 
 /// The largest datagram that UDP can carry.
 const DATAGRAM_BYTES: usize = 65_507;
 
-/// A recording being written; one may be fed from several threads.
+/// A recording that is being written; several threads may share it.
 ///
-/// Dropped without [`Writer::finish`], it writes everything that was given, and its file states that it was not finished; one that
-/// has not begun its file leaves it as it was.
+/// Dropped without [`Writer::finish`], it writes everything that it accepted, and the file states that it was not
+/// finished. If the file was not begun yet, an existing file is left unchanged.
 pub struct Writer {
     /// The first source.
     track: Track,
     header: Header,
 }
 
-/// One source's part of a recording being written; fed from any thread. A [`Writer`] is the first one's.
+/// Writes one source of a recording; any thread may use it. A [`Writer`] is also the first source's.
 pub struct Track {
     queue: Arc<WriteQueue>,
-    /// Which of the file's sources.
+    /// Index of the source in the file.
     source: usize,
     stream: Option<Stream>,
-    /// Columns of the array.
+    /// Number of columns of the array.
     columns: usize,
-    pictures: Mutex<Pictures>,
+    grey_scale: Mutex<GreyScale>,
 }
 
 impl std::ops::Deref for Writer {
@@ -63,11 +66,11 @@ impl std::ops::Deref for Writer {
 }
 
 impl Writer {
-    /// Begins a recording of the header's source and of those that it names; the file is readable from now on.
+    /// Creates a recording with the header's source and the sources that it names; the file is readable from now on.
     ///
     /// # Errors
     ///
-    /// As [`OutputFile::open`]; `File` where the file cannot be written; `Core(Problem)` for sources that make no sense.
+    /// As [`OutputFile::open`]; `File` if the file cannot be written; `Core(Problem)` if a source is not valid.
     pub fn create(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
         header.check()?;
         let writer = Self::plan(OutputFile::open(path, options.overwrite)?, header, options.compression, false);
@@ -75,8 +78,8 @@ impl Writer {
         Ok(writer)
     }
 
-    /// As [`Writer::create`], of a header that was checked and a file that is reserved: it is changed with the first datagram or
-    /// sample; or, where it waits `for_clock`, with [`Writer::begin`]. What is given before waits.
+    /// As [`Writer::create`], for a header that was checked and a file that is reserved. The file is first changed by
+    /// the first datagram or sample or, with `for_clock`, by [`Writer::begin`]; data accepted before wait in memory.
     pub(crate) fn plan(file: OutputFile, header: &Header, compression: Compression, for_clock: bool) -> Self {
         let queue = Arc::new(WriteQueue::new(Plan { file, header: header.clone(), compression }, for_clock));
         let track = Track {
@@ -84,13 +87,13 @@ impl Writer {
             source: 0,
             stream: header.stream.clone(),
             columns: header.array.columns.into(),
-            pictures: Mutex::new(Pictures::new(header.array.len())),
+            grey_scale: Mutex::new(GreyScale::new(header.array.len())),
         };
         Self { track, header: header.clone() }
     }
 
-    /// Begins the file of `Writer::plan` with what is added to decoded times, us ([`Header::origin_us`]); returns whether that
-    /// came in time, before it was begun with the header's.
+    /// Begins the file of `Writer::plan` with the offset of decoded times, us ([`Header::origin_us`]); returns whether
+    /// the offset was used, that is, whether the file was not begun with the header's before.
     ///
     /// # Errors
     ///
@@ -105,18 +108,18 @@ impl Writer {
         self.track.queue.lock().begun
     }
 
-    /// Sets when the recording began, ns since 1970, where its file is not begun.
+    /// Sets the time when the recording began, ns since 1970, unless the file was already begun.
     pub fn set_started(&self, at_ns: i64) {
         if let Some(plan) = &mut *lock(&self.track.queue.plan) {
             plan.header.started_ns = at_ns;
         }
     }
 
-    /// Another source's part.
+    /// The writer of another source.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the header named none of that name.
+    /// `Core(Problem)` if the header contains no source of that name.
     pub fn track(&self, name: &str) -> Result<Track> {
         let named = self.header.sources.iter().position(|source| source.name == name);
         let Some(k) = named else {
@@ -127,57 +130,57 @@ impl Writer {
             source: k + 1,
             stream: self.header.sources[k].stream.clone(),
             columns: self.header.sources[k].array.columns.into(),
-            pictures: Mutex::new(Pictures::new(self.header.sources[k].array.len())),
+            grey_scale: Mutex::new(GreyScale::new(self.header.sources[k].array.len())),
         })
     }
 
-    /// Whether any source has given anything.
+    /// Whether any source has passed data.
     #[must_use]
     pub fn holds_anything(&self) -> bool {
         self.track.queue.lock().recorded.iter().any(|&n| n > 0)
     }
 
-    /// Ends the recording with what was lost of the first source and a verdict line, which it returns; the other sources
-    /// have ended before ([`Track::end`]).
+    /// Ends the recording with the counts of the first source and the verdict; returns the final counts. The other
+    /// sources must have ended before ([`Track::end`]).
     ///
-    /// The file is on the disk when this returns.
+    /// The file is synced to the disk when this returns.
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone: the file keeps everything that was written before; or where the file was removed,
-    /// renamed or replaced while it was written, with what is lost.
+    /// `File` if the disk is full or not available, in which case the file keeps everything that was written before; or
+    /// if the file was removed, renamed or replaced while it was written, with a description of what is lost.
     pub fn finish(self, counts: Counts) -> Result<Counts> {
         self.begin(self.header.origin_us)?;
         self.track.queue.finish(Some(counts.clone()))?;
         Ok(Counts { recorded: self.track.queue.lock().recorded[0], ..counts })
     }
 
-    /// Ends a recording that holds nothing: a new file is removed, an earlier one stays.
+    /// Ends an empty recording: removes a new file, leaves an earlier one unchanged.
     ///
     /// # Errors
     ///
-    /// `File` where the file cannot be removed.
+    /// `File` if the file cannot be removed.
     pub fn discard(self) -> Result<()> {
         self.track.queue.abandon().map_or(Ok(()), OutputFile::discard)
     }
 }
 
 impl Track {
-    /// Writes numbers of a stream as they arrived, one for each of its columns: arrival by the host's clock (ns since 1970), our
-    /// arrival number.
+    /// Writes one line of a stream, with a number for each of its columns, the arrival time by the host's clock (ns
+    /// since 1970) and the arrival number.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where the source is no stream, or has other columns; else as [`Track::datagram`].
+    /// `Core(Problem)` if the source is not a stream, or has other columns; otherwise as [`Track::datagram`].
     pub fn sample(&self, arrived_ns: i64, number: u64, values: &[f64]) -> Result<()> {
-        let Some(stream) = self.stream.as_ref().filter(|stream| stream.takes(values)) else {
+        let Some(stream) = self.stream.as_ref().filter(|stream| stream.fits(values)) else {
             let n = self.stream.as_ref().map_or(0, |stream| stream.columns.len());
             return Err(problem!("{} values: the source has {n} columns", values.len()).into());
         };
         self.push(Topic::Samples, arrived_ns, number, stream.message(values).to_string().as_bytes())
     }
 
-    /// Writes a line of a stream that could not be read, as it arrived.
+    /// Writes a line of a stream that could not be parsed, as it arrived.
     ///
     /// # Errors
     ///
@@ -186,19 +189,19 @@ impl Track {
         self.push(Topic::Samples, arrived_ns, number, json!({ "line": line }).to_string().as_bytes())
     }
 
-    /// Ends this source, with what was received and lost of it; it gives nothing afterwards.
+    /// Ends this source with the counts of what was received and lost; it must not be used afterwards.
     pub fn end(&self, name: &str, counts: Counts) {
         let mut state = self.queue.lock();
         let recorded = state.recorded[self.source];
         state.ends.insert(name.to_owned(), Counts { recorded, ..counts });
     }
 
-    /// Writes a datagram as it arrived: arrival by the host's clock (ns since 1970), our arrival number, bytes.
+    /// Writes a datagram, with its arrival time by the host's clock (ns since 1970), arrival number and bytes.
     ///
     /// # Errors
     ///
-    /// `File` where an earlier write failed: the disk is full, or gone. `Core` where the bytes are more than a datagram
-    /// can be.
+    /// `File` if an earlier write failed because the disk is full or not available. `Core` if there are more bytes than
+    /// a datagram can have.
     pub fn datagram(&self, arrived_ns: i64, number: u64, bytes: &[u8]) -> Result<()> {
         self.datagram_at_most(arrived_ns, number, bytes, QUEUE_BYTES)
     }
@@ -210,7 +213,7 @@ impl Track {
         self.queue.push(self.source, Topic::Datagrams, (arrived_ns, number), bytes, most)
     }
 
-    /// Writes many datagrams: each begins in `bytes` where `offsets` say, whose last entry says where all end.
+    /// Writes many datagrams: each begins in `bytes` at its entry of `offsets`, whose last one is where all end.
     ///
     /// # Errors
     ///
@@ -230,16 +233,16 @@ impl Track {
         Ok(())
     }
 
-    /// Writes the board's registers, as they are from now on.
+    /// Writes the board's registers, valid from now on.
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`], also below.
+    /// As [`Track::datagram`]; the same applies to the methods below.
     pub fn registers(&self, at_ns: i64, registers: &Registers) -> Result<()> {
         self.push_json(Topic::Registers, at_ns, &json!(registers))
     }
 
-    /// Writes a start or stop that the board marked.
+    /// Writes a start or stop marked by the board.
     ///
     /// # Errors
     ///
@@ -248,7 +251,7 @@ impl Track {
         self.push_json(Topic::Markers, at_ns, &json!({ "t_us": marker.t, "start": marker.start }))
     }
 
-    /// Writes a note of a person; `t_us` is the board's time where it is known.
+    /// Writes a user's note; `t_us` is the board's time if it is known.
     ///
     /// # Errors
     ///
@@ -257,7 +260,7 @@ impl Track {
         self.push_json(Topic::Notes, at_ns, &log(at_ns, t_us, text))
     }
 
-    /// Writes that a person zeroed a taxel, as a note.
+    /// Writes a taxel's zeroing by a user, as a note.
     ///
     /// # Errors
     ///
@@ -268,7 +271,7 @@ impl Track {
         let text = format!("zeroed row {y}, column {x}: rest {before_text} to {rest:.1} ticks");
         let mut note = log(at_ns, Some(t), &text);
         note["zeroed"] = json!({ "x": x, "y": y, "rest": rest, "before": before });
-        self.pictures().zero(usize::from(y) * self.columns + usize::from(x), rest);
+        self.grey_scale().zero(usize::from(y) * self.columns + usize::from(x), rest);
         self.push_json(Topic::Notes, at_ns, &note)
     }
 
@@ -282,7 +285,7 @@ impl Track {
         self.push_json(Topic::Board, change.at_ns, &value)
     }
 
-    /// Writes a detection of a readout; `at_ns` is when it was output.
+    /// Writes a detection of a readout; `at_ns` is the time of its output.
     ///
     /// # Errors
     ///
@@ -293,7 +296,7 @@ impl Track {
         self.push_json(Topic::Detections, at_ns, &value)
     }
 
-    /// Writes what was received and lost so far, so that an unfinished recording states it too; call it about once a second.
+    /// Writes the counts so far, so that an unfinished recording contains them too; to be called about once a second.
     ///
     /// # Errors
     ///
@@ -302,28 +305,29 @@ impl Track {
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 
-    /// Subtracts a tare's rest from the pictures from now on; before, the lowest value that each taxel held so far.
+    /// Subtracts a tare's rest from the pictures from now on; without a tare, the lowest value of each taxel so far is
+    /// subtracted.
     pub fn tare(&self, tare: &Tare) {
-        self.pictures().tare(tare);
+        self.grey_scale().tare(tare);
     }
 
-    fn pictures(&self) -> MutexGuard<'_, Pictures> {
-        lock(&self.pictures)
+    fn grey_scale(&self) -> MutexGuard<'_, GreyScale> {
+        lock(&self.grey_scale)
     }
 
-    /// Writes a picture of held values for viewers: 8 bits above rest, the largest of the last 10 s being white. The
-    /// message states what was subtracted and how many ticks are white.
+    /// Writes a picture of the taxels' values for viewers: 8 bits above rest, scaled so that the largest value of the
+    /// last 10 s is white. The message states the rest that was subtracted and the value of white in ticks.
     ///
     /// # Errors
     ///
-    /// As [`Track::datagram`]; `Core` where `ticks` are not rows of `columns`.
+    /// As [`Track::datagram`]; `Core` if the number of `ticks` is not a multiple of `columns`.
     pub fn picture(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16]) -> Result<()> {
         let columns = usize::from(columns);
         if columns == 0 || ticks.is_empty() || !ticks.len().is_multiple_of(columns) {
             let n = ticks.len();
             return Err(problem!("picture of {n} taxels, {columns} a row: must be whole rows").into());
         }
-        let grey = self.pictures().take(t_us, ticks);
+        let grey = self.grey_scale().draw(t_us, ticks);
         let picture = json!({
             "timestamp": time(at_ns), "frame_id": "taxel", "width": columns, "height": ticks.len() / columns,
             "encoding": "mono8", "step": columns, "data": base64(&grey.bytes), "t_us": t_us,
@@ -332,8 +336,9 @@ impl Track {
         self.push_json(Topic::Pressure, at_ns, &picture)
     }
 
-    /// Writes the values that the taxels hold before the recording's first datagram, ticks by taxel index; 65 535 of a taxel without
-    /// any event so far. A recording that begins in mid-stream would else know a taxel from its next change on.
+    /// Writes the taxels' values before the recording's first datagram, ticks by taxel index; 65 535 for a taxel
+    /// without any event so far. Without this message, a recording that begins in mid-stream would know a taxel's value
+    /// only after its next change.
     ///
     /// # Errors
     ///
@@ -356,13 +361,13 @@ impl Track {
 impl Drop for Writer {
     fn drop(&mut self) {
         if lock(&self.track.queue.thread).is_some() {
-            // No caller is left to return an error to; the file itself states that it was not finished.
+            // No caller remains to receive an error; the file itself states that it was not finished.
             let _ = self.track.queue.finish(None);
         }
     }
 }
 
-/// What a viewer shows as a line of text.
+/// A message that viewers show as a line of text.
 fn log(at_ns: i64, t_us: Option<i64>, text: &str) -> serde_json::Value {
     json!({
         "timestamp": time(at_ns), "level": 2, "message": text, "name": "taxel", "file": "", "line": 0, "t_us": t_us,
@@ -380,7 +385,7 @@ mod tests {
     use super::super::{LATE, Reader};
     use super::*;
 
-    /// A writer whose thread has not begun.
+    /// A writer whose thread was not started.
     fn alone(path: &Path) -> Writer {
         let header: Header = serde_json::from_value(json!({ "array": taxel_core::Array::thesis() })).unwrap();
         let writer = Writer::plan(OutputFile::open(path, true).unwrap(), &header, Compression::None, false);
@@ -397,7 +402,7 @@ mod tests {
             writer.datagram(i64::from(k), u64::from(k), &[7; 1400]).unwrap();
             std::thread::sleep(LATE / 4);
         }
-        // What a kill would leave now: the last late caller, at the latest one in ten, wrote all before it.
+        // The file as a kill would leave it now: a late caller, at least one in ten, wrote everything before it.
         let left = Reader::open(&path).unwrap().remarks(taxel_core::Stop::never()).unwrap().0.datagrams;
         let waiting = writer.track.queue.lock().queue.messages.len() as u64;
         assert_eq!(left + waiting, 20);
@@ -410,7 +415,7 @@ mod tests {
         let path = std::env::temp_dir().join(format!("taxel-stalled-{}.mcap", std::process::id()));
         let writer = alone(&path);
         writer.track.queue.at_disk.store(true, Ordering::Relaxed);
-        // The thread that waits for the disk has locked the chunk writer: a caller who wanted it would wait for ever.
+        // The thread that waits for the disk has locked the chunk writer: a caller that tried to lock it would block.
         let busy = lock(&writer.track.queue.writer);
         writer.datagram(0, 0, &[7; 1400]).unwrap();
         std::thread::sleep(LATE);

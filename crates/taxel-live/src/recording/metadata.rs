@@ -1,4 +1,4 @@
-//! Names of a recording's metadata records, which the writer writes and the reader looks for.
+//! Names of a recording's metadata records, shared by the writer and the reader.
 
 /// Name of the metadata record at the beginning of a recording.
 pub(super) const BEGIN: &str = "taxel";

@@ -1,8 +1,9 @@
-//! The file that a recording is written to: locked as long as it is written, and looked for at the end.
+//! The file of a recording: locked while it is written, and checked at the end.
 //!
-//! A second recorder that is to replace the file of a running one is refused by the lock, which the system takes away with the
-//! process. Other programs know nothing of it: they remove, rename or replace the file, and what is written then goes into a
-//! file without a name. So whoever ends a recording checks that the name still leads to the file that was written.
+//! A second recorder that should replace the file of a running one is refused by the lock, which the system releases
+//! when the process ends. Other programs do not check the lock: they may remove, rename or replace the file, and what
+//! is written then goes into a file without a name. Therefore the end of a recording checks that the name still refers
+//! to the file that was written.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Error as IoError, ErrorKind, Result as IoResult};
@@ -20,12 +21,12 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Opens and locks a new file; or an existing one where `overwrite` is set, whose contents stay until
-    /// [`OutputFile::begin`]. One that is write-protected is never replaced.
+    /// Opens and locks a new file; or with `overwrite` an existing one, whose contents remain until
+    /// [`OutputFile::begin`]. A write-protected file is never replaced.
     ///
     /// # Errors
     ///
-    /// `File` where the file exists (and `overwrite` is not set), cannot be created or written, or is being recorded by another
+    /// `File` if the file exists (and `overwrite` is not set), cannot be created or written, or is being recorded by another
     /// program, or by another part of this one.
     pub fn open(path: &Path, overwrite: bool) -> Result<Self> {
         if overwrite {
@@ -39,36 +40,36 @@ impl OutputFile {
                     let text = "is being recorded by another program; end that first, or name another file";
                     return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, text)));
                 }
-                // A file system without locks, as some of networks: what is lost there is found at the end.
+                // Some file systems, for example of networks, have no locks: a loss is then detected at the end.
                 Err(TryLockError::Error(error))
                     if matches!(error.raw_os_error(), Some(libc::ENOLCK | libc::EOPNOTSUPP)) => {}
                 Err(TryLockError::Error(error)) => return Err(Error::file(path)(error)),
             }
             let output = Self { path: path.to_owned(), file, new };
-            // Whoever held the lock before may have removed the file.
+            // The previous holder of the lock may have removed the file.
             if output.is_in_place()? {
                 return Ok(output);
             }
         }
     }
 
-    /// Its name.
+    /// Path of the file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether there was no such file before.
+    /// Whether the file did not exist before.
     #[must_use]
     pub fn is_new(&self) -> bool {
         self.new
     }
 
-    /// Empties it: what it held before is replaced from now on.
+    /// Truncates the file: its previous content is replaced from now on.
     ///
     /// # Errors
     ///
-    /// `File` where the system refuses.
+    /// `File` if the system refuses.
     pub fn begin(&self) -> Result<()> {
         // A device has no length.
         let is_file = self.file.metadata().map_err(Error::file(&self.path))?.is_file();
@@ -81,7 +82,7 @@ impl OutputFile {
         &self.file
     }
 
-    /// Whether the name still leads to this file.
+    /// Whether the path still refers to this file.
     fn is_in_place(&self) -> Result<bool> {
         let ours = self.file.metadata().map_err(Error::file(&self.path))?;
         match std::fs::metadata(&self.path) {
@@ -91,11 +92,12 @@ impl OutputFile {
         }
     }
 
-    /// Checks at the end of a recording that its name still leads to it; `written` is what it holds, for the error.
+    /// Checks at the end of a recording that its path still refers to the file; `written` describes its content in the
+    /// error.
     ///
     /// # Errors
     ///
-    /// `File` where the file was removed, renamed or replaced: what was written is lost.
+    /// `File` if the file was removed, renamed or replaced, so that what was written is lost.
     pub fn check(&self, written: impl FnOnce() -> String) -> Result<()> {
         if self.is_in_place()? {
             return Ok(());
@@ -104,7 +106,7 @@ impl OutputFile {
         Err(Error::file(&self.path)(IoError::new(ErrorKind::NotFound, text)))
     }
 
-    /// Removes the file where it is new: nothing is to be kept in it. An earlier one stays.
+    /// Removes the file where it is new: nothing is to stay in it. An earlier one stays.
     ///
     /// # Errors
     ///
@@ -117,7 +119,7 @@ impl OutputFile {
     }
 }
 
-/// The file, and whether it is new.
+/// Opens the file; also returns whether it is new.
 fn open(path: &Path, overwrite: bool) -> IoResult<(File, bool)> {
     let mut options = OpenOptions::new();
     options.read(true).write(true);
@@ -128,7 +130,7 @@ fn open(path: &Path, overwrite: bool) -> IoResult<(File, bool)> {
     options.create(true).truncate(false).open(path).map(|file| (file, new))
 }
 
-/// Refuses a write-protected file, also to the superuser, who may write everywhere.
+/// Refuses a write-protected file, also for the superuser, who could write to it.
 fn replaceable(path: &Path) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(file) if file.permissions().readonly() => Err(Error::file(path)(IoError::from_raw_os_error(libc::EACCES))),

@@ -1,4 +1,4 @@
-//! Sources that are no boards: lines of numbers, as an IMU sends them, each with a stamp of its own or none.
+//! Sources that are not boards: lines of numbers, for example from an IMU, with or without time stamps of their own.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -6,21 +6,21 @@ use taxel_core::problem;
 
 use super::limits;
 
-/// A counter of whole numbers is assumed to have 32 bits.
+/// Range of a counter: whole numbers are assumed to have 32 bits.
 const TURN: f64 = 4_294_967_296.0;
 
-/// A clock that steps back by more than this, though time went on, began anew, us.
+/// A clock that steps back by more than this has restarted, us.
 const STEP_BACK_US: f64 = 1e6;
 
-/// What the lines of a source hold.
+/// The columns of a source's lines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stream {
     /// The names of all columns.
     pub columns: Vec<String>,
-    /// The one that is the source's own clock; without one a line's time is when it came.
+    /// The column of the source's own clock; without one a line's time is its arrival time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
-    /// What a step of that clock is, us.
+    /// Unit of that clock, us.
     #[serde(default = "one")]
     pub unit_us: f64,
 }
@@ -30,7 +30,8 @@ fn one() -> f64 {
 }
 
 impl Stream {
-    /// Columns by name. The one whose name ends in `_ns`, `_us`, `_ms` or `_s` after `t`, `time` or `stamp` is the clock.
+    /// Defines the columns by name. A name `t`, `time`, `stamp` or `timestamp` with the ending `_ns`, `_us`, `_ms` or
+    /// `_s` is the clock.
     #[must_use]
     pub fn of_columns(columns: Vec<String>) -> Self {
         let unit = |name: &str| {
@@ -43,7 +44,7 @@ impl Stream {
         Self { columns, time, unit_us }
     }
 
-    /// The names of the columns of values: all but the clock's.
+    /// The names of the columns of values, without the clock.
     pub fn values(&self) -> impl Iterator<Item = &String> {
         self.columns.iter().filter(|name| Some(*name) != self.time.as_ref())
     }
@@ -74,21 +75,21 @@ impl Stream {
         Ok(())
     }
 
-    /// Whether the numbers are as many as the columns.
+    /// Whether the number of values equals that of columns.
     #[must_use]
-    pub fn takes(&self, values: &[f64]) -> bool {
+    pub fn fits(&self, values: &[f64]) -> bool {
         values.len() == self.columns.len()
     }
 
-    /// The numbers of a line of text, separated by commas, semicolons, tabs or blanks; `None` where one is none, or there are
-    /// not as many as columns.
+    /// Parses a line of numbers separated by commas, semicolons, tabs or blanks; `None` if a field is not a number, or
+    /// if the number of fields differs from that of columns.
     #[must_use]
     pub fn parse(&self, line: &str) -> Option<Vec<f64>> {
         let values = fields(line).map(|field| field.parse().ok()).collect::<Option<Vec<f64>>>()?;
-        self.takes(&values).then_some(values)
+        self.fits(&values).then_some(values)
     }
 
-    /// A line as it is recorded.
+    /// A line in the form in which it is recorded.
     #[must_use]
     pub(super) fn message(&self, values: &[f64]) -> Value {
         let named: Map<String, Value> =
@@ -105,31 +106,31 @@ pub fn fields(line: &str) -> impl Iterator<Item = &str> {
 /// The samples of a stream, as they arrived.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Samples {
-    /// When each came, ns since 1970.
+    /// Arrival time of each sample, ns since 1970.
     pub arrived_ns: Vec<i64>,
-    /// Our arrival number of each.
+    /// Arrival number of each sample.
     pub number: Vec<u64>,
-    /// By the source's own clock, us, going on over turns of a counter of 32 bits and over a clock that began anew; without
-    /// one when it came.
+    /// Time by the source's own clock, us, unwrapped over turns of a 32-bit counter and continued over restarts;
+    /// without a clock the arrival time.
     pub t: Vec<i64>,
-    /// The values without the clock, line by line.
+    /// The values without the clock column, line by line.
     pub values: Vec<f64>,
-    /// Lines that could not be read.
+    /// Number of lines that could not be parsed.
     pub bad: u64,
-    /// How often the clock began anew.
+    /// Number of restarts of the clock.
     pub resets: u64,
 }
 
-/// Takes a stream's messages.
+/// Decodes a stream's messages.
 #[derive(Debug)]
 pub(super) struct Sampling<'a> {
     stream: &'a Stream,
     samples: Samples,
-    /// Whether all stamps so far are whole numbers: then they may be those of a counter.
+    /// Whether all stamps so far are whole numbers, so that they may be those of a counter.
     whole: bool,
-    /// What is added to stamps, us.
+    /// Added to stamps, us.
     added: f64,
-    /// The last stamp with it, us, and when it came, ns.
+    /// The last time, with this addition, us, and its arrival time, ns.
     last: Option<(f64, i64)>,
 }
 
@@ -138,7 +139,7 @@ impl<'a> Sampling<'a> {
         Self { stream, samples: Samples::default(), whole: true, added: 0.0, last: None }
     }
 
-    pub(super) fn take(&mut self, at_ns: i64, number: u64, data: &[u8]) {
+    pub(super) fn push(&mut self, at_ns: i64, number: u64, data: &[u8]) {
         let Some((stamp, values)) = self.parse(data) else {
             self.samples.bad += 1;
             return;
@@ -153,7 +154,7 @@ impl<'a> Sampling<'a> {
         self.samples.values.extend(values);
     }
 
-    /// The stamp and the values of a message; a number that JSON cannot hold is not one.
+    /// The stamp and the values of a message; a value that JSON cannot represent becomes NaN.
     fn parse(&self, data: &[u8]) -> Option<(Option<f64>, Vec<f64>)> {
         let message: Value = serde_json::from_slice(data).ok()?;
         let named = message.get("values")?.as_object()?;
@@ -165,7 +166,7 @@ impl<'a> Sampling<'a> {
         Some((stamp, values.collect::<Option<_>>()?))
     }
 
-    /// The time of a stamp, us.
+    /// Converts a stamp to a time, us.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
     fn unwrapped(&mut self, stamp: f64, at_ns: i64) -> i64 {
         self.whole &= stamp.fract() == 0.0 && (0.0..TURN).contains(&stamp);
@@ -175,7 +176,8 @@ impl<'a> Sampling<'a> {
             let lacks = passed - (own + self.added - last);
             let turn = TURN * self.stream.unit_us;
             let turns = (lacks / turn).round();
-            // Arrivals give the time within a second, or a hundredth of a pause.
+            // Arrival times determine the elapsed time within a second, or within a hundredth of a pause if that is
+            // longer.
             let near = STEP_BACK_US.max(passed.abs() * 1e-2);
             if self.whole && turns >= 1.0 && (lacks - turns * turn).abs() <= near {
                 self.added += turns * turn;
@@ -206,7 +208,7 @@ mod tests {
         let mut sampling = Sampling::new(stream);
         for (k, &(stamp, at_ns)) in stamps.iter().enumerate() {
             let message = stream.message(&[stamp, k as f64]).to_string();
-            sampling.take(at_ns, k as u64, message.as_bytes());
+            sampling.push(at_ns, k as u64, message.as_bytes());
         }
         let samples = sampling.finish();
         assert_eq!(samples.bad, 0);
@@ -260,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn seconds_with_a_fraction_have_no_turns_and_a_small_step_back_is_kept() {
+    fn seconds_with_a_fraction_have_no_turns_and_a_small_step_back_stays() {
         let stream = stream(&["t_s", "a"]);
         let at = |ms: i64| 1_700_000_000_000_000_000 + ms * 1_000_000;
         let (t, resets) = times(&stream, &[(1.5, at(0)), (1.75, at(250)), (1.625, at(260)), (3601.5, at(3_600_000))]);

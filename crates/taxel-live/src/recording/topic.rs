@@ -1,7 +1,7 @@
 //! The channels of a recording, with their schemas.
 
-/// A channel of a recording. Its number is the same in every file, so that a file whose first chunk (where the channel
-/// records are) is damaged can still be read.
+/// A channel of a recording. Its number is the same in every file, so that a file is readable even if its first chunk,
+/// which contains the channel records, is damaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u16)]
 pub enum Topic {
@@ -9,29 +9,29 @@ pub enum Topic {
     Datagrams = 1,
     /// The board's register file, when it was set.
     Registers = 2,
-    /// Starts and stops as the board marked them.
+    /// Starts and stops, as marked by the board.
     Markers = 3,
-    /// Notes of people.
+    /// Notes written by users.
     Notes = 4,
     /// Detections of a readout.
     Detections = 5,
-    /// What was received and lost so far.
+    /// Counts of what was received and lost so far.
     Counts = 6,
     /// The low-rate picture.
     Pressure = 7,
-    /// What the taxels held when the recording began.
+    /// The taxels' values at the beginning of the recording.
     Held = 8,
     /// Resets of the board, and changes of its version of the wire.
     Board = 9,
-    /// Lines of numbers of a source that is no board.
+    /// Lines of numbers of a source that is not a board.
     Samples = 10,
 }
 
-/// The channels of a file's second source have this added to their numbers, those of the third twice that ...
+/// Difference of the channel numbers of one source from those of the source before it in the file.
 const NEXT_SOURCE: u16 = 16;
 
 impl Topic {
-    /// All, by number.
+    /// All channels, by number.
     pub const ALL: [Self; 10] = [
         Self::Datagrams,
         Self::Registers,
@@ -45,17 +45,17 @@ impl Topic {
         Self::Samples,
     ];
 
-    /// Those of a source: a board's, or those of a stream of numbers.
+    /// The channels of a source: those of a board, or those of a stream of numbers.
     pub(super) fn of_source(stream: bool) -> impl Iterator<Item = Self> {
-        let kept = move |topic: &Self| match topic {
+        let belongs = move |topic: &Self| match topic {
             Self::Samples => stream,
             Self::Counts => true,
             _ => !stream,
         };
-        Self::ALL.into_iter().filter(kept)
+        Self::ALL.into_iter().filter(belongs)
     }
 
-    /// The name in the file.
+    /// The channel's name in a file.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -72,7 +72,7 @@ impl Topic {
         }
     }
 
-    /// How its messages are encoded.
+    /// The encoding of the channel's messages.
     pub(super) fn encoding(self) -> &'static str {
         match self {
             Self::Datagrams => "taxel.wire.v1",
@@ -80,7 +80,7 @@ impl Topic {
         }
     }
 
-    /// Name and JSON schema of its messages; datagrams have none, they are the board's own bytes.
+    /// Name and JSON schema of the channel's messages; datagrams have none, because they are the board's own bytes.
     pub(super) fn schema(self) -> Option<(&'static str, &'static str)> {
         Some(match self {
             Self::Datagrams => return None,
@@ -96,22 +96,22 @@ impl Topic {
         })
     }
 
-    /// The number of the channel in a file; `source` counts the file's sources.
+    /// The number of the channel in a file; `source` is the index of the source.
     pub(super) fn channel(self, source: usize) -> u16 {
         u16::try_from(source).unwrap_or(u16::MAX).saturating_mul(NEXT_SOURCE).saturating_add(self as u16)
     }
 
-    /// The name of the channel in a file: those of the first source have the topic's alone.
+    /// The name of the channel in a file; for the first source it is the topic's name alone.
     pub(super) fn channel_name(self, source: usize, named: &str) -> String {
         if source == 0 { self.name().to_owned() } else { format!("/{named}{}", self.name()) }
     }
 
-    /// The topic of a channel's name, where the channel is that source's.
+    /// The topic of a channel with this name, if the channel belongs to the source.
     pub(super) fn of_name(name: &str, source: usize, named: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|t| t.channel_name(source, named) == name)
     }
 
-    /// The topic of a channel's number in a file of ours, where the channel is that source's.
+    /// The topic of a channel with this number in a file of ours, if the channel belongs to the source.
     pub(super) fn of_number(number: u16, source: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|t| t.channel(source) == number)
     }

@@ -213,10 +213,10 @@ impl KeyframeIndex for LiveIndex {
         let stored = &ring.pieces[place];
         let held = stored.piece.held.clone().unwrap_or_default();
         let rest = stored.rest.as_ref().map_or_else(|| held.clone(), |rest| rest.to_vec());
-        let frame = Keyframe { latest: stored.piece.since, events: stored.piece.before, held, rest };
+        let keyframe = Keyframe { latest: stored.piece.since, events: stored.piece.before, held, rest };
         let number = ring.first + place as u64;
         drop(ring);
-        Ok((frame, Box::new(LiveChanges { index: self.clone(), number, held_returned: Some(number) })))
+        Ok((keyframe, Box::new(LiveChanges { index: self.clone(), number, held_returned: Some(number) })))
     }
 
     fn keyframe_before(&self, t: i64) -> Option<i64> {

@@ -44,7 +44,7 @@ enum Source {
 /// The decoder of a recording.
 #[derive(Debug, Clone)]
 enum Decoding {
-    Datagrams(Box<wire::Receiver>),
+    Datagrams(Box<wire::SenderDecoder>),
     Bytes(Box<Decoder>),
 }
 
@@ -54,7 +54,7 @@ struct Key {
     block: usize,
     place: Place,
     decoding: Decoding,
-    frame: Keyframe,
+    keyframe: Keyframe,
 }
 
 /// An indexed recording.
@@ -154,7 +154,7 @@ impl RecordingIndex {
     fn decoding(&self) -> Decoding {
         let decoder = Decoder::new(self.header.array.clone()).differences(self.header.difference);
         match &self.source {
-            Source::Mcap(_) => Decoding::Datagrams(Box::new(wire::Receiver::new(decoder, 1))),
+            Source::Mcap(_) => Decoding::Datagrams(Box::new(wire::SenderDecoder::new(decoder, 1))),
             Source::Lsa(..) => Decoding::Bytes(Box::new(decoder)),
         }
     }
@@ -170,18 +170,18 @@ impl RecordingIndex {
     ) -> Result<u64> {
         let mut bytes = 0;
         match (&self.source, &mut *decoding) {
-            (Source::Mcap(reader), Decoding::Datagrams(receiver)) => {
+            (Source::Mcap(reader), Decoding::Datagrams(decoder)) => {
                 reader.block(k, place, |message| {
                     if message.topic == Topic::Datagrams {
-                        receiver.push(message.data, Some(message.at_ns / 1000), events);
+                        decoder.push(message.data, Some(message.at_ns / 1000), events);
                         bytes += message.data.len() as u64;
                     } else if message.topic == Topic::Held {
-                        begin_with(receiver, message.data);
+                        begin_with(decoder, message.data);
                     } else if message.topic == Topic::Pressure {
                         return Ok(());
                     }
                     if let Some(remarks) = &mut remarks {
-                        remarks.take(&message);
+                        remarks.add(&message);
                     }
                     Ok(())
                 })?;
@@ -197,7 +197,7 @@ impl RecordingIndex {
         }
         if k + 1 == self.blocks() {
             match decoding {
-                Decoding::Datagrams(receiver) => receiver.finish_into(events),
+                Decoding::Datagrams(decoder) => decoder.finish_into(events),
                 Decoding::Bytes(decoder) => decoder.finish_into(events),
             }
         }
@@ -240,7 +240,7 @@ impl RecordingIndex {
                     block,
                     place,
                     decoding,
-                    frame: state.keyframe(),
+                    keyframe: state.keyframe(),
                 }));
                 if thin {
                     let mut odd = false;
@@ -253,7 +253,7 @@ impl RecordingIndex {
                     // A recording begun in mid-stream starts with the held values, before all datagrams of the first block.
                     state.set_held(&held, 0);
                     if let Some(key) = keys.first_mut() {
-                        key.frame = state.keyframe();
+                        key.keyframe = state.keyframe();
                     }
                 }
                 state.apply(&changes);
@@ -292,7 +292,7 @@ impl RecordingIndex {
             let mut piece = Decoded { key: None, thin: false, held: None, changes: vec![] };
             if since >= spacing {
                 (since, keys) = (0, keys + 1);
-                piece.key = Some((k, place.kept(), decoding.clone()));
+                piece.key = Some((k, place.without_memory(), decoding.clone()));
                 if keys * each > KEYFRAME_BYTES {
                     (piece.thin, keys, spacing) = (true, keys.div_ceil(2), 2 * spacing);
                 }
@@ -382,8 +382,8 @@ impl KeyframeIndex for Arc<RecordingIndex> {
     }
 
     fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
-        let place = self.keys.partition_point(|key| key.frame.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
-        let Some(Key { block, place, decoding, frame }) = self.keys.get(place) else {
+        let place = self.keys.partition_point(|key| key.keyframe.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
+        let Some(Key { block, place, decoding, keyframe }) = self.keys.get(place) else {
             return Err(problem!("{}: holds no events", self.path.display()).into());
         };
         let reader = RecordingChanges {
@@ -393,11 +393,11 @@ impl KeyframeIndex for Arc<RecordingIndex> {
             decoding: decoding.clone(),
             events: Events::empty(self.header.array.clone()),
         };
-        Ok((frame.clone(), Box::new(reader)))
+        Ok((keyframe.clone(), Box::new(reader)))
     }
 
     fn keyframe_before(&self, t: i64) -> Option<i64> {
-        self.keys.iter().rev().filter_map(|key| key.frame.latest).find(|&latest| latest < t)
+        self.keys.iter().rev().filter_map(|key| key.keyframe.latest).find(|&latest| latest < t)
     }
 
     fn time_columns(&self) -> Option<&TimeColumns> {
@@ -405,8 +405,8 @@ impl KeyframeIndex for Arc<RecordingIndex> {
     }
 
     fn events_before(&self, t: i64) -> u64 {
-        let place = self.keys.partition_point(|key| key.frame.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
-        self.keys.get(place).map_or(0, |key| key.frame.events)
+        let place = self.keys.partition_point(|key| key.keyframe.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
+        self.keys.get(place).map_or(0, |key| key.keyframe.events)
     }
 }
 

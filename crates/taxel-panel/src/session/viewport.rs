@@ -464,6 +464,7 @@ fn opened_message(name: &str, index: &Arc<RecordingIndex>, begun: Instant) -> Va
         "verdict": index.verdict,
         "unfinished": index.unfinished,
         "registers": header.registers,
+        "frame_us": header.registers.map(|registers| registers.frame_us()),
         "markers": markers.collect::<Vec<_>>(),
         "notes": notes.collect::<Vec<_>>(),
         "zeroed": remarks.zeroings.iter().map(|(_, one)| messages::zeroing(one)).collect::<Vec<_>>(),

@@ -1,4 +1,4 @@
-"""Recipes by name: what `taxel train` starts from where nothing else is asked for; one data file each.
+"""Recipes by name, one data file each: where none is named, `taxel train` chooses the one that fits the recording.
 
 A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", or units of frames), the
 encoder, what all neurons share (`learner`), what is a neuron's own (`neurons`), and whose parameters any `other` label
@@ -23,7 +23,7 @@ from taxel.frames import Frames
 
 __all__ = ["fitting", "for_labels", "names", "read"]
 
-#: What fits where no other recipe does: levels in shares of the running range ask for no unit.
+#: The recipe of recordings that no other fits: its levels are shares of the running range, of any unit.
 _ANY = "gait_channel"
 
 
@@ -73,8 +73,8 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
             )
         place = Path(__file__).parent / f"{recipe}.toml"
     try:
-        said = place.read_text(encoding="utf-8-sig")
-        values = json.loads(said) if place.suffix.lower() == ".json" else tomllib.loads(said)
+        content = place.read_text(encoding="utf-8-sig")
+        values = json.loads(content) if place.suffix.lower() == ".json" else tomllib.loads(content)
     except (UnicodeDecodeError, json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
         kind = "JSON" if place.suffix.lower() == ".json" else "TOML"
         raise FormatError(f"{place}: not {kind}: {error}") from None

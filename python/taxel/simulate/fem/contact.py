@@ -15,7 +15,7 @@ __all__ = ["Contact", "Touch"]
 _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 #: The step of the complex derivative; nothing is subtracted, so it may be as small as one likes.
 _STEP = 1e-30
-#: How many segments a point's own may be from the nearest one, and Newton's steps to its place there.
+#: How many segments away from the nearest one a point's own may be, and Newton steps that find its place there.
 _MOVES, _ROOTS = 3, 4
 
 
@@ -69,10 +69,10 @@ class Contact:
         self._size = 2 * len(nodes)
 
     def apart(self) -> Touch:
-        """Return the touch of what does not touch."""
+        """Return the state of no contact."""
         return Touch(np.full(len(self._weight), np.nan), np.full(len(self._weight), np.nan))
 
-    # A wild iterate of Newton's, far from any touch, divides by 0; what comes of it is thrown away and the step halved.
+    # A Newton iterate far from any contact divides by 0; the solver discards its result and halves the step.
     @np.errstate(divide="ignore", invalid="ignore", over="ignore")
     def forces(self, x: NDArray[np.float64], before: Touch) -> tuple[NDArray[np.float64], sparse.csc_array, Touch]:
         """Return the forces that hold the bodies against the contact's, their derivative, and the touch.

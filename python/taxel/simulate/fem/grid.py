@@ -125,10 +125,10 @@ class SamplingGrid:
             raise ProblemError(f"the grid is {2 * places[-1]:g} mm wide: must lie on the block")
         along = PchipInterpolator(course.path_mm, course.sensed_kpa(self.quantity)[:, near])
         across = CubicSpline(course.x_mm[near], np.eye(int(near.sum())))
-        found = np.zeros((number_of, count + 1, self.taxels), np.float32)
+        drawn = np.zeros((number_of, count + 1, self.taxels), np.float32)
         for first in range(0, number_of, _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
             t = phase[part, None] + np.arange(count) * period_ms
             path = np.minimum(t * (depth / self.duration_ms), reached)
-            found[part, 1:] = along(path) @ across(places + shift[part, None]).transpose(0, 2, 1)
-        return found
+            drawn[part, 1:] = along(path) @ across(places + shift[part, None]).transpose(0, 2, 1)
+        return drawn

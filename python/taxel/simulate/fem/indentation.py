@@ -90,7 +90,7 @@ class Indentation:
         instance("silicone", self.silicone, Yeoh)
         diameter, height = f"the diameter, {self.diameter_mm:g} mm", f"the height, {self.height_mm:g} mm"
         finest, coarsest = min(self.mesh_mm, self.base_mesh_mm), max(self.mesh_mm, self.base_mesh_mm)
-        for wrong, said in (
+        for wrong, message in (
             (self.friction < 0, f"friction is {self.friction:g}: must be 0 or more"),
             (abs(self.angle_deg) > 60, f"angle_deg is {self.angle_deg:g}: must be -60 to 60"),
             (
@@ -112,7 +112,7 @@ class Indentation:
             ),
         ):
             if wrong:
-                raise ProblemError(said)
+                raise ProblemError(message)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as JSON holds them."""
@@ -120,13 +120,13 @@ class Indentation:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Indentation:
-        """Return what `to_dict` gave."""
+        """Build an indentation from the values that `to_dict` returned."""
         return cls(**{**values, "silicone": Yeoh(**values["silicone"])})
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Hold what happened along an indentation's path; forces are by mm of thickness.
+    """Hold the results along an indentation's path; forces are by mm of thickness.
 
     Attributes
     ----------
@@ -136,7 +136,7 @@ class Course:
     reaction : float64, shape (n, 2), mN/mm
         The force that moves the half disc: along x, and down.
     base : float64, shape (n, 2), mN/mm
-        The force that the base gives back, the same ways: the sum of all its nodes'.
+        The reaction of the base along the same axes: the sum over its nodes.
     x_mm : float64, shape (base nodes,)
     pressure_kpa, shear_kpa : float64, shape (n, base nodes)
         Normal traction on the base, force by length at rest: a node's reaction by the length that belongs to it.
@@ -194,7 +194,7 @@ class Course:
         """Return the true stress along the base, kPa (tension above 0)."""
         law, b = self.indentation.silicone, self.stretch
         shear = np.zeros_like(b)
-        # sigma_xy = 2 W' a b, and W' itself moves with a: twice around is exact to rounding at these strains.
+        # sigma_xy = 2 W' a b, and W' itself moves with a: two iterations are exact to rounding at these strains.
         for _ in range(20):
             slope = law.slope(shear**2 + b**2 + b**-2 - 2)
             shear = self.shear_kpa / (2 * slope)
@@ -203,7 +203,7 @@ class Course:
     def save(self, path: Path, *, made_by: str = "", overwrite: bool = False) -> Path:
         """Write one ``.npz`` file, whole or not at all."""
         arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
-        told = {
+        description = {
             "indentation": self.indentation.to_dict(),
             "fault": self.fault,
             "factorisations": self.factorisations,
@@ -213,7 +213,7 @@ class Course:
         shapes: dict[str, Any] = {f"shape_{at:.6f}": x.astype(np.float32) for at, x in self.shapes.items()}
 
         def write(file: BinaryIO) -> None:
-            np.savez_compressed(file, told=np.array(json.dumps(told)), **arrays, **shapes)
+            np.savez_compressed(file, told=np.array(json.dumps(description)), **arrays, **shapes)
 
         return write_whole(path, write, overwrite=overwrite)
 
@@ -227,14 +227,14 @@ class Course:
         """
         try:
             with np.load(path, allow_pickle=False) as file:
-                told = json.loads(str(file["told"]))
+                description = json.loads(str(file["told"]))
                 shapes = {float(n[6:]): file[n].astype(float) for n in file.files if n.startswith("shape_")}
                 arrays = {name: file[name] for name in _ARRAYS}
             return cls(
-                indentation=Indentation.from_dict(told["indentation"]),
+                indentation=Indentation.from_dict(description["indentation"]),
                 shapes=shapes,
                 **arrays,
-                **{name: told[name] for name in ("fault", "factorisations", "cuts")},
+                **{name: description[name] for name in ("fault", "factorisations", "cuts")},
             )
         except FileNotFoundError:
             raise
@@ -297,20 +297,20 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
     held = np.concatenate([_both(ground.held), _both(top)])
     way = np.array([math.sin(math.radians(i.angle_deg)), -math.cos(math.radians(i.angle_deg))])
 
-    def given(path: float) -> NDArray[np.float64]:
+    def displacement(path: float) -> NDArray[np.float64]:
         return np.concatenate([np.zeros(2 * len(ground.held)), np.tile(path * way, len(top))])
 
     count = max(1, round(i.depth_mm / (i.step_um / 1000)))
     paths = np.linspace(0, i.depth_mm, count + 1)
-    kept = {int(np.abs(paths - at).argmin()) for at in _SHAPES_MM if at <= i.depth_mm} | {count}
+    shape_steps = {int(np.abs(paths - at).argmin()) for at in _SHAPES_MM if at <= i.depth_mm} | {count}
     base = _Base(ground, top)
     shapes: dict[float, NDArray[np.float64]] = {}
     fault, state = "", None
     try:
-        for k, found in enumerate(march(solids, contact, held, given, paths)):
-            state = found
+        for k, equilibrium in enumerate(march(solids, contact, held, displacement, paths)):
+            state = equilibrium
             base.add(state)
-            if k in kept:
+            if k in shape_steps:
                 shapes[state.path] = solids.nodes + state.u.reshape(-1, 2)
             if progress is not None:
                 progress(state.path, i.depth_mm)

@@ -1,4 +1,4 @@
-"""Courses of indentations kept in a folder, each under a digest of all that made it."""
+"""Courses of indentations stored in a folder, each under a digest of all that it depends on."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["KeptCourses"]
 
 
 class KeptCourses:
-    """Keep courses in a folder that the caller names.
+    """Store courses in a folder that the caller names.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class KeptCourses:
     Attributes
     ----------
     code : str
-        The digest of the solver's sources (`taxel.report.Sources`): courses of other code count no more.
+        The digest of the solver's sources (`taxel.report.Sources`): courses of other code are not found.
 
     Raises
     ------
@@ -59,7 +59,7 @@ class KeptCourses:
         return self.path(asked).exists()
 
     def __getitem__(self, asked: Indentation) -> Course:
-        """Return a course that is there.
+        """Return a stored course.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class KeptCourses:
         return path if path.exists() else course.save(path, made_by=self.code, overwrite=True)
 
     def made(self, asked: Indentation) -> Course:
-        """Return a course; run it and keep it where it is not there."""
+        """Return a course; compute and store it where it is missing."""
         if asked not in self:
             self.add(press(asked))
         return self[asked]

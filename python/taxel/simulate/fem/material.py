@@ -73,10 +73,10 @@ class Yeoh:
     def limit(self) -> float:
         """The I1 - 3 at which the law loses stability: the nominal stress peaks in one of the three simple tests."""
         stretch = np.geomspace(1.0001, _FARTHEST, 20_000)
-        found = np.inf
+        least = np.inf
         for first, power in ((stretch**2 + 2 / stretch, 2), (stretch**2 + 1 + stretch**-2, 3)):
-            found = min(found, self._peak(first - 3, stretch - stretch**-power))
-        return float(min(found, self._peak(2 * stretch**2 + stretch**-4 - 3, stretch - stretch**-5)))
+            least = min(least, self._peak(first - 3, stretch - stretch**-power))
+        return float(min(least, self._peak(2 * stretch**2 + stretch**-4 - 3, stretch - stretch**-5)))
 
     def _peak(self, x: NDArray[np.float64], shape: NDArray[np.float64]) -> float:
         falls = np.flatnonzero(np.diff(self.slope(x) * shape) <= 0)
@@ -106,12 +106,12 @@ class Yeoh:
         direction = 2 * f - 2 * (j**-3)[..., None] * cofactor
         slope = self.slope(x)
         curve = (2 * self.c20_pa + 6 * self.c30_pa * x) / 1000
-        found = (6 * slope * j**-4)[..., None, None] * (cofactor[..., :, None] * cofactor[..., None, :])
+        derivative = (6 * slope * j**-4)[..., None, None] * (cofactor[..., :, None] * cofactor[..., None, :])
         if self.c20_pa or self.c30_pa:
-            found += curve[..., None, None] * (direction[..., :, None] * direction[..., None, :])
-        found -= (2 * slope * j**-3)[..., None, None] * _COFACTOR
-        found += (2 * slope)[..., None, None] * np.eye(4)
-        return slope[..., None] * direction, found
+            derivative += curve[..., None, None] * (direction[..., :, None] * direction[..., None, :])
+        derivative -= (2 * slope * j**-3)[..., None, None] * _COFACTOR
+        derivative += (2 * slope)[..., None, None] * np.eye(4)
+        return slope[..., None] * direction, derivative
 
 
 def _invariant(f: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -60,7 +60,7 @@ def march(
     solids: Solids,
     contact: Contact,
     held: NDArray[np.int64],
-    given: Callable[[float], NDArray[np.float64]],
+    prescribed: Callable[[float], NDArray[np.float64]],
     paths: NDArray[np.float64],
 ) -> Iterator[State]:
     """Give the equilibrium at each path in turn.
@@ -69,8 +69,8 @@ def march(
     ----------
     solids, contact
     held : int64
-        The unknowns that are given.
-    given : function of the path
+        The unknowns that are prescribed.
+    prescribed : function of the path
         Their values.
     paths : float64, mm, rising
 
@@ -83,7 +83,7 @@ def march(
     free = np.setdiff1d(np.arange(size), held)
     state = State(float(paths[0]), np.zeros(size), contact.apart(), np.zeros(size), np.zeros(size))
     yield state
-    # The first touch, of a point or two, is where Newton is lost most easily.
+    # Newton's method fails most easily at the first contact, of a point or two.
     last, cut = state, _FIRST_HALVINGS
     for goal in paths[1:]:
         begun = state.path
@@ -92,14 +92,14 @@ def march(
             done += 1
             path = float(goal) if done == 2**cut else begun + (goal - begun) * done / 2**cut
             try:
-                found = _equilibrium(solids, contact, held, free, given(path), path, state, last)
+                reached = _equilibrium(solids, contact, held, free, prescribed(path), path, state, last)
             except ArithmeticError as fault:
                 if cut == _HALVINGS:
                     raise Stopped(f"stopped at {state.path:.4f} mm: {fault}") from None
                 cut, done = cut + 1, 2 * (done - 1)
                 state = State(**{**vars(state), "cuts": state.cuts + 1})
                 continue
-            last, state = state, found
+            last, state = state, reached
             if cut and done % 2 == 0:
                 cut, done = cut - 1, done // 2
         yield state
@@ -107,7 +107,7 @@ def march(
 
 @dataclass(frozen=True, eq=False)
 class _Residual:
-    """Hold what a displacement leaves of forces, and its derivative."""
+    """Hold the residual forces of a displacement, and their derivative."""
 
     u: NDArray[np.float64]
     total: NDArray[np.float64]
@@ -121,7 +121,7 @@ def _equilibrium(
     contact: Contact,
     held: NDArray[np.int64],
     free: NDArray[np.int64],
-    given: NDArray[np.float64],
+    prescribed: NDArray[np.float64],
     path: float,
     state: State,
     last: State,
@@ -129,7 +129,7 @@ def _equilibrium(
     u = state.u.copy()
     if state.path > last.path:
         u += (state.u - last.u) * ((path - state.path) / (state.path - last.path))
-    u[held] = given
+    u[held] = prescribed
     count = state.factorisations
 
     def at(u: NDArray[np.float64]) -> _Residual:
@@ -168,7 +168,7 @@ def _along(
     *,
     patient: bool,
 ) -> _Residual:
-    """Go a Newton step; part of it only where the whole goes wrong: where points come and go, Newton may circle."""
+    """Take a Newton step, shortened only where the full one fails: where contacts open and close, Newton may cycle."""
     norm = np.linalg.norm(here.total[free])
     best, fault = None, None
     for part in _PARTS:
@@ -179,11 +179,11 @@ def _along(
         except ArithmeticError as error:
             fault = error
             continue
-        found = np.linalg.norm(there.total[free])
-        if patient or found < (1 - part / 4) * norm:
+        residual = np.linalg.norm(there.total[free])
+        if patient or residual < (1 - part / 4) * norm:
             return there
-        if best is None or found < best[0]:
-            best = found, there
+        if best is None or residual < best[0]:
+            best = residual, there
     if best is None:
         raise ArithmeticError(str(fault))
     return best[1]

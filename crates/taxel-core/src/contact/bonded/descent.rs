@@ -54,7 +54,7 @@ impl Descent {
         way.clear();
         way.resize(cells.len(), 0.0);
         let (mut last, mut keeps, mut known) = (1.0, 0.0, false);
-        // The layer's stiffness under a wide touch: what a gap that is left is worth.
+        // The layer's stiffness under a wide touch turns a remaining gap into a pressure.
         let stiffness = 1.0 / surface[0];
         for _ in 0..turns {
             if !known {
@@ -64,7 +64,7 @@ impl Descent {
                 }
             }
             if pressure.iter().all(|p| *p == 0.0) {
-                // Nothing is pressed yet: begin where a wide touch would.
+                // Without pressures from before, begin with those of a wide touch.
                 for (pressure, gap) in pressure.iter_mut().zip(gap.iter()) {
                     *pressure = (-gap * stiffness).max(0.0);
                 }
@@ -98,7 +98,7 @@ impl Descent {
                 known &= was >= step * way[k];
                 pressure[k] = (was - step * way[k]).max(0.0);
                 if pressure[k] == 0.0 && gap[k] < 0.0 {
-                    // Overlap where nothing presses: it joins, and directions begin anew.
+                    // A cell without pressure overlaps the body: it joins the contact, and the search directions begin anew.
                     pressure[k] = -step * gap[k];
                     (keeps, known) = (0.0, false);
                 }

@@ -5,7 +5,7 @@ use super::super::{Foam, within};
 use crate::allowed::Range;
 use crate::{Array, Error, Result};
 
-/// The layer's influence has died within so many thicknesses; less than a per cent of the force arrives beyond.
+/// Range of the layer's influence, in thicknesses; less than a per cent of the force arrives beyond.
 const REACH: f64 = 4.0;
 /// The longest plane, in cells, where only the influence of a very thick layer would need a longer one.
 const LONGEST: usize = 1024;

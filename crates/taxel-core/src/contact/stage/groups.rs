@@ -3,7 +3,7 @@
 /// The board's lines are read in four groups a frame, each as the touch then is.
 pub const GROUPS: usize = 4;
 
-/// The fabric answers so much later, us (thesis 4.4.1).
+/// The delay of the fabric's response, us (thesis 4.4.1).
 const FABRIC_US: f64 = 50.0;
 
 /// When a group of lines is read that shows the touch of `GROUPS` steps a frame.

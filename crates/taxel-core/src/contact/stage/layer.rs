@@ -87,7 +87,7 @@ impl Layer {
         solved.number = number;
         solved.touches = self.sink(k) > 0;
         if solved.touches {
-            // What is lost on the way raises the force above that of a body at rest.
+            // Losses raise the force of a moving body above that of one at rest.
             let gain: Vec<f64> = (0..self.shapes.len())
                 .map(|n| {
                     let track = &self.motion.tracks[n];

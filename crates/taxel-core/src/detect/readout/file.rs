@@ -1,4 +1,4 @@
-//! A readout's file: JSON that names its format and version.
+//! The file of a readout: JSON with the name and version of its format.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -10,7 +10,7 @@ use crate::{Error, Result, reading};
 /// The name of the format in the file.
 const FORMAT: &str = "taxel readout";
 
-/// The version of that file which is written, and the only one so far.
+/// The version of the format that is written; there is no other so far.
 const VERSION: u64 = 1;
 
 impl Readout {
@@ -18,7 +18,7 @@ impl Readout {
     ///
     /// # Errors
     ///
-    /// `Format` where the text is no readout, one of a version that is not known, or holds parts that make no sense.
+    /// `Format` if the text is not a readout, has an unknown version, or has parts that are not valid.
     pub fn from_json(text: &str) -> Result<Self> {
         let format = |said: String| Error::Format(said);
         let mut value: Value = reading::from_text(text).map_err(|unfit| format(unfit.of("readout")))?;
@@ -37,7 +37,8 @@ impl Readout {
             }
             None => return Err(format(format!("readout: says no version, must be {VERSION}"))),
         }
-        // An encoder that is read as a part of another loses the names of its parameters.
+        // An encoder nested in another value would lose the parameter names from its errors, so it is read by itself
+        // first.
         if let Some(encoder) = object.get("encoder") {
             Encoder::from_json(&encoder.to_string()).map_err(|e| format(format!("readout: {e}")))?;
         }
@@ -46,7 +47,7 @@ impl Readout {
         Ok(readout)
     }
 
-    /// The readout as the text of its file: every number comes back as it was.
+    /// The readout as the text of its file; reading it returns exactly the same numbers.
     #[must_use]
     pub fn to_json(&self) -> String {
         #[derive(Serialize)]
@@ -56,7 +57,7 @@ impl Readout {
             #[serde(flatten)]
             readout: &'a Readout,
         }
-        // Numbers were checked to be finite, and nothing else in here can fail to be written.
+        // Serialising can fail only for numbers that are not finite, which the checks exclude.
         serde_json::to_string_pretty(&File { format: FORMAT, version: VERSION, readout: self }).unwrap_or_default()
     }
 }

@@ -1,4 +1,4 @@
-//! Files, checks, and zeroed taxels.
+//! Tests of readout files, checks, and zeroed taxels.
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -30,7 +30,7 @@ fn readout() -> Readout {
 fn a_file_gives_every_number_back() {
     let mut readout = readout();
     let weights = &mut readout.neurons.get_mut("lift").unwrap().weights;
-    // Numbers that a careless reader of decimals gets wrong by the last bit.
+    // Numbers that an inexact decimal reader changes in the last bit.
     weights[..6].copy_from_slice(&[
         0.1 + 0.2,
         1.0 / 3.0,
@@ -97,13 +97,13 @@ fn another_array_and_a_missing_tare_are_refused() {
     assert!(said.starts_with("array other of 63 x 64 taxels: the readout was trained on thesis"), "{said}");
     let said = readout().stream(&Array::thesis(), 192.0, None).err().unwrap().to_string();
     assert!(said.contains("tare"), "{said}");
-    // Without an array of its own a readout listens to any whose trains are as many.
+    // A readout without an array of its own accepts every array with the same number of trains.
     let tare =
         Tare { array: array.clone(), rest: vec![Some(0.0); 63 * 64], start_us: 0, stop_us: 1, note: String::new() };
     assert!(Readout { array: None, ..readout() }.stream(&array, 192.0, Some(&tare)).is_ok());
 }
 
-/// Presses on 6 x 6 taxels, at stamps of the wire, some of which are full of them.
+/// Presses on 6 x 6 taxels with time stamps of the wire, some of which are shared by many events.
 fn presses(random: &mut StdRng, array: &Array) -> Events {
     let (mut t, mut events, mut intensity) = (0, Events::empty(array.clone()), Intensities::default());
     for _ in 0..600 {
@@ -118,7 +118,7 @@ fn presses(random: &mut StdRng, array: &Array) -> Events {
     Events { intensity: Some(intensity), ..events }
 }
 
-/// The same events as if, after `z.t`, the taxel's values were lower by `rise`, and an event reported that then.
+/// The same events with the taxel's values lower by `rise` after `z.t`, and with an event that reports the change.
 fn lowered(mut events: Events, z: &Zeroing, rise: u16) -> Events {
     let at = events.t.partition_point(|&t| t <= z.t);
     let mut intensity = events.intensity.take().unwrap();
@@ -143,7 +143,7 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
     let array = Array::new(6, 6, 2.0, "small").unwrap();
     let rest = vec![Some(130.0); 36];
     let tare = Tare { array: array.clone(), rest, start_us: -1, stop_us: 0, note: String::new() };
-    let (mut count, mut heard) = (0, 0);
+    let (mut count, mut changed) = (0, 0);
     for (seed, name) in (0..40).zip(["contact_area", "moments"].into_iter().cycle()) {
         let mut random = StdRng::seed_from_u64(seed);
         let encoder = Encoder::from_json(&format!(r#"{{"name": "{name}"}}"#)).unwrap();
@@ -172,9 +172,9 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
         };
         let said = run(&events, &zeroings);
         assert_eq!(said, run(&low, &[]), "seed {seed}, {name}");
-        (count, heard) = (count + said.len(), heard + usize::from(said != run(&events, &[])));
+        (count, changed) = (count + said.len(), changed + usize::from(said != run(&events, &[])));
 
-        // Live: in pieces, time moved on between them, each zeroing before anything that is later than it.
+        // Live: pushed in pieces, with time advanced in between and each zeroing set before any later input.
         let mut live = readout.stream(&array, 192.0, Some(&tare)).unwrap();
         let (mut pieces, mut from) = (vec![], 0);
         while from < events.len() {
@@ -191,8 +191,8 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
         live.advance(events.t[599] + SILENCE_US, &mut pieces).unwrap();
         assert_eq!(pieces, said, "seed {seed}, {name}");
     }
-    assert!(count > 400, "something must be said to compare: {count}");
-    assert!(heard > 20, "a zeroing changes what is said: {heard} of 40");
+    assert!(count > 400, "there must be detections to compare: {count}");
+    assert!(changed > 20, "a zeroing changes the detections: {changed} of 40");
 }
 
 #[test]

@@ -1,22 +1,22 @@
-//! One neuron of a readout: its label, its state, and its crossings so far.
+//! A neuron of a readout in a stream: its label, its state, and its crossings so far.
 
 use crate::Result;
 use crate::detect::TrainedNeuron;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
 
-/// One neuron with its name.
+/// A neuron with its label.
 #[derive(Clone)]
 pub(super) struct NamedNeuron {
     pub label: String,
     neuron: Neuron,
     weights: Vec<f64>,
     threshold: f64,
-    /// By how much its crossings come later than the event: the encoder's latency and the trained delay, ms.
+    /// The delay of its crossings after the event: the encoder's latency plus the trained delay, ms.
     pub offset_ms: f64,
-    /// Started at the first spike, so that a grid has the same points wherever the input starts.
+    /// Started at the first spike, so that a grid has the same points wherever the input begins.
     pub stream: Option<NeuronStream>,
     pub crossings: Vec<OutputSpike>,
-    /// When the latest input came that may rest on a repaired taxel, ms.
+    /// The time of the latest input that may rest on a repaired taxel, ms.
     pub repaired: Option<f64>,
 }
 
@@ -39,7 +39,7 @@ impl NamedNeuron {
     ///
     /// # Errors
     ///
-    /// As [`NeuronStream::push`].
+    /// Those of [`NeuronStream::push`].
     pub fn push(&mut self, t: f64, input: u32) -> Result<()> {
         let stream = match &mut self.stream {
             Some(stream) => stream,

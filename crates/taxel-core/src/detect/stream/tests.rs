@@ -1,4 +1,4 @@
-//! Against one neuron run by itself, and wherever the input is cut.
+//! Compares a stream with a single neuron, and with itself when its input is divided elsewhere.
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
@@ -7,7 +7,8 @@ use super::*;
 use crate::neuron::{AfterSpike, Neuron, Time};
 use crate::{Events, Intensities};
 
-/// Encodes each event as a signed spike of its taxel's train at its stamp, a picture as a spike of each loaded taxel.
+/// An encoder that turns each event into a signed spike of its taxel's train at its stamp, and a picture into a spike
+/// of each loaded taxel.
 #[derive(Clone)]
 struct Plain {
     latency_ms: f64,
@@ -67,7 +68,7 @@ fn stream(neuron: &Neuron, latency_ms: f64, period_us: f64) -> ReadoutStream {
     )
 }
 
-/// Events with the stamps of 192 us frames, some frames full of them, some silences long.
+/// Events with the stamps of 192 us frames; some frames have many events, some pauses are long.
 fn events(seed: u64, n: usize) -> Events {
     let mut random = StdRng::seed_from_u64(seed);
     let mut events = Events::empty(array());
@@ -120,7 +121,7 @@ fn pieces_and_moves_of_time_change_nothing() {
             let to = (from + random.random_range(0..40)).min(400);
             live.push_events(events.view().piece(from..to), &mut pieces).unwrap();
             from = to;
-            // Time may move on up to the next event, itself excluded, but no farther.
+            // Time may be advanced up to the next event, but not beyond its time.
             let last = live.now().unwrap_or(events.t[0]);
             let next = events.t.get(to).copied().unwrap_or(end);
             for _ in 0..random.random_range(0..3) {

@@ -1,4 +1,4 @@
-//! CONE-R (6.12 to 6.14): the best weights where no weights satisfy all targets and all silence, solved to a proven gap.
+//! CONE-R (6.12 to 6.14): the best weights when no weights satisfy all targets and all silence, solved to a proven gap.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,31 +18,32 @@ use crate::{Result, SpikeTrains, Stop, problem};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConeR {
-    /// The neuron; its step is the step of the silent rows.
+    /// The neuron; its grid step is also the step of the silent rows.
     pub neuron: Neuron,
-    /// What the potential shall reach behind a target, in thresholds.
+    /// The potential that B requires after a target, in thresholds.
     pub kappa: f64,
-    /// How far behind the target, ms; `0.1 tau` where left out, as in Tables 6.1 and 6.2.
+    /// The delay after the target at which B requires that potential, ms; by default `0.1 tau`, as in Tables 6.1 and
+    /// 6.2.
     pub delta_t_ms: Option<f64>,
-    /// `lambda_1` to `lambda_5`: l1, l2, B, C, D.
+    /// `lambda_1` to `lambda_5`: the factors of l1, l2, B, C and D.
     pub lambdas: [f64; 5],
     /// Least weight, mV.
     pub lb: Bound,
     /// Largest weight, mV.
     pub ub: Bound,
-    /// What B is divided by.
+    /// The normaliser of B.
     pub divide_b_by: Divisor,
-    /// The l2 term as norm or as square.
+    /// Whether the l2 term is the norm or its square.
     pub norm: Norm,
-    /// How far below the threshold silence shall stay, mV.
+    /// The distance that silence must keep below the threshold, mV.
     pub margin: f64,
-    /// Where silent rows end, ms; the later of the pattern's end and last target + `tau` where left out.
+    /// The end of the silent rows, ms; by default the later of the pattern's end and its last target + `tau`.
     pub horizon: Option<f64>,
     /// The relative gap between objective and proven bound at which a fit counts as solved.
     pub tolerance: f64,
-    /// Who solves.
+    /// The solver to begin with.
     pub engine: Engine,
-    /// The time after which the caller requests the best so far, s; this crate reads no clock.
+    /// The time after which the caller requests the best weights so far, s; this crate reads no clock.
     pub max_seconds: Option<f64>,
 }
 
@@ -79,13 +80,13 @@ impl ConeR {
         max_seconds: "s", Range::ABOVE_0;
     }
 
-    /// Its parameters, with their defaults and ranges.
+    /// The parameters with their defaults and ranges.
     #[must_use]
     pub fn described() -> Described {
         Described::by(&Self::default(), &[], Self::RANGES)
     }
 
-    /// Checks every parameter.
+    /// Checks every parameter, and that the neuron runs on a grid.
     ///
     /// # Errors
     ///
@@ -102,37 +103,38 @@ impl ConeR {
         check_bounds(&self.lb, &self.ub)
     }
 
-    /// Delay after a target at which B takes the potential, ms.
+    /// The delay after a target at which B evaluates the potential, ms.
     #[must_use]
     pub fn delta_t(&self) -> f64 {
         self.delta_t_ms.unwrap_or(0.1 * self.neuron.tau)
     }
 
-    /// Where the silent rows of pattern `p` end, ms, and how many grid points that makes.
+    /// The end of the silent rows of pattern `p`, ms, and the number of grid points up to it.
     ///
     /// # Errors
     ///
-    /// `Problem` where a target, or the pattern's start, lies behind the horizon.
+    /// `Problem` if a target, or the pattern's start, is after the horizon.
     pub(crate) fn end_of(&self, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<(f64, f64)> {
         let end = end_of(&self.neuron, self.horizon, p, pattern, targets)?;
         Ok((end, self.neuron.points(pattern.start, end)))
     }
 
-    /// The same with all potentials in units of this many mV.
+    /// These parameters with all potentials in units of `unit` mV.
     fn in_units(&self, unit: f64) -> Self {
         let (lb, ub) = (self.lb.times(1.0 / unit), self.ub.times(1.0 / unit));
         Self { neuron: self.neuron.in_units(unit), lb, ub, margin: self.margin / unit, ..self.clone() }
     }
 }
 
-/// The multipliers that prove a fit: those that are not 0, by row (the silent ones, then the targets).
+/// The multipliers that prove a fit: the nonzero ones, by row (silent rows first, then targets).
 ///
-/// As shares of the row's weight in 6.14, of C's twice: from 0 to 1 on a silent row, from -1/2 to 1/2 at a target.
+/// Each is a share of its row's weight in 6.14 (of twice that weight for C): from 0 to 1 for a silent row, from -1/2 to
+/// 1/2 for a target.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Shares {
-    /// Ascending.
+    /// The numbers of the rows, ascending.
     pub rows: Vec<usize>,
-    /// One a row.
+    /// The share of each of these rows.
     pub values: Vec<f64>,
 }
 
@@ -141,19 +143,19 @@ pub struct Shares {
 pub struct ConeRFit {
     /// Weights and objective.
     pub fit: Fit,
-    /// Rows in the last cone program.
+    /// The number of rows in the last cone program.
     pub rows: usize,
-    /// What a fit nearby may start from, beside the weights.
+    /// The multipliers, from which a similar fit may start together with the weights.
     pub multipliers: Shares,
     /// Targets, as (pattern, target), that no weights within the bounds bring to the threshold.
     pub unreachable: Vec<(usize, usize)>,
-    /// Output spikes on the training patterns that follow another one, with no target between, within `tau`.
+    /// Output spikes on the training patterns that follow a previous one within `tau` without a target in between.
     pub refires: usize,
 }
 
-/// The problem of some examples, its rows made once, solved for many `lambdas`, `kappa`, bounds and divisors.
+/// The rows of a set of examples, computed once and solved for many `lambdas`, `kappa`, bounds and divisors.
 ///
-/// Inside, potentials are in units of `Neuron::unit` mV.
+/// Internally all potentials are in units of `Neuron::unit` mV.
 #[derive(Debug, Clone)]
 pub struct ConeRProblem {
     base: ConeR,
@@ -163,11 +165,11 @@ pub struct ConeRProblem {
 }
 
 impl ConeRProblem {
-    /// Lays out the rows of these patterns and targets (ms).
+    /// Computes the rows of these patterns and targets (ms).
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters or examples that make no sense (names pattern and target); `Interrupted`.
+    /// `Problem` for parameters or examples that are not valid (names pattern and target); `Interrupted`.
     pub fn new(parameters: &ConeR, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
         parameters.check()?;
         let neuron = &parameters.neuron;
@@ -182,7 +184,7 @@ impl ConeRProblem {
         Self::laid_out(parameters, patterns, targets, &ends, stop)
     }
 
-    /// Lays out one pattern, which has been checked: others will follow.
+    /// Computes the rows of a first pattern, which the caller has checked; `push` adds the others.
     pub(crate) fn of_one(
         parameters: &ConeR,
         pattern: &SpikeTrains,
@@ -211,7 +213,7 @@ impl ConeRProblem {
         Ok(Self { base, patterns: patterns.to_vec(), statement, rows })
     }
 
-    /// Adds one more pattern, which has been checked; where the caller stops it, all is as before.
+    /// Adds a pattern, which the caller has checked; if the caller stops it, nothing changes.
     pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64, stop: Stop<'_>) -> Result<()> {
         self.statement.push(pattern, targets, end, stop)?;
         if let Err(error) = self.rows.push(&self.statement, self.base.delta_t(), stop) {
@@ -222,7 +224,7 @@ impl ConeRProblem {
         Ok(())
     }
 
-    /// Takes the first pattern away; gives how many silent and free rows, and how many targets, went with it.
+    /// Removes the first pattern; returns the number of grid rows and the number of targets removed with it.
     pub(crate) fn drop_first(&mut self) -> (usize, usize) {
         let gone = (self.rows.silent.of_first(), self.rows.targets.of_first());
         self.rows.drop_first();
@@ -243,19 +245,19 @@ impl ConeRProblem {
         self.rows.silent.len()
     }
 
-    /// How many rows there are: silent ones, grid points at which nothing is asked, targets.
+    /// The number of rows: grid points, with or without a requirement, and targets.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows.silent.len() + self.rows.targets.len()
     }
 
-    /// How many silent rows there are.
+    /// The number of rows that require silence.
     #[must_use]
     pub fn silent_rows(&self) -> usize {
         self.rows.silent.limit.iter().filter(|l| l.is_finite()).count()
     }
 
-    /// 6.14 with these parameters (in units of this problem).
+    /// The objective 6.14 with these parameters, in this problem's units.
     fn objective(&self, parameters: &ConeR, silent: &[f64]) -> Result<Objective> {
         let bounds = bounds_of(&parameters.lb, &parameters.ub, self.rows.trains)?;
         let ConeR { lambdas, kappa, norm, divide_b_by: divisor, .. } = *parameters;
@@ -268,14 +270,15 @@ impl ConeRProblem {
 
     /// Fits the weights.
     ///
-    /// `parameters` may differ from those that the problem was made with in `lambdas`, `kappa`, bounds, `divide_b_by`,
-    /// `norm`, `tolerance` and `engine`; the rest is in the rows. `silent` are the largest weights (mV, without sign) of trains
-    /// without a spike that were left out of the rows: the normalisers count them. `start` are weights of a similar fit, and its multipliers
-    /// where it was of these very rows: the closer, the quicker. Where `stop` asks for an end, the best so far comes back.
+    /// `parameters` may differ from those of the problem in `lambdas`, `kappa`, bounds, `divide_b_by`, `norm`,
+    /// `tolerance` and `engine`; the others are part of the rows. `silent` are the largest absolute weights (mV) of
+    /// trains without a spike, which were left out of the rows but count in the normalisers. `start` are the weights of
+    /// a similar fit, with its multipliers if that fit had the same rows; a closer start is faster. If a stop is
+    /// requested, `fit` returns the best weights so far.
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters that make no sense or that need other rows.
+    /// `Problem` for parameters that are not valid or that need other rows.
     pub fn fit(
         &self,
         parameters: &ConeR,
@@ -287,7 +290,7 @@ impl ConeRProblem {
         self.fit_counting(parameters, silent, start, None, progress, stop)
     }
 
-    /// As `fit`; counts refiring on one pattern alone where one is named.
+    /// Fits like `fit`; counts refiring on one pattern alone if it is named.
     pub(crate) fn fit_counting(
         &self,
         parameters: &ConeR,

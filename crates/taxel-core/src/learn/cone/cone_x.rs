@@ -1,9 +1,9 @@
-//! CONE-X (6.9 to 6.11): weights that satisfy every row of target and silence exactly, or a proof that there are none.
+//! CONE-X (6.9 to 6.11): weights that satisfy every row of targets and silence exactly, or a proof that no weights do.
 //!
-//! Of a million silent instants a few hundred bind. A round solves the problem over a working set of rows, evaluates all
-//! silence at the weights found, and adds the worst instant of each stretch in which it is violated. The shortest weights
-//! (l2 alone, or no objective) come from a dual active set, whose every state is a lower bound; they also decide whether
-//! there are any. Other objectives go on from there.
+//! Of a million silent instants, a few hundred are binding. Each round solves the problem over a working set of rows,
+//! evaluates silence everywhere at the resulting weights, and adds the worst instant of each interval in which it is
+//! violated. A dual active set finds the shortest weights (l2 alone, or no objective), with a lower bound at every
+//! step, and also decides feasibility. Other objectives continue from its weights.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,9 +19,10 @@ use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// The margin and the slope in continuous time where none is given, mV and mV/ms, at the default threshold; else in proportion.
+/// The default margin and slope in continuous time, mV and mV/ms at the default threshold, in proportion to it
+/// otherwise.
 const MARGIN: f64 = 1e-3;
-/// Where no weights keep it, a smaller one is tried, down to this share of it.
+/// If no weights keep the default margin, it is multiplied by this factor, down to `LEAST_SHARE` of the default.
 const SMALLER: f64 = 0.1;
 const LEAST_SHARE: f64 = 0.99e-3;
 
@@ -29,42 +30,45 @@ const LEAST_SHARE: f64 = 0.99e-3;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConeX {
-    /// The neuron; on the grid its step is the step of the silent rows.
+    /// The neuron; on the grid its step is also the step of the silent rows.
     pub neuron: Neuron,
-    /// The potential that B aims at behind a target, in thresholds.
+    /// The potential that B aims at after a target, in thresholds.
     pub kappa: f64,
-    /// How far behind the target, ms; `0.1 tau` where left out, as in Table 6.1.
+    /// The delay after the target at which B evaluates the potential, ms; by default `0.1 tau`, as in Table 6.1.
     pub delta_t_ms: Option<f64>,
-    /// `lambda_1` to `lambda_3`: l1, l2, B; only their ratios matter. All 0: any weights that meet the rows.
+    /// `lambda_1` to `lambda_3`: the factors of l1, l2 and B; only their ratios matter. All 0: any weights that satisfy
+    /// the rows.
     pub lambdas: [f64; 3],
-    /// Least weight, mV, one for all or one a synapse.
+    /// Least weight, mV, one for all or one per synapse.
     pub lb: Bound,
-    /// Largest weight, mV, one for all or one a synapse.
+    /// Largest weight, mV, one for all or one per synapse.
     pub ub: Bound,
-    /// What B is divided by.
+    /// The normaliser of B.
     pub divide_b_by: Divisor,
-    /// The l2 term as norm or as square.
+    /// Whether the l2 term is the norm or its square.
     pub norm: Norm,
-    /// How far below the threshold silence shall stay, mV; where left out `theta_0` / 300 in continuous time, 0 on the grid.
+    /// The distance that silence must keep below the threshold, mV; by default `theta_0` / 300 in continuous time, 0 on
+    /// the grid.
     pub margin: Option<f64>,
-    /// How steeply that margin falls to 0 at a target, mV/ms; continuous time only, `theta_0` / 300 a ms where left out.
+    /// The slope with which that margin falls to 0 towards a target, mV/ms; continuous time only, by default
+    /// `theta_0` / 300 per ms.
     pub slope: Option<f64>,
-    /// Where silence ends, ms, one for all or one a pattern; the later of a pattern's end and its last target + `tau` where
-    /// left out.
+    /// The end of silence, ms, one for all or one per pattern; by default the later of a pattern's end and its last
+    /// target + `tau`.
     pub horizon: Option<Horizon>,
     /// The relative gap between objective and proven bound at which a fit counts as solved.
     pub tolerance: f64,
-    /// The time after which the caller requests the best so far, s; this crate reads no clock.
+    /// The time after which the caller requests the best weights so far, s; this crate reads no clock.
     pub max_seconds: Option<f64>,
 }
 
-/// Where silence ends, ms.
+/// The end of silence, ms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "must be a number, or one a pattern, ms")]
 pub enum Horizon {
     /// The same in all patterns.
     All(f64),
-    /// One a pattern.
+    /// One per pattern.
     Each(Vec<f64>),
 }
 
@@ -78,7 +82,7 @@ impl Numbers for Horizon {
 }
 
 impl Horizon {
-    /// That of pattern `p`.
+    /// The horizon of pattern `p`.
     fn at(&self, p: usize) -> f64 {
         match self {
             Self::All(value) => *value,
@@ -130,7 +134,7 @@ impl ConeX {
         max_seconds: "s", Range::ABOVE_0;
     }
 
-    /// Its parameters, with their defaults and ranges.
+    /// The parameters with their defaults and ranges.
     #[must_use]
     pub fn described() -> Described {
         Described::by(&Self::default(), &[], Self::RANGES)
@@ -157,13 +161,13 @@ impl ConeX {
         Ok(())
     }
 
-    /// Delay after a target at which B takes the potential, ms.
+    /// The delay after a target at which B evaluates the potential, ms.
     #[must_use]
     pub fn delta_t(&self) -> f64 {
         self.delta_t_ms.unwrap_or(0.1 * self.neuron.tau)
     }
 
-    /// The margin that silence keeps.
+    /// The margin of silence, with its defaults.
     #[must_use]
     pub fn margin(&self) -> Margin {
         let continuous = self.neuron.time == Time::Continuous;
@@ -171,7 +175,7 @@ impl ConeX {
         Margin { height: self.margin.unwrap_or(left_out), slope: self.slope.unwrap_or(left_out) }
     }
 
-    /// The same with all potentials in units of this many mV.
+    /// These parameters with all potentials in units of `unit` mV.
     fn in_units(&self, unit: f64) -> Self {
         let Margin { height, slope } = self.margin().times(1.0 / unit);
         let neuron = self.neuron.in_units(unit);
@@ -180,37 +184,39 @@ impl ConeX {
     }
 }
 
-/// Why a search ended early.
+/// Reasons for a search that ended early.
 const ASKED: &str = "asked to stop, by max_seconds or Ctrl-C";
 const UNDECIDED: &str = "rows that rounding cannot tell apart are neither met nor refuted";
 
 /// A fit of CONE-X.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConeXFit {
-    /// Weights and objective; its gap is over all weights that keep the whole margin.
+    /// Weights and objective; its gap refers to all weights that keep the whole margin.
     pub fit: Fit,
-    /// How far the worst row is broken: targets missed, silence with half its margin, mV.
+    /// The largest violation of any row: targets, and silence with half its margin, mV.
     pub violation: f64,
-    /// The margin that holds; on the grid the least threshold - potential over the silent points, as `height`.
+    /// The margin that the weights keep; on the grid `height` is the least threshold - potential over the silent
+    /// points.
     pub margin: Margin,
-    /// The margin of the last problem: smaller than the first where the caller fixed none and no weights keep that.
+    /// The margin of the last problem solved: smaller than the default if the caller fixed none and no weights keep the
+    /// default.
     pub asked: Margin,
-    /// Why a fit is stopped, or why the objective of a solved one is not proven to lie within the tolerance.
+    /// Why a fit is stopped, or why the objective of a solved fit is not proven to within the tolerance.
     pub reason: Option<String>,
-    /// The rows that bind, with their multipliers: a start for a similar problem.
+    /// The binding rows with their multipliers: a start for a similar problem.
     pub held: Vec<(Row, f64)>,
-    /// The proof, where there are no weights.
+    /// The proof that no weights exist, if the fit is infeasible.
     pub certificate: Option<Certificate>,
 }
 
-/// The problem of some examples, ready to be solved.
+/// The problem that a set of examples states, ready to be solved.
 ///
-/// Inside, potentials are in units of `Neuron::unit` mV.
+/// Internally all potentials are in units of `Neuron::unit` mV.
 #[derive(Debug, Clone)]
 pub struct ConeXProblem {
     parameters: ConeX,
     exact: Exact,
-    /// Whether the caller fixed no margin.
+    /// Whether the caller left the margin to its default, so that it may be reduced.
     free_margin: bool,
 }
 
@@ -219,7 +225,7 @@ impl ConeXProblem {
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters or examples that make no sense (names pattern and target); `Interrupted`.
+    /// `Problem` for parameters or examples that are not valid (names pattern and target); `Interrupted`.
     pub fn new(parameters: &ConeX, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
         parameters.check()?;
         check_examples(&parameters.neuron, patterns, targets)?;
@@ -269,22 +275,22 @@ impl ConeXProblem {
         Ok(Self { exact, ..self.clone() })
     }
 
-    /// What a potential of 1 is inside, mV.
+    /// The internal unit of potentials, mV.
     fn unit(&self) -> f64 {
         self.exact.statement.unit
     }
 
-    /// What margin its rows have, mV and mV/ms.
+    /// The margin of the rows, mV and mV/ms.
     #[must_use]
     pub fn margin(&self) -> Margin {
         self.exact.statement.margin.times(self.unit())
     }
 
-    /// A row, with or without its margin, mV (a slope row: mV/ms).
+    /// The coefficients and limit of a row, with or without its margin, mV (of a slope row mV/ms).
     ///
     /// # Errors
     ///
-    /// `Problem` where there is no such row.
+    /// `Problem` if there is no such row.
     pub fn row(&self, row: Row, margin: bool) -> Result<Stated> {
         let mut stated = self.exact.statement.state(row)?;
         stated.limit += if margin { 0.0 } else { self.exact.statement.margin_of(row) };
@@ -292,7 +298,7 @@ impl ConeXProblem {
         Ok(stated)
     }
 
-    /// The weights that are allowed, mV.
+    /// The bounds on the weights, mV.
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         let Bounds { lower, upper } = &self.exact.objective.bounds;
@@ -300,24 +306,24 @@ impl ConeXProblem {
         Bounds { lower: times(lower), upper: times(upper) }
     }
 
-    /// The row of B behind a target: coefficients, and `kappa` thresholds.
+    /// The row of B after a target: its coefficients, and `kappa` thresholds as limit.
     ///
     /// # Errors
     ///
-    /// `Problem` where there is no such target.
+    /// `Problem` if there is no such target.
     pub fn behind(&self, pattern: usize, target: usize) -> Result<Stated> {
         let mut stated = self.exact.statement.behind(pattern, target, self.parameters.delta_t())?;
         stated.limit *= self.parameters.kappa * self.unit();
         Ok(stated)
     }
 
-    /// Finds the weights, or the proof that there are none; where it is stopped, the best so far.
+    /// Finds the weights, or a proof that there are none; if stopped, returns the best weights so far.
     ///
-    /// `start` are the rows that bound in an earlier fit of a similar problem, with their multipliers.
+    /// `start` are the binding rows of an earlier fit of a similar problem, with their multipliers.
     ///
     /// # Errors
     ///
-    /// `Problem` for a start that makes no sense.
+    /// `Problem` for a start that is not valid.
     pub fn fit(&self, start: &[(Row, f64)], progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<ConeXFit> {
         let unit = self.unit();
         let start: Vec<(Row, f64)> = start.iter().map(|&(row, multiplier)| (row, multiplier / unit)).collect();
@@ -337,8 +343,8 @@ impl ConeXProblem {
                 found = self.undecided(&found);
                 break;
             }
-            let mut told = |round: Round| progress(Round { round: rounds + round.round, ..round });
-            found = self.exact.with_margin(margin, stop)?.solve(&start, &mut told, stop)?;
+            let mut notify = |round: Round| progress(Round { round: rounds + round.round, ..round });
+            found = self.exact.with_margin(margin, stop)?.solve(&start, &mut notify, stop)?;
             rounds += found.fit.rounds;
         }
         found.fit.rounds = rounds;
@@ -353,7 +359,8 @@ impl ConeXProblem {
         Ok(found)
     }
 
-    /// The result where infeasibility is proven for the least margin alone: smaller ones remain undecided.
+    /// The result if infeasibility is proven for the smallest margin alone, which leaves still smaller margins
+    /// undecided.
     fn undecided(&self, found: &ConeXFit) -> ConeXFit {
         let Margin { height, slope } = found.asked.times(self.unit());
         let proof = found.certificate.as_ref().map_or("", |proof| proof.text.as_str());
@@ -372,13 +379,13 @@ impl ConeXProblem {
 }
 
 impl Exact {
-    /// Finds the weights at this margin, or the proof that there are none.
+    /// Finds the weights at this margin, or a proof that there are none.
     fn solve(&self, start: &[(Row, f64)], progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<ConeXFit> {
         if let Some(certificate) = Certificate::of_one_target(&self.statement, &self.objective.bounds)? {
             return Ok(self.refuted(certificate, 0));
         }
         let Shortest { weights, held, rounds, end } = self.shortest(start, progress, stop)?;
-        // The other terms are never below 0.
+        // The other terms are at least 0, so a bound on the l2 term bounds the objective.
         let least = self.objective.of_square(self.bound_of_square(&held)?);
         let best = Best { weights, least, held, engine: Engine::Native, rounds };
         Ok(match end {
@@ -414,11 +421,11 @@ impl Exact {
         }
     }
 
-    /// Measures the weights over all rows, whatever engine they come from.
+    /// Evaluates the weights over all rows, whichever engine found them.
     fn report(&self, best: Best, cut_short: Option<&str>) -> Result<ConeXFit> {
         let Best { mut weights, least, held, engine, rounds } = best;
         let Bounds { lower, upper } = &self.objective.bounds;
-        // Weights at a bound may lie outside it by rounding.
+        // Rounding can move a weight across its bound.
         for ((w, &l), &u) in weights.iter_mut().zip(lower).zip(upper) {
             *w = w.clamp(l, u);
         }

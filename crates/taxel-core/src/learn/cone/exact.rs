@@ -1,4 +1,4 @@
-//! The problem of 6.11 at one margin: its rows, its objective, and by how much weights violate the rows.
+//! The problem of 6.11 at one margin: its rows, its objective, and the violations of rows by given weights.
 
 use std::sync::Arc;
 
@@ -10,33 +10,34 @@ use crate::neuron::{AT_EDGE, Grid, Time};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
-/// How far a target may be missed, mV.
+/// The largest violation of a target row that counts as satisfied, mV.
 pub(super) const MET: f64 = 1e-12;
-/// Silence counts as violated from this on, mV, and from this share of the sum of absolute weights on: rounding of the sweep.
+/// Silence counts as violated above this, mV, and above this share of the sum of absolute weights, which covers
+/// rounding.
 const BROKEN: f64 = 1e-13;
 const BROKEN_SHARE: f64 = 2e-16;
 /// The share of the margin that weights must keep to count as a solution.
 const KEPT_SHARE: f64 = 0.5;
-/// A spike at its target may differ from it by so many distances of neighbouring times.
+/// The largest difference between a spike and its target, in units of the last place of the time.
 const ROUNDINGS: f64 = 4.0;
-/// Rounds end without a verdict after so many.
+/// The number of rounds after which a fit ends without a verdict.
 pub(super) const MOST_ROUNDS: usize = 1000;
 
-/// A stated problem whose rows of targets and silence are hard constraints.
+/// A stated problem in which the rows of targets and silence are hard constraints.
 #[derive(Debug, Clone)]
 pub(super) struct Exact {
     pub(super) statement: Statement,
     pub(super) targets: Arc<Targets>,
     silence: Silence,
     pub(super) objective: Objective,
-    /// The relative gap at which the objective counts as least.
+    /// The relative gap at which the objective counts as minimal.
     pub(super) tolerance: f64,
 }
 
-/// The best weights so far, and what is known of them.
+/// The best weights so far, with a lower bound on their objective.
 pub(super) struct Best {
     pub(super) weights: Vec<f64>,
-    /// No weights have a smaller objective.
+    /// A lower bound on the objective of any weights.
     pub(super) least: f64,
     pub(super) held: Vec<(Row, f64)>,
     pub(super) engine: Engine,
@@ -44,7 +45,7 @@ pub(super) struct Best {
 }
 
 impl Exact {
-    /// Writes out the targets of a statement, lays out its silence, and normalises what is minimised.
+    /// Computes the target rows and the silence of a statement, and normalises the objective.
     pub(super) fn new(
         statement: Statement,
         delta_t: f64,
@@ -66,38 +67,39 @@ impl Exact {
         Ok(Self { statement, targets, silence, objective, tolerance: self.tolerance })
     }
 
-    /// 6.11 at these weights, by its terms.
+    /// The terms of 6.11 at these weights.
     pub(super) fn parts(&self, weights: &[f64]) -> Parts {
         self.objective.exact_parts(&self.targets, weights)
     }
 
-    /// How far the worst target is missed, mV.
+    /// The largest violation of a target row, mV.
     pub(super) fn missed(&self, weights: &[f64]) -> f64 {
         let missed = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         largest(missed.chain([0.0]))
     }
 
-    /// Where silence is broken with this share of the margin, by more than `tolerance`.
+    /// The instants at which silence with this share of the margin is violated by more than `tolerance`.
     pub(super) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
         self.silence.broken(weights, share, tolerance)
     }
 
-    /// The worst violation of silence with the share of the margin that a solution must keep, mV; negative where there is none.
+    /// The worst violation of silence with the share of the margin that a solution must keep, mV; negative if silence
+    /// holds.
     pub(super) fn worst(&self, weights: &[f64]) -> f64 {
         self.silence.worst(weights, KEPT_SHARE)
     }
 
-    /// How far silence may seem broken by rounding alone, mV.
+    /// The violation of silence that rounding alone can explain, mV.
     pub(super) fn rounding(&self, weights: &[f64]) -> f64 {
         let least = if self.is_grid() { MET } else { BROKEN };
         least.max(BROKEN_SHARE * weights.iter().map(|w| w.abs()).sum::<f64>())
     }
 
-    /// The first condition that these weights violate, with its pattern and time: silence with half its margin; the target
-    /// rows on the grid; the spikes of the neuron itself, run on the patterns.
+    /// The first condition that these weights violate, with its pattern and time: silence with half its margin; the
+    /// target rows on the grid; the spikes of the neuron itself, run on the patterns.
     ///
-    /// On the grid the neuron is not run without a margin, as it fires where a silent row holds with equality, nor where a
-    /// target is not a point.
+    /// On the grid the neuron is not run if the margin is 0, because it fires at a silent row that holds with equality,
+    /// nor if a target is not a grid point.
     pub(super) fn unmet(&self, weights: &[f64]) -> Result<Option<String>> {
         let unit = self.statement.unit;
         let worst = self.silence.broken(weights, KEPT_SHARE, self.rounding(weights)).into_iter();
@@ -126,7 +128,7 @@ impl Exact {
         !self.is_grid() || margin.height > 0.0 && all_at_points()
     }
 
-    /// The first target at which the neuron itself, run on the patterns, does not fire, or the first spike elsewhere.
+    /// The first target at which the neuron, run on the patterns, does not fire, or its first spike elsewhere.
     fn misfire(&self, weights: &[f64]) -> Result<Option<String>> {
         for (p, example) in self.statement.examples.iter().enumerate() {
             let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, example.start)?);
@@ -159,19 +161,20 @@ impl Exact {
         self.statement.neuron.time == Time::Grid
     }
 
-    /// The largest share of the margin that holds, 0 where silence is broken; on the grid the least threshold - potential.
+    /// The largest share of the margin that holds, 0 if silence is violated; on the grid the least threshold -
+    /// potential.
     pub(super) fn kept_margin(&self, weights: &[f64]) -> Margin {
         let margin = self.statement.margin;
         if self.is_grid() {
             return Margin { height: margin.height - self.silence.worst(weights, 1.0), slope: 0.0 };
         }
-        // At the worst instants potential + share margin = threshold gives the next share; the shares only fall.
+        // At the worst instants, potential + share * margin = threshold gives the next share; the shares only decrease.
         let mut share = 1.0;
         loop {
             let broken = self.broken(weights, share, self.rounding(weights));
             let less = broken.iter().map(|peak| peak.excess / self.statement.margin_of(peak.row()));
             let next = share - largest(less.chain([0.0]));
-            // Weights of a fit that was stopped may keep none at all.
+            // The weights of a fit that was stopped may keep no margin at all.
             if next.is_nan() || next <= 0.0 {
                 return margin.times(0.0);
             }
@@ -183,7 +186,7 @@ impl Exact {
     }
 }
 
-/// Slope rows, which no sweep prices.
+/// The slope rows, which the sweep over silence does not evaluate.
 #[derive(Debug)]
 pub(super) struct Slopes(pub(super) Vec<(Row, Stated)>);
 
@@ -196,7 +199,7 @@ impl Slopes {
         Ok(Self(rows.map(|row| Ok((row, statement.state(row)?))).collect::<Result<_>>()?))
     }
 
-    /// Those that are broken even with so much less slope.
+    /// The slope rows that are violated even when their limit is relaxed by `left_out`.
     pub(super) fn broken(&self, weights: &[f64], left_out: f64) -> Vec<usize> {
         let kept = |row: &Stated| dot(&row.coefficients, weights) <= row.limit + left_out;
         (0..self.0.len()).filter(|&k| !kept(&self.0[k].1)).collect()

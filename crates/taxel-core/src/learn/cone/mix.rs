@@ -1,4 +1,5 @@
-//! Objectives of more than the shortest weights: l1, B and sums of terms, by rounds around the solver for few rows.
+//! Objectives beyond the shortest weights (l1, B and sums of terms): row generation around the solver for small working
+//! sets.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -11,20 +12,21 @@ use crate::learn::statement::{Bounds, Peak, Row, Stated, Targets, largest};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
-/// As for the shortest weights, with more room: rows that are nearly the same are harder here.
+/// Cuts demand the full margin, but only violations of this share of it are cut. The share is smaller than that for the
+/// shortest weights, because nearly identical rows are harder for this solver.
 const ASKED_SHARE: f64 = 0.9;
-/// The first rounds only collect rows, at this tolerance: silence counts as violated from the first share of `theta_0` on, and
-/// rows with more room than the second share are dropped.
+/// The first rounds only collect rows, at a loose tolerance: silence counts as violated above `NEAR_SHARE` of
+/// `theta_0`, and rows that are slack by more than `SLACK_SHARE` of it are dropped.
 const NEAR: f64 = 1e-3;
 const NEAR_SHARE: f64 = 1e-4;
 const SLACK_SHARE: f64 = 0.05;
-/// Rounds in which rows go: later ones only add, so that they end.
+/// The number of rounds in which rows may be dropped: later rounds only add rows, so that they terminate.
 const DROPPING: usize = 10;
-/// So near before a target, in `tau`, a row of silence is all but the target's own.
+/// A row of silence this close before a target, in `tau`, is nearly parallel to the target's row.
 const BESIDE: f64 = 1e-2;
 
 impl Exact {
-    /// Goes on from weights that meet every row.
+    /// Continues from weights that satisfy every row.
     pub(super) fn mix(
         &self,
         mut best: Best,
@@ -82,7 +84,7 @@ impl Exact {
                 continue;
             }
             best.engine = found.engine;
-            // Rows that bind here help the next fit, although the shortest weights do not need them.
+            // The binding rows of this objective help the next fit, although they do not bind at the shortest weights.
             for (&name, &multiplier) in rows.names.iter().zip(&found.inequality) {
                 if multiplier > 0.0 && !best.held.iter().any(|(held, _)| *held == name) {
                     best.held.push((name, 0.0));
@@ -99,19 +101,19 @@ impl Exact {
     }
 }
 
-/// The working set, written out.
+/// The working set as dense rows.
 struct Dense {
     targets: Arc<Targets>,
     below: Vec<f64>,
     limit: Vec<f64>,
-    /// Of the rows below.
+    /// The names of the rows in `below`.
     names: Vec<Row>,
     there: HashSet<(usize, u64)>,
     slopes: Slopes,
 }
 
 impl Dense {
-    /// All targets, and those of these rows that the problem has.
+    /// All target rows, and those of the given rows that the problem has.
     fn new(problem: &Exact, rows: impl Iterator<Item = Row>) -> Result<Self> {
         let statement = &problem.statement;
         let slopes = Slopes::new(statement)?;
@@ -147,8 +149,9 @@ impl Dense {
         if self.there.insert((pattern, t.to_bits())) {
             let row = Row::Silence { pattern, t };
             let Stated { mut coefficients, mut limit } = problem.statement.state(row)?;
-            // The difference to the target's row, which holds with equality, over the time between is a row for the slope, as
-            // long as the others. The two rows themselves are parallel to rounding.
+            // Near a target the two rows are parallel to within rounding. Their difference divided by the time between
+            // them limits the slope instead and is as long as the other rows; it is equivalent because the target's row
+            // holds with equality.
             let tau = problem.statement.neuron.tau;
             if let Some((target, at)) = self.targets.next(pattern, t).filter(|(target, _)| target - t < BESIDE * tau) {
                 let steep = tau / (target - t);
@@ -185,7 +188,7 @@ impl Dense {
         Ok(self.names.len() > before)
     }
 
-    /// Drops rows without a multiplier that have this much room; returns which rows remain.
+    /// Drops rows without a multiplier that are slack by more than `room`; returns which rows remain.
     fn drop_slack(&mut self, weights: &[f64], multipliers: &[f64], room: f64) -> Vec<bool> {
         let n = weights.len();
         let most = multipliers.iter().fold(0.0, |m: f64, z| m.max(*z));
@@ -202,7 +205,7 @@ impl Dense {
         keep
     }
 
-    /// How far the worst row is missed.
+    /// The largest violation of any row of the working set.
     fn missed(&self, weights: &[f64]) -> f64 {
         let n = weights.len();
         let equal = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());

@@ -1,4 +1,4 @@
-//! The shortest weights that meet every row: row generation around the dual active set.
+//! The shortest weights that satisfy every row: row generation around the dual active set.
 
 use std::collections::HashSet;
 
@@ -8,24 +8,24 @@ use crate::learn::fit::{Left, Round};
 use crate::learn::statement::{Certificate, Peak, Row, Statement};
 use crate::{Result, Stop, problem};
 
-/// Cuts demand the full margin, but only violations of this share of it are cut: each cut leaves room around it, so that
-/// rounds end.
+/// Cuts demand the full margin, but only violations of this share of it are cut: a cut then also settles the instants
+/// next to it, so the rounds terminate.
 const ASKED_SHARE: f64 = 0.999;
-/// The worst of the violated rows enter, this share of them and no fewer rows than that: weights that satisfy them often
-/// satisfy the others.
+/// This share of the violated rows, but at least `ENTER_LEAST` of them, enters at once, worst first: weights that
+/// satisfy the worst rows often satisfy the others.
 const ENTER_SHARE: f64 = 0.4;
 const ENTER_LEAST: usize = 100;
-/// A proof of so many rows or less is made one in which every row is needed.
+/// Proofs of at most this many rows are reduced until every row is needed.
 const FEW: usize = 60;
 
-/// How the rounds of the shortest weights ended.
+/// How row generation for the shortest weights ended.
 pub(super) enum End {
     Met,
     Infeasible(Certificate),
     Stopped,
 }
 
-/// The result of the rounds of the shortest weights.
+/// The result of row generation for the shortest weights.
 pub(super) struct Shortest {
     pub(super) weights: Vec<f64>,
     pub(super) held: Vec<(Row, f64)>,
@@ -34,7 +34,7 @@ pub(super) struct Shortest {
 }
 
 impl Exact {
-    /// Row generation around the dual active set.
+    /// Generates rows around the dual active set until none is violated.
     pub(super) fn shortest(
         &self,
         start: &[(Row, f64)],
@@ -62,7 +62,8 @@ impl Exact {
                     if !ended && weights != before && working.cut(&self.statement, &broken, &flat)? {
                         continue;
                     }
-                    // Rounds that no longer move a weight end here; `report` checks whether the rows are satisfied.
+                    // Row generation ends once rounds no longer change the weights; `report` checks whether the rows
+                    // are satisfied.
                     if !ended || (broken.is_empty() && flat.is_empty()) { End::Met } else { End::Stopped }
                 }
             };
@@ -71,7 +72,7 @@ impl Exact {
         }
     }
 
-    /// The proof, of as few rows as can be found quickly.
+    /// The proof of infeasibility, with as few rows as can be found quickly.
     fn refutation(&self, rows: Vec<(Row, f64)>, stop: Stop<'_>) -> Result<Option<Certificate>> {
         let Some(proof) = Certificate::check(&self.statement, &self.objective.bounds, rows.clone())? else {
             return Ok(None);
@@ -79,7 +80,7 @@ impl Exact {
         if rows.len() > FEW {
             return Ok(Some(proof));
         }
-        // Rows that explain least to a reader are tried first.
+        // Rows that explain least to a reader are removed first.
         let worth = |row: &Row| match row {
             Row::Slope { .. } => 0,
             Row::Silence { .. } => 1,
@@ -88,11 +89,11 @@ impl Exact {
         let mut kept: Vec<Row> = rows.iter().map(|r| r.0).collect();
         kept.sort_by_key(worth);
         let (mut fewest, mut needed) = (proof.clone(), 0);
-        // All rows before `needed` are needed: without any of them the others can be satisfied.
+        // All rows before `needed` are needed: without any one of them the others can be satisfied.
         while needed < kept.len() && !stop.asked() {
             let others = kept.iter().enumerate().filter(|(k, _)| *k != needed).map(|(_, row)| *row).collect::<Vec<_>>();
             match self.conflict(&others, stop)? {
-                // A proof that needs no margin stays one.
+                // A proof that holds without any margin must not be replaced by one that needs the margin.
                 Some(fewer) if fewer.at_all || !proof.at_all => {
                     kept.retain(|row| fewer.rows.iter().any(|r| r.0 == *row));
                     fewest = fewer;
@@ -121,7 +122,7 @@ impl Exact {
         Certificate::check(&self.statement, &self.objective.bounds, named(&targets, &others, &ray.multipliers))
     }
 
-    /// A bound on `|w|^2` below, from any multipliers: what the Lagrangian comes to at least within the bounds.
+    /// A lower bound on `|w|^2` by any multipliers: the minimum of the Lagrangian within the bounds.
     pub(super) fn bound_of_square(&self, held: &[(Row, f64)]) -> Result<f64> {
         let trains = self.statement.trains;
         let (mut sum, mut row, mut allowed) = (vec![0.0; trains], vec![0.0; trains], 0.0);
@@ -140,16 +141,16 @@ impl Exact {
     }
 }
 
-/// The engine with the names of its rows.
+/// The dual active set with the names of its rows.
 struct Working {
     engine: DualActiveSet,
     targets: Vec<Row>,
-    /// By number of the inequality.
+    /// The names of the inequalities, by their number.
     names: Vec<Row>,
     /// Silent rows in the working set, by pattern and time.
     there: HashSet<(usize, u64)>,
     slopes: Slopes,
-    /// By slope row, its number in the working set.
+    /// The number of each slope row in the working set.
     ids: Vec<Option<RowId>>,
     row: Vec<f64>,
 }
@@ -197,7 +198,7 @@ impl Working {
                         multipliers.inequalities.push((id, multiplier.max(0.0)));
                     }
                 }
-                // Rows that this problem does not have are no help to it.
+                // Rows that this problem does not have are skipped.
                 Row::Silence { pattern, t } => {
                     if statement.is_asked(pattern, t) && !self.there.contains(&(pattern, t.to_bits())) {
                         let id = self.add(statement, row)?;
@@ -220,7 +221,7 @@ impl Working {
         Ok(id)
     }
 
-    /// The slope rows out of the working set that are broken, even with this much less slope.
+    /// The slope rows outside the working set that are violated even when their limit is relaxed by `left_out`.
     fn flat(&self, weights: &[f64], left_out: f64) -> Vec<usize> {
         let mut broken = self.slopes.broken(weights, left_out);
         broken.retain(|&k| self.ids[k].is_none());
@@ -231,7 +232,7 @@ impl Working {
         self.targets.len() + self.there.len()
     }
 
-    /// Drops rows that do not bind and adds the worst of the violated ones; returns whether any row is new.
+    /// Drops rows that are not binding and adds the worst of the violated ones; returns whether any row is new.
     fn cut(&mut self, statement: &Statement, broken: &[Peak], flat: &[usize]) -> Result<bool> {
         let mut new: Vec<&Peak> = broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
         new.sort_by(|a, b| b.excess.total_cmp(&a.excess));
@@ -261,7 +262,7 @@ impl Working {
     }
 }
 
-/// Multipliers by name.
+/// The multipliers with the names of their rows.
 fn named(targets: &[Row], others: &[Row], multipliers: &Multipliers) -> Vec<(Row, f64)> {
     let targets = targets.iter().copied().zip(multipliers.equalities.iter().copied());
     let others = multipliers.inequalities.iter().map(|&(id, z)| (others[id.index()], z));

@@ -1,9 +1,10 @@
 //! The minimum of 6.14 by a proximal augmented Lagrangian with semismooth Newton steps.
 //!
-//! Each row has a multiplier between the two slopes of its kink. With the multipliers held, and every kink rounded over
-//! `delta` mV, 6.14 is smooth, and its curvature comes from those few rows alone that lie on their rounded kink: only they are
-//! ever written out. All others enter by one sweep over the grid (the potential) and one back (a sum of rows). Then each
-//! multiplier moves to the slope found, `delta` shrinks, and so on, until a bound from below proves the objective.
+//! Each row has a multiplier between the two slopes of its kink. With the multipliers fixed and every kink smoothed
+//! over `delta` mV, 6.14 is differentiable, and its curvature comes only from the few rows on their smoothed kinks, the
+//! only rows that are ever written out. All other rows enter by one sweep over the grid (the potential) and one back (a
+//! weighted sum of rows). After each round every multiplier is set to the slope found and `delta` shrinks, until a
+//! lower bound proves the objective.
 
 mod bound;
 mod line_search;
@@ -18,23 +19,24 @@ use crate::Stop;
 use crate::learn::statement::{Norm, Objective, Point, Relaxed};
 use crate::vectors::{add, dot};
 
-/// At first a target's kink is rounded over so many thresholds (all of them, seen from no weights), one of silence over so many.
+/// The initial smoothing of the kinks in thresholds: for targets all of them are smooth at weights of 0; less for
+/// silence.
 const TARGETS_FROM: f64 = 2.0;
 const SILENCE_FROM: f64 = 0.1;
-/// From a fit nearby: over so many.
+/// The initial smoothing if the start is a similar fit, in thresholds.
 const WARM_FROM: f64 = 0.002;
-/// A round shrinks them by so much, down to so many thresholds.
+/// The factor by which a round reduces the smoothing, and its least value in thresholds.
 const SHRINK: f64 = 0.25;
 const SHARPEST: f64 = 1e-8;
-/// Newton steps of a round, and rounds, at most.
+/// The largest number of Newton steps in a round, and of rounds.
 const STEPS: usize = 12;
 const ROUNDS: usize = 60;
-/// Steps of a round beyond its accuracy, where bounds far wider than what targets need ask for more.
+/// Additional steps of a round, needed if the bounds are far wider than the weights that the targets need.
 const FINER: usize = 3;
-/// Bounds wider than so many times the weights that targets need do not set the scale of the weights.
+/// Bounds wider than this many times the weights that the targets need do not set the scale of the weights.
 const FAR: f64 = 30.0;
 
-/// Where to begin: weights of a similar fit, and its multipliers as shares of their range.
+/// A start: the weights of a similar fit, and its multipliers as shares of their range.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Start {
     pub(crate) weights: Option<Vec<f64>>,
@@ -42,31 +44,31 @@ pub(crate) struct Start {
 }
 
 struct Lagrangian<'a> {
-    /// Whether weights were given to start from.
+    /// Whether the caller gave weights to start from.
     started: bool,
     problem: &'a Relaxed,
     objective: &'a Objective,
     weights: Vec<f64>,
     excess: Vec<f64>,
     behind: Vec<f64>,
-    /// Multipliers as shares: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
+    /// The multipliers as shares: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
     shares: Vec<f64>,
-    /// Multipliers of l1 and bounds, a synapse each.
+    /// The multipliers of l1 and of the bounds, one per synapse.
     held: Vec<f64>,
-    /// Where the weights were when the round began.
+    /// The weights at the beginning of the round, the centre of the proximal term.
     centre: Vec<f64>,
-    /// Over how many mV kinks are rounded: silence, targets.
+    /// The smoothing of the kinks, mV: silence, targets.
     delta: [f64; 2],
-    /// The least 6.14 so far.
+    /// The least value of 6.14 so far.
     most: f64,
-    /// How far weights lie apart that matter, mV: the bounds, unless they are far wider than what targets need.
+    /// The scale of differences between weights, mV: the bounds, unless they are far wider than the targets need.
     width: f64,
-    /// Curvature of what holds a weight at 0 or a bound, and of the proximal term.
+    /// The curvature of the terms that hold a weight at 0 or at a bound, and of the proximal term.
     sigma: f64,
     rho: f64,
-    /// The slope in the weights.
+    /// The gradient in the weights.
     gradient: Vec<f64>,
-    /// Rows on their rounded kinks.
+    /// The rows on their smoothed kinks.
     inside: Vec<usize>,
     factors: Vec<f64>,
     hessian: Vec<f64>,
@@ -74,7 +76,7 @@ struct Lagrangian<'a> {
 }
 
 impl Relaxed {
-    /// Minimises 6.14 (scaled so that it is about 1) until its relative gap is `tolerance`, or no further progress is made.
+    /// Minimises 6.14 (scaled so that it is about 1) until its relative gap is `tolerance`, or until progress ends.
     pub(crate) fn augmented(
         &self,
         objective: &Objective,
@@ -185,7 +187,7 @@ impl<'a> Lagrangian<'a> {
             hessian: vec![0.0; n * n],
             memory: MemBuffer::new(scratch),
         };
-        // How hard the rows pull at a synapse, with no weights: the scale of what holds it and of the proximal term.
+        // The gradient of the rows at each synapse for weights of 0 sets the scale of `sigma` and `rho`.
         engine.multipliers();
         let mut pull = vec![0.0; n];
         for (k, target) in problem.targets.iter().enumerate() {
@@ -202,7 +204,7 @@ impl<'a> Lagrangian<'a> {
         engine
     }
 
-    /// The slope of each row, times its weight in 6.14.
+    /// Computes the slope of each row, times its weight in 6.14.
     fn multipliers(&mut self) {
         let silent = self.problem.silent.len();
         let (d, c) = (self.objective.d, 2.0 * self.objective.c);
@@ -217,7 +219,7 @@ impl<'a> Lagrangian<'a> {
         }
     }
 
-    /// Computes the slope in the weights; gives how much 6.14 could fall along it, over weights that matter and anywhere.
+    /// Computes the gradient; returns how much 6.14 could fall along it within `width`, and within the bounds.
     fn slope(&mut self) -> (f64, f64) {
         let (problem, o) = (self.problem, self.objective);
         let silent = problem.silent.len();
@@ -256,14 +258,15 @@ impl<'a> Lagrangian<'a> {
         (near, anywhere)
     }
 
-    /// The slope of the norm; none where all weights are 0.
+    /// The gradient of the norm; 0 if all weights are 0.
     fn pull(&self) -> Vec<f64> {
         let length = dot(&self.weights, &self.weights).sqrt();
         let factor = if length > 0.0 { self.objective.l2 / length } else { 0.0 };
         self.weights.iter().map(|w| factor * w).collect()
     }
 
-    /// What holds weight `n` at 0 and within its bounds: the slope, whether it is held, and where.
+    /// The term that holds weight `n` at 0 and within its bounds: its slope, whether it is active, and the value it
+    /// holds to.
     fn hold(&self, n: usize, w: f64) -> (f64, bool, f64) {
         let o = self.objective;
         let z = w + self.held[n] / self.sigma;
@@ -277,12 +280,12 @@ impl<'a> Lagrangian<'a> {
         };
         let at = soft.clamp(o.bounds.lower[n], o.bounds.upper[n]);
         let held = at != soft || (soft == 0.0 && shift > 0.0);
-        // Not sigma (z - at): z, at and w may be close, and sigma large.
+        // Not computed as sigma (z - at): z, at and w may be close and sigma large, which would lose digits.
         let slope = if held { self.held[n] + self.sigma * (w - at) } else { o.l1.copysign(z) };
         (slope, held, at)
     }
 
-    /// Has l1 and the bounds hold against all else where the weights are at 0 or at a bound.
+    /// Sets the multipliers of l1 and bounds to balance all other slopes for weights that are at 0 or at a bound.
     fn hold_still(&mut self) {
         self.slope();
         for n in 0..self.weights.len() {
@@ -298,12 +301,12 @@ impl<'a> Lagrangian<'a> {
         }
     }
 
-    /// The weights where l1 and the bounds hold them: some exactly at 0, none outside.
+    /// The weights projected by l1 and the bounds: some exactly 0, none outside the bounds.
     fn candidate(&self) -> Vec<f64> {
         (0..self.weights.len()).map(|n| self.hold(n, self.weights[n]).2).collect()
     }
 
-    /// The multipliers move to the slopes found, kinks get sharper, the proximal term lets go.
+    /// Ends a round: sets the multipliers to the slopes found, reduces the smoothing, and weakens the proximal term.
     fn sharpen(&mut self, reached: bool) {
         let silent = self.problem.silent.len();
         self.multipliers();

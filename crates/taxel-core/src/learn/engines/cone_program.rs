@@ -1,7 +1,7 @@
 //! The convex program over a few rows, as a cone program for Clarabel.
 //!
 //! Minimise `linear.w + l1 |w|_1 + l2 |w|_2 (or |w|_2^2) + quadratic |B w|^2 + sum_i weight_i max(r_i.w - limit_i, 0)` over
-//! a box, equality rows and hard inequality rows. Each hinge gets one slack variable, so a dense row stands in the matrix once.
+//! a box, equality rows and hard inequality rows. Each hinge gets one slack variable, so its dense row is stored once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,7 +17,7 @@ use crate::learn::statement::Norm;
 use crate::vectors::dot;
 use crate::{Error, Result, Stop};
 
-/// A sum of hinges, `weight_i max(r_i.w - limit_i, 0)`, with rows one after the other.
+/// A sum of hinges, `weight_i max(r_i.w - limit_i, 0)`; the rows are stored one after the other.
 #[derive(Debug, Default)]
 pub(crate) struct Hinges {
     pub(crate) rows: Vec<f64>,
@@ -25,7 +25,7 @@ pub(crate) struct Hinges {
     pub(crate) weight: Vec<f64>,
 }
 
-/// Rows that must be met, one after the other: `equal.w = equal_to`, `below.w <= limit`.
+/// Rows that must be satisfied, stored one after the other: `equal.w = equal_to`, `below.w <= limit`.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct HardRows<'a> {
     pub(crate) equal: &'a [f64],
@@ -41,10 +41,10 @@ pub(crate) struct ConeProgram<'a> {
     pub(crate) l1: f64,
     pub(crate) l2: f64,
     pub(crate) norm: Norm,
-    /// Half the curvature of `B`, and its rows, one after the other.
+    /// Half the curvature of `B`, and its rows, stored one after the other.
     pub(crate) quadratic: f64,
     pub(crate) behind: &'a [f64],
-    /// `B'B`, column by column.
+    /// `B'B`, by columns.
     pub(crate) gram: &'a [f64],
     /// Least and largest value of each weight.
     pub(crate) bounds: Vec<[f64; 2]>,
@@ -52,23 +52,23 @@ pub(crate) struct ConeProgram<'a> {
     pub(crate) hard: HardRows<'a>,
 }
 
-/// What the solver found; whether it is the optimum, the caller finds out.
+/// The solver's result; the caller checks whether it is optimal.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) weights: Vec<f64>,
-    /// One multiplier a hinge, between 0 and its weight.
+    /// The multiplier of each hinge, between 0 and its weight.
     pub(crate) multipliers: Vec<f64>,
-    /// One multiplier a hard row; those of inequalities at least 0.
+    /// The multiplier of each hard row; those of inequalities are at least 0.
     pub(crate) equality: Vec<f64>,
     pub(crate) inequality: Vec<f64>,
-    /// The slope that stands for `l2 |w|_2` in the dual, no longer than `l2`; zeros without that term.
+    /// The vector that represents `l2 |w|_2` in the dual, no longer than `l2`; zeros without that term.
     pub(crate) pull: Vec<f64>,
 }
 
-/// Coefficients below this do not move a potential by more than its rounding.
+/// Coefficients below this change a potential by less than its rounding error.
 const NOTHING: f64 = 1e-14;
 
-/// Columns of a sparse matrix, filled one after the other.
+/// A sparse matrix, filled column after column.
 struct Columns {
     pointers: Vec<usize>,
     rows: Vec<usize>,
@@ -97,27 +97,29 @@ impl Columns {
 }
 
 impl ConeProgram<'_> {
-    /// Solves the program to a relative gap of about `tolerance`, all costs times `scale` (so that they are about 1).
+    /// Solves the program to a relative gap of about `tolerance`, with all costs multiplied by `scale` (so that they
+    /// are about 1).
     pub(crate) fn solve(&self, scale: f64, tolerance: f64, stop: Stop<'_>) -> Result<Answer> {
         let n = self.linear.len();
         let (m, k) = (self.hinges.limit.len(), self.behind.len() / n.max(1));
         let quadratic = self.quadratic * scale;
-        // B as a dense n x n block costs nothing where the hinges fill that block anyway; else its few rows are cheaper.
+        // B as a dense n x n block costs nothing extra if the hinges fill that block anyway; otherwise its few rows are
+        // cheaper.
         let factored = quadratic > 0.0 && m + k < n;
         let dense = quadratic > 0.0 && !factored;
-        // Where a weight has one sign only, its absolute value is linear.
+        // The absolute value of a weight whose bounds have the same sign is linear.
         let astride = |[lower, upper]: [f64; 2]| self.l1 > 0.0 && lower < 0.0 && upper > 0.0;
         let absolute: Vec<usize> = (0..n).filter(|&j| astride(self.bounds[j])).collect();
         let normed = self.l2 > 0.0 && self.norm == Norm::Norm;
 
-        // Variables: w; from there on the hinges' slacks, |w| by synapse, |w|_2, B w.
+        // Variables, in this order: w, the hinges' slacks, |w| by synapse, |w|_2, B w.
         let slack = n;
         let size = slack + m;
         let length = size + absolute.len();
         let image = length + usize::from(normed);
         let variables = image + if factored { k } else { 0 };
-        // Rows: B w - y = 0; from there on equalities; r w - slack <= limit; slack >= 0; hard r w <= limit; w <= upper;
-        // -w <= -lower; w - |w| <= 0; -w - |w| <= 0; the cone of |w|_2.
+        // Rows, in this order: B w - y = 0; equalities; r w - slack <= limit; slack >= 0; hard r w <= limit; w <=
+        // upper; -w <= -lower; w - |w| <= 0; -w - |w| <= 0; the cone of |w|_2.
         let equal = if factored { k } else { 0 };
         let hinge = equal + self.hard.equal_to.len();
         let positive = hinge + m;
@@ -232,11 +234,11 @@ impl ConeProgram<'_> {
 
         let settings = DefaultSettings {
             verbose: false,
-            // The tolerance counts relative to the objective; the absolute one is for an optimum of 0.
+            // The tolerance is relative to the objective; the absolute one applies if the optimum is 0.
             tol_gap_abs: 1e-13,
             tol_gap_rel: tolerance,
             tol_feas: tolerance,
-            // Rows are few and all matter; one thread, so that a fit gives the same bits again.
+            // There are few rows and all matter; one thread, so that a fit is reproducible to the bit.
             presolve_enable: false,
             max_threads: 1,
             ..DefaultSettings::default()
@@ -259,7 +261,7 @@ impl ConeProgram<'_> {
     }
 }
 
-/// Runs Clarabel beside this thread, which looks out for a request to stop.
+/// Runs Clarabel in a second thread, while this one waits for a request to stop.
 fn solve_stoppable(
     p: &CscMatrix<f64>,
     q: &[f64],
@@ -274,7 +276,7 @@ fn solve_stoppable(
     let (done, wait) = std::sync::mpsc::channel::<()>();
     let solved = std::thread::scope(|scope| {
         let solving = scope.spawn(move || {
-            let _done = done; // hung up when this thread ends, however it ends
+            let _done = done; // dropped when this thread ends, even by a panic
             let mut solver = DefaultSolver::new(p, q, a, b, cones, settings).map_err(|e| e.to_string())?;
             solver.set_termination_callback(move |_: &DefaultInfo<f64>| asked.load(Ordering::Relaxed));
             solver.solve();

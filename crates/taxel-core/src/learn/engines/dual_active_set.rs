@@ -1,12 +1,12 @@
 //! The shortest weights under linear rows and bounds: the dual active set of Goldfarb and Idnani on a working set.
 //!
-//! `min |w|^2 / 2` under `a.w = value`, `a.w <= limit` and `lower <= w <= upper`. With multipliers u of the active
-//! rows A, `w = -A'u`, so all is computed in the Gram matrix `A A'` of the working set and the Cholesky factor of
-//! its active part. Each state is optimal for its active rows; the dual objective only rises, hence it ends.
+//! `min |w|^2 / 2` under `a.w = value`, `a.w <= limit` and `lower <= w <= upper`. With multipliers u of the active rows
+//! A, `w = -A'u`, so everything follows from the Gram matrix `A A'` of the working set and the Cholesky factor of its
+//! active part. Each state is optimal for its active rows, and the dual objective only rises, so the method terminates.
 //!
-//! Goldfarb and Idnani (1983), Mathematical Programming 27:1, activate one violated row after another. Here all violated
-//! rows enter at once, and those whose multiplier would turn negative leave again, as long as that raises the dual
-//! objective; single steps do the rest, and detect infeasibility. Before all that, a new row that hardly differs from an
+//! Goldfarb and Idnani (1983), Mathematical Programming 27:1, activate one violated row after another. Here all
+//! violated rows enter at once, and those whose multipliers would turn negative leave again, while that raises the dual
+//! objective; single steps do the rest and detect infeasibility. Before this, a new row that hardly differs from an
 //! active one replaces it.
 
 mod certificate;
@@ -26,19 +26,20 @@ pub use self::rows::{Multipliers, Ray, RowId};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, Stop, problem};
 
-/// Squared pivots at which a row counts as dependent: the next one where no proof comes of it.
+/// Squared pivots below which a row counts as linearly dependent: the next one is tried if no proof results.
 const DEPENDENT: [f64; 4] = [1e-16, 1e-20, 1e-24, 1e-28];
-/// Rows that are appended to the factor, or whose products are computed, in one go.
+/// The number of rows that are appended to the factor, or whose products are computed, at a time.
 const BLOCK: usize = 64;
-/// Rows that enter at once when each step must raise the dual.
+/// The number of rows that enter at once when each step must raise the dual.
 const FEW: usize = 32;
-/// Beyond so many violated rows for each that could still be activated, each step must raise the dual.
+/// With more than this many violated rows for each that could still be activated, each step must raise the dual.
 const CROWD: usize = 2;
-/// Candidates for single steps between two evaluations of all rows.
+/// The number of candidates for single steps between two evaluations of all rows.
 const QUEUE: usize = 16;
-/// Block exchanges in one call of `solve`, after which single steps follow.
+/// The number of block exchanges in one call of `solve`, after which single steps follow.
 const EXCHANGES: usize = 60;
-/// Evaluations of all rows in one call of `solve`, for each row and bound: each raises the dual, unless rounding prevents it.
+/// The number of evaluations of all rows in one call of `solve`, per row and bound: each raises the dual unless
+/// rounding prevents it.
 const MOST_ROUNDS: usize = 10;
 /// How many exchanges in succession may leave the dual below its best before each must raise it.
 const MOST_FALLS: usize = 3;
@@ -48,19 +49,19 @@ const MOST_FALLS: usize = 3;
 pub enum Verdict {
     /// The weights satisfy all rows and bounds, and no shorter weights do.
     Optimal,
-    /// No weights within the bounds meet all rows; checked.
+    /// No weights within the bounds satisfy all rows; the proof has been checked.
     Infeasible(Ray),
-    /// The caller requested a stop, or rows that double precision cannot tell from dependent ones are neither satisfied nor
-    /// refuted; the weights are optimal for the active rows.
+    /// The caller requested a stop, or some rows cannot be distinguished from dependent ones in double precision and
+    /// are neither satisfied nor refuted; the weights are optimal for the active rows.
     Stopped,
 }
 
-/// The solver, with its working set; see the module.
+/// The solver with its working set; the module describes the method.
 #[derive(Debug, Clone)]
 pub struct DualActiveSet {
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// By slot; slots of dropped rows are reused.
+    /// The rows by slot; slots of dropped rows are reused.
     rows: Vec<Row>,
     /// Coefficients by slot, `stride` numbers each.
     coefficients: Aligned,
@@ -68,12 +69,12 @@ pub struct DualActiveSet {
     /// Slots in use, ascending, and free slots.
     live: Vec<usize>,
     free: Vec<usize>,
-    /// Rows whose products are still to be computed.
+    /// Slots whose products are still to be computed.
     fresh: Vec<usize>,
-    /// Products by slot and slot, `gram_stride` numbers a row.
+    /// The products of rows by slot and slot, `gram_stride` numbers per row.
     gram: Aligned,
     gram_stride: usize,
-    /// Slots of the active rows in the order of the factor, and the other way round.
+    /// The slots of the active rows in the order of the factor, and the place of each slot in that order.
     active: Vec<usize>,
     place: Vec<Option<usize>>,
     factor: Factor,
@@ -85,7 +86,7 @@ pub struct DualActiveSet {
     equalities: Vec<usize>,
     inequalities: usize,
     dependent: usize,
-    /// Slots by synapse of the bounds in the working set.
+    /// The slots of the bounds in the working set, by synapse.
     bounds: Vec<[Option<usize>; 2]>,
 }
 
@@ -102,7 +103,7 @@ impl DualActiveSet {
         if let Some(n) = (0..lower.len()).find(|&n| lower[n].is_nan() || upper[n].is_nan() || lower[n] > upper[n]) {
             return Err(problem!("bounds of weight {n}: {} to {}, must ascend", lower[n], upper[n]));
         }
-        // Strides that are no power of two, so that rows do not fall into the same cache sets.
+        // Strides are not powers of two, so that rows do not map to the same cache sets.
         let stride = lower.len().next_multiple_of(LANES);
         let stride = if stride.is_multiple_of(64) { stride + LANES } else { stride };
         Ok(Self {
@@ -144,7 +145,7 @@ impl DualActiveSet {
     ///
     /// # Errors
     ///
-    /// As [`DualActiveSet::equality`].
+    /// `Problem` if the number of coefficients is wrong or one is not finite.
     pub fn inequality(&mut self, coefficients: &[f64], limit: f64) -> Result<RowId> {
         let id = RowId(self.inequalities);
         self.add(Kind::Inequality(id), coefficients, limit)?;
@@ -164,7 +165,7 @@ impl DualActiveSet {
         self.stated(&self.multipliers)
     }
 
-    /// Removes the inactive inequalities from the working set; returns their names.
+    /// Removes the inactive inequalities from the working set; returns their ids.
     pub fn drop_inactive(&mut self) -> Vec<RowId> {
         let mut dropped = Vec::new();
         for at in (0..self.live.len()).rev() {
@@ -185,7 +186,7 @@ impl DualActiveSet {
         dropped
     }
 
-    /// Begins from multipliers of an earlier solution; rows that they do not name begin at 0.
+    /// Starts from the multipliers of an earlier solution; rows without one start at 0.
     ///
     /// # Errors
     ///
@@ -236,7 +237,7 @@ impl DualActiveSet {
     ///
     /// # Errors
     ///
-    /// None so far; a stop is a verdict.
+    /// None at present; a stop is a verdict.
     pub fn solve(&mut self, stop: Stop<'_>) -> Result<Verdict> {
         let fresh = self.extend_gram();
         self.replace_similar(&fresh);
@@ -329,7 +330,7 @@ impl DualActiveSet {
         }
     }
 
-    /// The dual at the multipliers that gave `weights`; less is better.
+    /// The negative dual objective at the multipliers that belong to `weights`; smaller is better.
     fn dual(&self, weights: &[f64]) -> f64 {
         0.5 * dot(weights, weights)
             + self.active.iter().map(|&slot| self.rows[slot].limit * self.multipliers[slot]).sum::<f64>()

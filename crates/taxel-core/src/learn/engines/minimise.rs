@@ -1,4 +1,4 @@
-//! The least 6.14: by the engine of this house, and by the cone solver where that one's check fails.
+//! Minimises 6.14: by the augmented Lagrangian, and by the cone solver if the former's result cannot be proven.
 
 use super::augmented::Start;
 use super::rounds::Rounds;
@@ -7,7 +7,7 @@ use crate::learn::statement::{Objective, Parts, Point, Relaxed, Tangents};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
-/// What was found, and who proved it.
+/// The weights found, and the engine that proved them.
 pub(crate) struct Found {
     pub(crate) weights: Vec<f64>,
     pub(crate) objective: f64,
@@ -20,13 +20,13 @@ pub(crate) struct Found {
 }
 
 impl Relaxed {
-    /// Finds the least objective; the bound that proves it counts all rows, whichever engine ran.
+    /// Finds the least objective; the bound that proves it covers all rows, whichever engine ran.
     ///
-    /// Where `stop` is requested, returns the best so far with its proven bound.
+    /// If a stop is requested, returns the best weights so far with their proven bound.
     ///
     /// # Errors
     ///
-    /// `Problem` where the cone solver finds no answer.
+    /// `Problem` if the cone solver finds no answer.
     pub(crate) fn minimise(
         &self,
         objective: &Objective,
@@ -42,28 +42,28 @@ impl Relaxed {
         let scale = if at_zero > 0.0 { 1.0 / at_zero } else { 1.0 };
         let objective = &objective.scaled(scale).within_reach(at_zero * scale);
         let mut before = 0;
-        let mut told = |round: usize, rows, least: f64, gap| {
+        let mut report = |round: usize, rows, least: f64, gap| {
             progress(Round { round, rows, objective: least / scale, left: Left::Gap(gap) });
         };
         let weights = start.weights.clone();
         let mut by = engine;
         let mut found = if engine == Engine::Native {
-            match self.near_a_fit(objective, tolerance, start, &mut told, stop) {
+            match self.near_a_fit(objective, tolerance, start, &mut report, stop) {
                 Ok(found) => found,
-                Err(start) => self.augmented(objective, tolerance, start, &mut told, stop),
+                Err(start) => self.augmented(objective, tolerance, start, &mut report, stop),
             }
         } else {
             let near = weights.is_some();
             let from = self.point(objective, weights.unwrap_or(zero));
-            self.by_rounds(objective, tolerance, (from, 0.0, near), &mut told, stop)?
+            self.by_rounds(objective, tolerance, (from, 0.0, near), &mut report, stop)?
         };
         let open = |best: &Point, bound| best.gap(bound) > tolerance;
         if by == Engine::Native && !found.stopped && open(&found.best, found.bound) {
             by = Engine::ConeSolver;
             before = found.rounds;
-            let mut told = |round, rows, least, gap| told(before + round, rows, least, gap);
+            let mut report = |round, rows, least, gap| report(before + round, rows, least, gap);
             let near = (found.best, found.bound, true);
-            found = self.by_rounds(objective, tolerance, near, &mut told, stop)?;
+            found = self.by_rounds(objective, tolerance, near, &mut report, stop)?;
         }
         let least = found.best.parts.sum() / scale;
         let mut parts = found.best.parts;
@@ -82,7 +82,7 @@ impl Relaxed {
         })
     }
 
-    /// What these shares of the multipliers' ranges prove, with the weights that they are of.
+    /// The lower bound that these shares of the multipliers' ranges prove, together with the weights they belong to.
     fn proven_by(&self, objective: &Objective, point: &Point, shares: &[f64]) -> f64 {
         let silent = self.silent.len();
         let times = |(row, share): (usize, &f64)| share * if row < silent { objective.d } else { 2.0 * objective.c };
@@ -98,10 +98,10 @@ impl Relaxed {
         self.bound(objective, &at, point.parts.sum())
     }
 
-    /// From a fit nearby: only rows that are near threshold there, written out, until none of the others matters.
+    /// Starts from a similar fit: solves over the rows that are near their kinks there, until no other row matters.
     ///
-    /// Rows left out add nothing below 0, so what bounds the rest bounds the whole. Gives the start back, moved on as far as it
-    /// came, where there is no such fit, or too many rows matter.
+    /// The rows left out contribute at least 0, so a bound for the others bounds the whole. Returns the start, as far
+    /// advanced as it got, if there is no such fit or if too many rows matter.
     fn near_a_fit(
         &self,
         objective: &Objective,
@@ -117,7 +117,7 @@ impl Relaxed {
         let near = NEAR * self.theta_0;
         let mut best = self.point(objective, weights);
         let mut at = best.excess.clone();
-        // Multipliers of a fit to these very rows may prove it as it is.
+        // The multipliers of a fit to the same rows may already prove it.
         let (mut bound, mut rounds) = (self.proven_by(objective, &best, &shares).max(0.0), 0);
         if best.gap(bound) <= tolerance {
             let rows = shares.iter().filter(|share| **share != 0.0).count();
@@ -132,8 +132,8 @@ impl Relaxed {
             let small = self.of_rows(&live);
             let begin = live.iter().map(|&row| shares[row]).chain(shares[silent..].iter().copied());
             let from = Start { weights: Some(best.weights.clone()), shares: Some(begin.collect()) };
-            let mut told = |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(bound));
-            let found = small.augmented(objective, 0.3 * tolerance, from, &mut told, stop);
+            let mut report = |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(bound));
+            let found = small.augmented(objective, 0.3 * tolerance, from, &mut report, stop);
             rounds += found.rounds;
             bound = bound.max(found.bound);
             for (k, &share) in found.shares.iter().enumerate() {
@@ -154,7 +154,8 @@ impl Relaxed {
     }
 }
 
-/// Rows within so many thresholds below theirs count as near, so many of them at most; rows are chosen so often.
+/// Rows at most `NEAR` thresholds below their limit are chosen, up to `ATTEMPTS` times; the attempt ends if more than
+/// `MOST_ROWS` are.
 const NEAR: f64 = 0.05;
 const MOST_ROWS: usize = 4000;
 const ATTEMPTS: usize = 4;

@@ -1,8 +1,9 @@
-//! The mixed objective over a working set of rows: l1, l2 (norm or square) and B with targets and silence as hard rows.
+//! The mixed objective over a working set: l1, l2 (norm or square) and B, with targets and silence as hard rows.
 //!
 //! Minimise `l1 |w|_1 + l2 |w|_2 (or |w|_2^2) + lift sum_k (behind_k.w - wanted_k)^2` over `equal.w = equal_to`,
-//! `below.w <= limit` and `lower <= w <= upper`. An interior point comes near, a polish on the rows and bounds that bind
-//! ends exactly, and a bound that holds whatever the solver did limits the distance to the least objective.
+//! `below.w <= limit` and `lower <= w <= upper`. An interior-point method approaches the optimum, a polish on the
+//! binding rows and bounds ends exactly, and a bound that is valid for any multipliers limits the distance to the least
+//! objective.
 
 mod best;
 mod dense;
@@ -22,21 +23,22 @@ use interior::Interior;
 use program::Program;
 pub(crate) use program::Terms;
 
-/// At looser tolerances an interior point is enough: it is to find violated rows, not weights.
+/// At looser tolerances the interior point is returned as it is: the caller then needs violated rows, not exact
+/// weights.
 const LOOSE: f64 = 1e-5;
-/// Gaps at which a polish is tried.
+/// Gaps at which a polish is attempted.
 const TRIES: [f64; 3] = [1e-6, 1e-9, 1e-12];
 
 /// Minimises the objective over these rows and bounds.
 ///
-/// `size` is the largest weight of some feasible weights, as bounds may be far wider than the scale of the weights.
-/// With a `tolerance` of more than 1e-5 the weights are those of an interior point near the optimum: rows are met about as
-/// well, and the rows they break are worth adding. Below that, rows are met to rounding and the gap is `tolerance` where
-/// the bound says so.
+/// `size` is the largest weight of some feasible weights, since bounds may be far wider than the scale of the weights.
+/// With a `tolerance` above 1e-5 the weights are those of an interior point near the optimum: they satisfy rows about
+/// as well as that, and the rows they violate are worth adding. Below it, rows are satisfied to rounding, and the gap
+/// is `tolerance` if the bound proves it.
 ///
 /// # Errors
 ///
-/// `Problem` where Clarabel, asked as a last resort, refuses the problem.
+/// `Problem` if Clarabel, the last resort, refuses the problem.
 pub(crate) fn minimise(
     terms: &Terms<'_>,
     rows: &HardRows<'_>,
@@ -52,7 +54,7 @@ pub(crate) fn minimise(
     if let Some(Start { state, exact: Some((point, guess)) }) = start
         && tolerance <= LOOSE
     {
-        // A few new rows often need no more than a few exchanges.
+        // After a few new rows, a few exchanges are often enough.
         best.exchange(point, guess, tolerance, stop);
         if best.gap() <= tolerance || stop.asked() {
             return Ok(best.found(Engine::Native, stop.asked(), state.clone()));

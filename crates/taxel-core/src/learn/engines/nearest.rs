@@ -1,11 +1,12 @@
-//! The last projection: the nearest weights that meet hard rows to rounding.
+//! The final projection: the nearest weights that satisfy hard rows to rounding.
 
 use super::cone_program::HardRows;
 use super::dual_active_set::{DualActiveSet, Verdict};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
-/// The weights within the bounds that meet all rows and lie nearest to these; none where there are none, or on a stop.
+/// The weights within the bounds that satisfy all rows and are nearest to `weights`; `None` if there are none, or on a
+/// stop.
 pub(crate) fn nearest(
     weights: &[f64],
     rows: &HardRows<'_>,
@@ -13,8 +14,8 @@ pub(crate) fn nearest(
     upper: &[f64],
     stop: Stop<'_>,
 ) -> Result<Option<Vec<f64>>> {
-    // The step is the shortest that meets what is left of each row; being short, it is rounded little. In units of what
-    // is missed at most, so that this is far above what counts as met.
+    // Finds the shortest step that removes the violation of each row; a short step is rounded little. The step is in
+    // units of the largest violation, which is far above the tolerance.
     let width = weights.len().max(1);
     let left = |rows: &[f64], limits: &[f64]| -> Vec<f64> {
         rows.chunks_exact(width).zip(limits).map(|(row, limit)| limit - dot(row, weights)).collect()

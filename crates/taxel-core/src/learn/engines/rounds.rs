@@ -1,37 +1,39 @@
 //! The minimum of 6.14 by rounds of row generation, with a proven gap.
 //!
-//! Nearly all of the million silent rows of a long recording do not matter. A round puts each hinge into one of three
-//! states, by where it stands at the best weights so far: *off* (counted as 0), *on* (counted as its straight part), or, near
-//! its kink, *kept* (its whole hinge goes to the cone program). Off and on lie below the hinge, so what the cone program
-//! minimises lies below 6.14 and touches it at those weights: its minimum is a lower bound, and the way there goes down. An
-//! exact line search on 6.14 keeps the next round from overshooting where hinges change state on the way.
+//! Nearly all of the million silent rows of a long recording do not matter. A round gives each hinge one of three
+//! states by its value at the best weights so far: *off* (counted as 0), *on* (counted as its linear part), or, near
+//! its kink, *kept* (the whole hinge enters the cone program). Off and on are below the hinge, so the cone program's
+//! objective is below 6.14 and equals it at those weights: its minimum is a lower bound, and a step towards it
+//! decreases 6.14. An exact line search on 6.14 keeps the step from overshooting where hinges change their state.
 
 use super::cone_program::{ConeProgram, HardRows, Hinges};
 use crate::learn::statement::{Norm, Objective, Point, Relaxed, Tangents};
 use crate::vectors::add;
 use crate::{Error, Result, Stop};
 
-/// Rows of the first program: targets and every 4th ms of the 60 ms before them, of so many targets that it stays small.
+/// The rows of the first program: targets, and every 4th ms of the 60 ms before them, for a number of targets that
+/// keeps it small.
 const START_NEAR_MS: f64 = 60.0;
 const START_STRIDE_MS: f64 = 4.0;
 const START_ROWS: usize = 500;
-/// Rows of any later one.
+/// The largest number of rows in later programs.
 const MOST_ROWS: usize = 2000;
-/// A hinge is kept within this share of `theta_0` from its kink.
+/// A hinge is kept if it is within this share of `theta_0` of its kink.
 const NEAR: f64 = 0.006;
-/// What the cone solver can do at best.
+/// The smallest tolerance that the cone solver can reach.
 const FINEST: f64 = 1e-12;
-/// Rounds end without a proof where the objective falls by less than this, relatively, and nothing else helps; and at last.
+/// Rounds end without a proof if the objective falls by less than this, relatively, even at the finest tolerance, or
+/// after `MOST_ROUNDS` rounds.
 const STALLED: f64 = 1e-10;
 const MOST_ROUNDS: usize = 500;
 
-/// What the rounds came to, whether proven or not.
+/// The result of the rounds, proven or not.
 pub(crate) struct Rounds {
     pub(crate) best: Point,
     pub(crate) bound: f64,
     pub(crate) rounds: usize,
     pub(crate) rows: usize,
-    /// A multiplier a row, as shares: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
+    /// The multiplier of each row as a share: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
     pub(crate) shares: Vec<f64>,
     pub(crate) stopped: bool,
 }
@@ -44,21 +46,22 @@ enum HingeState {
     Kept,
 }
 
-/// The hinges that go to the cone program.
+/// The hinges that enter the cone program.
 struct Kept {
-    /// Their numbers: silent rows, then targets.
+    /// The numbers of their rows: silent rows, then targets.
     rows: Vec<usize>,
     hinges: Hinges,
-    /// The slope of everything linear: hinges that are on, 6.12's `-x`, B's mixed term.
+    /// The gradient of all linear parts: hinges that are on, the `-x` of 6.12, B's mixed term.
     linear: Vec<f64>,
 }
 
 impl Relaxed {
-    /// Minimises 6.14 (scaled so that it is about 1) from a point of which `bound` is known, or from a small program of its own.
+    /// Minimises 6.14 (scaled so that it is about 1) from a point with a known `bound`, or from a small program of its
+    /// own.
     ///
     /// # Errors
     ///
-    /// `Problem` where the cone solver finds no answer.
+    /// `Problem` if the cone solver finds no answer.
     pub(crate) fn by_rounds(
         &self,
         objective: &Objective,
@@ -91,7 +94,7 @@ impl Relaxed {
             for (&row, multiplier) in kept.rows.iter().zip(answer.multipliers) {
                 multipliers[row] = multiplier;
             }
-            // |x| of 6.12 went to the program as 2 max(x, 0) - x.
+            // The program contained |x| of 6.12 as 2 max(x, 0) - x.
             multipliers[self.silent.len()..].iter_mut().for_each(|m| *m -= objective.c);
             let at = Tangents {
                 weights: &trial.weights,
@@ -122,11 +125,11 @@ impl Relaxed {
         }
     }
 
-    /// The best point on the way from `from` to `to`.
+    /// The best point on the line from `from` to `to`.
     fn better(&self, objective: &Objective, from: Point, to: Vec<f64>) -> Point {
         let end = self.point(objective, to);
         let silent = self.silent.len();
-        // How steeply 6.14 falls or rises at the share `s` of the way.
+        // The derivative of 6.14 at the share `s` of the line.
         let slope = |s: f64| {
             let mut sum = 0.0;
             let (mut along, mut square) = (0.0, 0.0);
@@ -199,7 +202,7 @@ impl Relaxed {
         states.iter().enumerate().map(slope).collect()
     }
 
-    /// The weight of a hinge: |x| of 6.12 is `2 max(x, 0) - x`.
+    /// The weight of a hinge; the |x| of 6.12 is `2 max(x, 0) - x`.
     fn hinge_weight(&self, objective: &Objective, row: usize) -> f64 {
         if row < self.silent.len() { objective.d } else { 2.0 * objective.c }
     }
@@ -226,7 +229,8 @@ impl Relaxed {
         Hinges { rows: coefficients, limit, weight }
     }
 
-    /// The first program: some targets, evenly chosen, and every 4th ms before them, each standing for those left out.
+    /// The first program: some targets, evenly chosen, and every 4th ms before them; each row is weighted for those
+    /// left out.
     fn start(&self, objective: &Objective) -> Kept {
         let stride = (START_STRIDE_MS / self.silent.step_ms).round().max(1.0) as usize;
         let targets = self.targets.names.iter().zip(&self.targets.times);

@@ -1,4 +1,5 @@
-//! The last step of CONE-R: onto the targets that the optimum meets, off the silent rows that it touches.
+//! The last step of CONE-R: moves the weights exactly onto the targets that the optimum reaches, and off touched silent
+//! rows.
 
 use super::cone_program::HardRows;
 use super::minimise::Found;
@@ -6,22 +7,24 @@ use super::nearest::nearest;
 use crate::learn::statement::{Objective, Relaxed, relative_gap};
 use crate::{Result, Stop};
 
-/// A row counts as met by the optimum where its multiplier lies so far within its range (of 1) and it is missed by no more
-/// than this share of `theta_0`.
+/// A row counts as met by the optimum if its multiplier is this far inside its range (of 1) and its violation is at
+/// most `NEARLY_MET` of `theta_0`.
 const WITHIN: f64 = 1e-6;
 const NEARLY_MET: f64 = 1e-3;
-/// Silent rows that the optimum touches stay below their limit by this share of `theta_0`.
+/// Silent rows that the optimum touches are moved this share of `theta_0` below their limit.
 const BELOW: f64 = 1e-9;
-/// The share of the tolerance that this may take: a later fit that starts here has the rest.
+/// The share of the tolerance that this step may use; the rest is left for a later fit that starts here.
 const SPARED: f64 = 0.3;
-/// Rows a synapse, of those that are touched, beyond which they are left as they are.
+/// If the optimum touches more rows per synapse than this, they are left as they are.
 const MOST_TOUCHED: usize = 4;
 
 impl Relaxed {
-    /// Moves the weights onto what they miss by no more than the solver's rounding: a neuron fires where it is touched.
+    /// Removes violations within the solver's rounding error, because a neuron fires where its potential touches the
+    /// threshold.
     ///
-    /// At the optimum a target whose multiplier lies within its range is met exactly, and so is a silent row; a silent row
-    /// stays just below its limit. Undone where the objective would leave the tolerance; returns whether the weights moved.
+    /// At the optimum a target whose multiplier is inside its range is reached exactly, and a silent row likewise; here
+    /// such a silent row is moved just below its limit. The step is undone if the objective would leave the tolerance;
+    /// returns whether the weights moved.
     pub(crate) fn meet(
         &self,
         objective: &Objective,

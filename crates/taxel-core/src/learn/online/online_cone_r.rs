@@ -1,7 +1,8 @@
-//! CONE-R as data arrives: a sliding window of patterns, one in and one out, each time fitted from the fit before.
+//! Online CONE-R: a sliding window of patterns; each fit starts from the previous one.
 //!
-//! The thesis names as CONE's limit that it cannot learn on line, and suggests such a window. Rows of a pattern are laid out
-//! once, when it comes; the objective is that of a fit to the whole window from nothing, to the same proven gap.
+//! The thesis names the lack of online learning as a limit of CONE and suggests such a window. The rows of a pattern
+//! are computed once, when it is added; the objective and its proven gap are those of a fit to the whole window from
+//! scratch.
 
 use crate::allowed::{Parameter, Range};
 use crate::learn::cone::{ConeR, ConeRFit, ConeRProblem, Shares};
@@ -16,13 +17,13 @@ pub struct OnlineConeR {
     parameters: ConeR,
     window: usize,
     problem: Option<ConeRProblem>,
-    /// How many patterns came so far.
+    /// The number of patterns added so far.
     seen: usize,
     last: Option<(Vec<f64>, Shares)>,
 }
 
 impl OnlineConeR {
-    /// How many patterns the window holds.
+    /// The number of patterns in a full window.
     const WINDOW: Parameter = Parameter { name: "window", unit: "", range: Range::FROM_1 };
 
     /// The parameters of [`ConeR`] and `window`, with their defaults and ranges.
@@ -31,34 +32,35 @@ impl OnlineConeR {
         ConeR::described().with(Self::WINDOW, 200)
     }
 
-    /// An empty window of so many patterns.
+    /// An empty window for `window` patterns.
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters that make no sense, or a window of none.
+    /// `Problem` for parameters that are not valid, or a window of 0 patterns.
     pub fn new(parameters: &ConeR, window: usize) -> Result<Self> {
         parameters.check()?;
         Self::WINDOW.check(&window)?;
         Ok(Self { parameters: parameters.clone(), window, problem: None, seen: 0, last: None })
     }
 
-    /// How many patterns the window holds now.
+    /// The number of patterns in the window.
     #[must_use]
     pub fn patterns(&self) -> usize {
         self.seen.min(self.window)
     }
 
-    /// How many rows they have that demand silence.
+    /// The number of rows in the window that require silence.
     #[must_use]
     pub fn silent_rows(&self) -> usize {
         self.problem.as_ref().map_or(0, ConeRProblem::silent_rows)
     }
 
-    /// Takes a pattern with its targets (ms) into the window; the oldest leaves where it is full.
+    /// Adds a pattern with its targets (ms) to the window, and removes the oldest if the window is full.
     ///
     /// # Errors
     ///
-    /// `Problem` for a pattern or targets that make no sense (names them), `Interrupted`; the window is then as before.
+    /// `Problem` for a pattern or targets that are not valid (names them), `Interrupted`; the window then stays
+    /// unchanged.
     pub fn add(&mut self, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<()> {
         let parameters = &self.parameters;
         check_example(&parameters.neuron, self.seen, pattern, targets)?;
@@ -103,7 +105,8 @@ impl OnlineConeR {
 }
 
 impl Shares {
-    /// The first pattern's rows and targets are gone; `silent` silent rows are left.
+    /// Removes the entries of the first pattern's `rows` and `targets`, and renumbers the others; `silent` silent rows
+    /// remain.
     fn drop_first(&mut self, rows: usize, silent: usize, targets: usize) {
         let mut kept = Self::default();
         for (&row, &value) in self.rows.iter().zip(&self.values) {
@@ -117,7 +120,7 @@ impl Shares {
         *self = kept;
     }
 
-    /// Behind `silent` silent rows there are now so many more.
+    /// Renumbers the targets after `rows` silent rows were added to the `silent` present ones.
     fn make_room(&mut self, silent: usize, rows: usize) {
         self.rows.iter_mut().filter(|row| **row >= silent).for_each(|row| *row += rows);
     }

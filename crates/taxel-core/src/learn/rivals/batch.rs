@@ -10,7 +10,7 @@ use crate::{Result, SpikeTrains, Stop};
 pub struct Learnt {
     /// One an input of the output neuron.
     pub weights: Vec<f64>,
-    /// What else there is to know of it, by name, with what output spikes depend on.
+    /// Further results by name, with all that output spikes depend on.
     pub said: Map<String, Value>,
 }
 

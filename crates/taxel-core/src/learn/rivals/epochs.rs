@@ -1,4 +1,4 @@
-//! What rules that learn by epochs share: present each pattern, compare what was fired with the targets, correct.
+//! Shared by rules that learn by epochs: present each pattern, compare the output spikes with the targets, correct.
 
 use rand::rngs::StdRng;
 use rand::seq::SliceRandom;
@@ -52,7 +52,7 @@ pub enum Ended {
     Stopped,
 }
 
-/// What came of it.
+/// The result of training.
 #[derive(Debug, Clone)]
 pub struct Trained {
     /// The weights with most patterns right, the latest such; mV.
@@ -70,20 +70,20 @@ pub struct Trained {
 pub(super) struct Correction {
     /// When, ms.
     pub t: f64,
-    /// How much; above 0 it raises.
+    /// By how much; above 0 it raises weights.
     pub amount: f64,
     /// Only inputs after this count, ms.
     pub after: f64,
-    /// Which target it is of, where it is of one: the factors there are the same each epoch.
+    /// The number of its target, where it is at one: the factors there are the same each epoch.
     pub target: Option<usize>,
 }
 
 /// A rule that learns by epochs.
 pub(super) trait Rule {
-    /// What an input brings, `since` ms before the spike (below 0: after it).
+    /// The contribution of an input `since` ms before the spike (below 0: after it).
     fn factor(&self, since: f64) -> f64;
 
-    /// What every synapse gets, input or not.
+    /// The change that every synapse gets, with or without an input.
     fn constant(&self) -> f64 {
         0.0
     }
@@ -114,14 +114,14 @@ pub(super) trait Rule {
     }
 }
 
-/// What is to be learnt, and from where on.
+/// The patterns and targets to learn, and the first weights.
 pub(super) struct Examples<'a> {
     pub patterns: &'a [SpikeTrains],
     pub targets: &'a [Vec<f64>],
     pub start: Option<&'a [f64]>,
 }
 
-/// One pattern before one neuron.
+/// One pattern, presented to one neuron.
 pub(super) struct Presented<'a> {
     pub neuron: &'a SteppedNeuron,
     pub laid: &'a Laid,
@@ -146,7 +146,7 @@ pub(super) fn is_right(targets: &[f64], fired: &[f64], within: f64) -> bool {
     targets.len() == fired.len() && targets.iter().zip(fired).all(|(t, f)| (t - f).abs() <= within)
 }
 
-/// What one presentation changes, over the learning rate, and the output spikes in it.
+/// The change of weights by one presentation, over the learning rate, and the output spikes in it.
 pub(super) fn change_of(
     rule: &impl Rule,
     neuron: &SteppedNeuron,

@@ -11,7 +11,7 @@ use crate::allowed::{Range, ranges};
 
 /// Output spikes are forced at the targets, so resets are known and each demand is linear in the weights: the potential
 /// reaches the threshold at every target, and stays below it at every other grid point, but for the last `window_ms`
-/// before a target. A perceptron corrects what is broken: raises where a target is missed, lowers at the peak of every
+/// before a target. A perceptron corrects violated demands: it raises where a target is missed, lowers at the peak of every
 /// stretch above the threshold.
 ///
 /// With `after_spike` "reset" and no window these are the rows of CONE-X without bounds and threshold recovery.
@@ -76,7 +76,7 @@ impl HtpRule {
         drive - earlier().map(|e| self.theta_0 * (-(t - e) / self.tau).exp()).sum::<f64>()
     }
 
-    /// Up to when inputs are lost at `t`.
+    /// The time up to which inputs have no effect at `t`.
     fn after(&self, of: &Presented<'_>, t: f64) -> f64 {
         let last = of.targets.iter().copied().take_while(|&e| e < t).last();
         last.filter(|_| self.forgets).unwrap_or(f64::NEG_INFINITY)

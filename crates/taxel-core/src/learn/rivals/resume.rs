@@ -13,7 +13,7 @@ use crate::{Result, problem};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Resume {
-    /// What every synapse gets, input or not.
+    /// The change that every synapse gets, with or without an input.
     pub a: f64,
     /// Height of the learning window.
     pub amplitude: f64,

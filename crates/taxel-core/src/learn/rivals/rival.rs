@@ -1,4 +1,4 @@
-//! The rules that learn spike times by epochs, under one roof: a neuron, a way of training, a rule.
+//! The rules that learn spike times by epochs, each with its neuron and its training.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -28,7 +28,7 @@ pub struct Rival {
 const NEURON: [&str; 5] = ["tau", "tau_s", "theta_0", "after_spike", "step_ms"];
 const TRAINING: [&str; 8] = ["eta", "epochs", "updates", "initial", "within_ms", "until_right", "seed", "max_seconds"];
 
-/// What holds for all rules.
+/// The defaults that all rules share.
 fn shared() -> Value {
     json!({ "step_ms": 0.1, "within_ms": 1.0, "until_right": true, "seed": 0, "max_seconds": null })
 }
@@ -115,8 +115,8 @@ impl Rival {
 
     /// Trains on patterns of the same trains, with one list of targets (ms, ascending) a pattern.
     ///
-    /// Calls `report` with the number of epochs done and the share of patterns right. A stop that is asked for ends it with the
-    /// best weights so far.
+    /// Calls `report` with the number of epochs done and the share of patterns right. A stop that is asked for ends it
+    /// with the best weights so far.
     ///
     /// # Errors
     ///
@@ -139,7 +139,7 @@ impl Rival {
         self.law.train(&self.neuron, &self.training, Examples { patterns, targets, start }, report, stop)
     }
 
-    /// What one presentation of a pattern changes, over the learning rate, and the output spikes in it (ms).
+    /// The change of weights by one presentation, over the learning rate, and the output spikes in it (ms).
     ///
     /// # Errors
     ///

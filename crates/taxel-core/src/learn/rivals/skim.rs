@@ -18,14 +18,14 @@ use crate::{Result, SpikeTrains, Stop, problem};
 /// Rows of a block: few enough for the cache, many enough to amortise a reflection.
 const BLOCK: usize = 512;
 
-/// What compresses what comes out of a branch's kernel.
+/// The nonlinearity of a branch, after its kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Nonlinearity {
     /// tanh.
     #[default]
     Tanh,
-    /// Nothing.
+    /// None.
     None,
 }
 
@@ -40,7 +40,7 @@ struct Layer {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Skim {
-    /// What an input does.
+    /// The kernel of a branch, which filters its inputs.
     pub kernel: Kernel,
     /// Its time constant, ms; that of Table 6.1.
     pub tau: f64,
@@ -58,7 +58,7 @@ pub struct Skim {
     pub spread: Option<f64>,
     /// Its fixed delays are drawn evenly from 0 to this, ms; none was published.
     pub delay_ms: Option<f64>,
-    /// What compresses what comes out of its kernels.
+    /// The nonlinearity after its kernels.
     pub nonlinearity: Nonlinearity,
     /// The thresholds to choose from; those of 6.5.4.
     pub thresholds: Vec<f64>,
@@ -91,7 +91,7 @@ impl Default for Skim {
 /// A least-squares problem, brought to triangular form: of all rows `A w ~ y` it keeps `R w ~ z`, with the same solutions.
 #[derive(Debug, Clone)]
 pub struct Normal {
-    /// `R`, row after row, and `z`, the last column, with what no weights reach in the last row.
+    /// `R`, row after row, and `z`, the last column, with the residual in the last row.
     entries: Vec<f64>,
     columns: usize,
     /// How many rows there were.
@@ -117,7 +117,7 @@ impl Normal {
         (0..m).map(|j| self.entries[j * (m + 1) + m]).collect()
     }
 
-    /// The sum of squares that no weights can lessen.
+    /// The least sum of squares over all weights.
     #[must_use]
     pub fn rest(&self) -> f64 {
         self.entries.last().map_or(0.0, |last| last * last)
@@ -174,7 +174,7 @@ impl Normal {
     }
 }
 
-/// One branch on its way through a pattern: what comes in, and its kernel's state.
+/// One branch while a pattern is run: its inputs, and its kernel's state.
 struct Branch {
     /// ms and weight, by time.
     inputs: Vec<(f64, f64)>,
@@ -233,7 +233,8 @@ impl Skim {
             .collect())
     }
 
-    /// Calls `each` with the rows of a pattern, block by block: the output of each branch, columns first, from row `first` on.
+    /// Calls `each` with the rows of a pattern, block by block: the output of each branch, columns first, from row
+    /// `first` on.
     fn walk(
         &self,
         pattern: &SpikeTrains,

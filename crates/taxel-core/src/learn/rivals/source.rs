@@ -7,14 +7,14 @@ use crate::allowed::Parameter;
 
 /// The parameters that the source of a rule publishes, and how they are combined.
 pub struct Source {
-    /// By which the rule is called.
+    /// The name of the rule.
     pub(super) name: &'static str,
     /// The parameters that are the rule's own.
     pub(super) own: &'static [&'static str],
     /// Their ranges.
     pub(super) ranges: &'static [&'static [Parameter]],
-    /// What the source gives; what stands neither here nor among what all rules share, the caller must give.
+    /// The values that the source gives; the caller must give those that stand neither here nor among those of all rules.
     pub(super) defaults: fn() -> Value,
-    /// Works out what is left out; may name `law` and `current` itself.
+    /// Computes parameters that are left out; may name `law` and `current` itself.
     pub(super) arrange: fn(&mut Map<String, Value>) -> Result<()>,
 }

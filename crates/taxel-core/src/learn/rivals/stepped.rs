@@ -6,7 +6,7 @@ use crate::allowed::{Parameter, Range, ranges};
 use crate::neuron::{Grid, MOST_LAID_OUT, check_points, points_between};
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// What drives the membrane after an input.
+/// The current into the membrane after an input.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Current {
@@ -43,11 +43,11 @@ pub enum Reset {
 pub struct SteppedNeuron {
     /// Membrane time constant, ms.
     pub tau: f64,
-    /// What drives it.
+    /// The current that drives it.
     pub current: Current,
     /// Threshold, mV.
     pub theta_0: f64,
-    /// What an output spike does.
+    /// The effect of an output spike.
     pub after_spike: Reset,
     /// How long the membrane stays at 0 after a spike, ms; for [`Reset::Membrane`] alone.
     pub refractory: f64,
@@ -55,7 +55,7 @@ pub struct SteppedNeuron {
     pub step_ms: f64,
 }
 
-/// What some time does to currents and potential: their decays, and what each current adds to the potential.
+/// The effect of some time on currents and potential: their decays, and what each current adds to the potential.
 #[derive(Debug, Clone, Copy)]
 struct Pass {
     a: f64,
@@ -65,7 +65,7 @@ struct Pass {
     b_to_v: f64,
 }
 
-/// One input, on its way to the first grid point at or after it.
+/// One input, propagated to the first grid point at or after it.
 #[derive(Debug, Clone, Copy)]
 struct Input {
     step: usize,
@@ -84,7 +84,7 @@ pub(super) struct Laid {
     steps: usize,
 }
 
-/// `V0` of a difference of exponentials: what makes its peak 1.
+/// `V0` of a difference of exponentials: the factor that makes its peak 1.
 pub(super) fn peak_factor(slow: f64, fast: f64) -> f64 {
     let at = slow * fast / (slow - fast) * (slow / fast).ln();
     1.0 / ((-at / slow).exp() - (-at / fast).exp())
@@ -125,7 +125,7 @@ impl Kernels {
         }
     }
 
-    /// What `dt` ms do.
+    /// The effect of `dt` ms.
     fn pass(&self, dt: f64) -> Pass {
         let v = (-dt / self.tau).exp();
         if !self.twice {
@@ -187,7 +187,7 @@ impl SteppedNeuron {
         Ok(())
     }
 
-    /// Its kernels, with their constants reckoned once.
+    /// Its kernels, with their constants computed once.
     pub(super) fn kernels(&self) -> Kernels {
         let (tau, (slow, fast)) = (
             self.tau,
@@ -279,7 +279,7 @@ impl SteppedNeuron {
     }
 }
 
-/// Currents and potential, on their way over the grid.
+/// Currents and potential at a point of the grid.
 struct Walk<'a> {
     weights: &'a [f64],
     inputs: std::iter::Peekable<std::iter::Copied<std::slice::Iter<'a, Input>>>,

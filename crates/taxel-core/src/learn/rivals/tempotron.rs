@@ -24,7 +24,7 @@ pub struct Tempotron {
     pub theta_0: f64,
     /// Learning rate; `3e-3 T / (tau N V0)` where left out, T being the patterns' mean length.
     pub eta: Option<f64>,
-    /// How much of the last change the next one carries on.
+    /// Momentum: the share of the last change that is added to the next one.
     pub momentum: f64,
     /// Spread of the first weights, drawn normally around 0.
     pub initial_sd: f64,
@@ -63,7 +63,7 @@ pub struct Peak {
     pub t_spike: Option<f64>,
 }
 
-/// A pattern's inputs by time, each with what the time up to it does.
+/// A pattern's inputs by time, each with the effect of the time up to it.
 struct Inputs {
     start: f64,
     stop: f64,
@@ -148,14 +148,14 @@ impl Tempotron {
             let next = if last { shape.after(state, end - t) } else { events.steps[k].apply(state) };
             if shape.slope(state) > 0.0 {
                 let summit = summit(shape, state);
-                // Where the next input comes before the summit, the way goes on from there, unless the neuron has fired.
+                // Where the next input comes before the maximum, the search goes on from there, unless the neuron has fired.
                 let (at, v) = if t + summit < end { (t + summit, shape.after(state, summit).b) } else { (end, next.b) };
                 if v > best.v_max {
                     (best.v_max, best.t_max) = (v, at);
                 }
                 if v >= self.theta_0 {
                     best.t_spike = Some(t + crossing(shape, state, at - t, self.theta_0));
-                    // What comes later is shunted, so the potential climbs on to its summit.
+                    // Later inputs are shunted, so the potential rises on to its maximum.
                     best.t_max = (t + summit).min(events.stop);
                     best.v_max = shape.after(state, best.t_max - t).b;
                     return Reached { peak: best, inputs: k };
@@ -181,8 +181,8 @@ impl Tempotron {
         Ok(self.reach(&self.shape(), weights, &self.lay_out(pattern, Stop::never())?).peak)
     }
 
-    /// What one presentation changes, over the learning rate: nothing where the neuron is right; else the potential that
-    /// each input makes at the peak, added where a spike is missed, taken off where one is false.
+    /// The change of weights by one presentation, over the learning rate: 0 where the neuron is right; else the
+    /// potential that each input makes at the peak, added where a spike is missed, taken off where one is false.
     ///
     /// # Errors
     ///

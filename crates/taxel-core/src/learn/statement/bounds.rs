@@ -1,17 +1,17 @@
-//! Bounds on the weights: the same for all synapses, or one a synapse.
+//! Bounds on the weights: the same for all synapses, or one per synapse.
 
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::Numbers;
 use crate::{Result, problem};
 
-/// A least or a largest weight, mV.
+/// A lower or an upper bound on the weights, mV.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged, expecting = "must be a number, or one a synapse, mV")]
 pub enum Bound {
     /// The same for all synapses.
     All(f64),
-    /// One a synapse.
+    /// One per synapse.
     Each(Vec<f64>),
 }
 
@@ -25,7 +25,7 @@ impl Numbers for Bound {
 }
 
 impl Bound {
-    /// The bound of synapse `n`, mV.
+    /// The bound on the weight of synapse `n`, mV.
     #[must_use]
     pub fn at(&self, n: usize) -> f64 {
         match self {
@@ -34,7 +34,7 @@ impl Bound {
         }
     }
 
-    /// This bound, times a factor.
+    /// The bound multiplied by `factor`.
     #[must_use]
     pub fn times(&self, factor: f64) -> Self {
         match self {
@@ -51,24 +51,24 @@ impl Bound {
     }
 }
 
-/// The weights that are allowed, mV.
+/// The lower and upper bounds of all weights, mV.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
-    /// One a train.
+    /// The lower bounds, one per train.
     pub lower: Vec<f64>,
-    /// One a train.
+    /// The upper bounds, one per train.
     pub upper: Vec<f64>,
 }
 
 impl Bounds {
-    /// The least and the largest that a row can come to.
+    /// The least and the largest value of `row.w` within the bounds.
     pub(crate) fn range(&self, row: &[f64]) -> (f64, f64) {
         let ends = row.iter().zip(&self.lower).zip(&self.upper).map(|((a, l), u)| (a * l, a * u));
         ends.fold((0.0, 0.0), |sum, (l, u)| (sum.0 + l.min(u), sum.1 + l.max(u)))
     }
 }
 
-/// Checks that `lb` does not lie above `ub`, both finite, at every synapse; where they are equal the synapse is frozen.
+/// Checks at every synapse that both bounds are finite and that `lb` is not above `ub`; equal bounds freeze the weight.
 ///
 /// # Errors
 ///
@@ -97,7 +97,7 @@ pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
 ///
 /// # Errors
 ///
-/// `Problem` where their number is another.
+/// `Problem` if a list of bounds has another length.
 pub(crate) fn bounds_of(lb: &Bound, ub: &Bound, trains: usize) -> Result<Bounds> {
     check_bounds(lb, ub)?;
     for (name, bound) in [("lb", lb), ("ub", ub)] {

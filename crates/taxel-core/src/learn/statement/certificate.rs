@@ -1,8 +1,10 @@
-//! Proof that no weights within the bounds meet a stated problem (Farkas), checked in plain arithmetic over restated rows.
+//! Proofs that no weights within the bounds satisfy a stated problem (Farkas), checked in plain arithmetic on restated
+//! rows.
 //!
-//! With multipliers y of target rows (any sign) and z of all others (0 or more), every solution w has
-//! `g.w <= y.threshold + z.limit`, where g is the sum of the rows, each times its multiplier. If even the least that `g.w`
-//! can be within the bounds is larger, there is no solution; the bounds pay for rounding, so they must be finite.
+//! With multipliers y of target rows (any sign) and z of all others (0 or more), every solution w satisfies
+//! `g.w <= y.threshold + z.limit`, where g is the sum of the rows, each times its multiplier. If even the least value
+//! of `g.w` within the bounds is larger, there is no solution. The bounds must be finite, because rounding errors are
+//! bounded by them.
 
 use std::collections::BTreeMap;
 
@@ -12,24 +14,26 @@ use crate::Result;
 use crate::neuron::Time;
 use crate::vectors::dot;
 
-/// Multipliers that prove a problem infeasible, and their explanation in words.
+/// The multipliers that prove a problem infeasible, and an explanation in words.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
-    /// Rows with their multipliers.
+    /// The rows with their multipliers.
     pub rows: Vec<(Row, f64)>,
-    /// By how much the bounds fail what the rows demand, mV; above its rounding.
+    /// The amount by which the least value within the bounds exceeds what the rows allow, mV; larger than its rounding
+    /// error.
     pub gap: f64,
-    /// Whether it also holds with margin and slope 0 in its rows: then the problem is impossible, not only with this margin.
+    /// Whether the proof also holds with margin and slope 0: then the problem is impossible with any margin.
     pub at_all: bool,
-    /// Which patterns, targets and silences conflict.
+    /// The patterns, targets and silences that conflict, in words.
     pub text: String,
 }
 
-/// Rows that an explanation names, those with the largest terms first.
+/// The number of rows that an explanation names, those with the largest terms first.
 const NAMED: usize = 12;
 
 impl Certificate {
-    /// Checks multipliers of rows (those of other rows than targets must be 0 or more); gives nothing if they prove nothing.
+    /// Checks multipliers of rows (those of rows other than targets must be 0 or more); returns `None` if they prove
+    /// nothing.
     pub(crate) fn check(statement: &Statement, bounds: &Bounds, rows: Vec<(Row, f64)>) -> Result<Option<Self>> {
         let Some(proven) = gap(statement, bounds, &rows, false)? else { return Ok(None) };
         let at_all = gap(statement, bounds, &rows, true)?.is_some();
@@ -37,8 +41,8 @@ impl Certificate {
         Ok(Some(Self { rows, gap: proven, at_all, text }))
     }
 
-    /// Looks for a time at which a pattern shall fire and another one, the same up to there, be silent: a proof of two rows,
-    /// for any margin.
+    /// Searches for a time at which the neuron must fire in one pattern and be silent in another with the same inputs
+    /// up to that time: a proof of two rows that holds for any margin.
     pub(crate) fn of_same_inputs(statement: &Statement, bounds: &Bounds) -> Result<Option<Self>> {
         for (pattern, target) in statement.targets() {
             let t = statement.examples[pattern].targets[target];
@@ -51,7 +55,7 @@ impl Certificate {
         Ok(None)
     }
 
-    /// Looks for a target that no weights reach, or that all exceed: a proof of one row.
+    /// Searches for a target that no weights reach, or that all weights exceed: a proof of one row.
     pub(crate) fn of_one_target(statement: &Statement, bounds: &Bounds) -> Result<Option<Self>> {
         for (pattern, target) in statement.targets() {
             let row = Row::Target { pattern, target };
@@ -65,10 +69,11 @@ impl Certificate {
     }
 }
 
-/// By how much the least of `g.w` within the bounds exceeds what the rows (`bare`: without margin and slope) allow; nothing if
-/// rounding could explain it.
+/// The amount by which the least value of `g.w` within the bounds exceeds what the rows allow; `None` if rounding could
+/// explain it. `bare` leaves out margin and slope.
 ///
-/// In continuous time a margin is above 0: rows that cancel without it and hold one of silence prove it for any.
+/// In continuous time a margin is positive: rows that cancel without it and include one of silence prove infeasibility
+/// for every margin.
 fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) -> Result<Option<f64>> {
     let trains = statement.trains;
     let (mut sum, mut size, mut row) = (vec![0.0; trains], vec![0.0; trains], vec![0.0; trains]);
@@ -89,7 +94,7 @@ fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) 
         most += s * l.abs().max(u.abs());
     }
     let gap = bounds.range(&sum).0 - allowed;
-    // Each term is rounded once when made and once for each sum that it enters.
+    // Each term is rounded once when computed and once in each sum that includes it.
     let rounding = (rows.len() + trains) as f64 * f64::EPSILON * most;
     let strict = bare && statement.neuron.time == Time::Continuous;
     let cancels = strict && allowed == 0.0 && sum.iter().all(|&g| g == 0.0);
@@ -137,7 +142,7 @@ fn explained(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all
     Ok(text)
 }
 
-/// The rows with the largest terms, by pattern.
+/// The text for the rows with the largest terms, pattern by pattern.
 fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
     let mut weighed = Vec::with_capacity(rows.len());
     for &(row, multiplier) in rows {
@@ -146,7 +151,7 @@ fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
         weighed.push((multiplier.abs() * length.max(stated.limit.abs()), row));
     }
     weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
-    // By pattern: targets that must be hit or neared, and times of silence.
+    // By pattern: texts of targets that must be reached, and times of silence.
     let mut by_pattern: BTreeMap<usize, (Vec<String>, Vec<f64>)> = BTreeMap::new();
     for &(_, row) in weighed.iter().take(NAMED) {
         let t = statement.time(row);

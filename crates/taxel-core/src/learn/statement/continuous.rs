@@ -1,9 +1,9 @@
 //! Silence in continuous time: finds where given weights violate it, in one sweep over all patterns with a state of two
-//! numbers, without writing rows out.
+//! numbers, without computing rows.
 //!
-//! Between two input spikes potential and tapered margin are one state of the kernel's family, so their maximum above the
-//! recovering threshold is found exactly; intervals are split at inputs, targets, edges of refractory times and where a taper
-//! begins. A bound that costs no exponential passes over nearly all of them.
+//! Between two input spikes the potential and the tapered margin are one state of the kernel's family, so their maximum
+//! above the recovering threshold is computed exactly; intervals are split at inputs, targets, ends of refractory times
+//! and starts of tapers. An upper bound that needs no exponential excludes nearly all of them.
 
 use super::peak::{Peak, exceeds};
 use super::rows::{Example, Statement, lost, until};
@@ -12,28 +12,28 @@ use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak, ro
 /// A time at which the state or the limit changes.
 #[derive(Debug, Clone, Copy)]
 struct Node {
-    /// From the node before to here.
+    /// The decay from the previous node to this one.
     step: Step,
-    /// The largest that an input of weight 1 at this node comes to before the next one.
+    /// The largest effect of an input of weight 1 at this node before the next node.
     reach: f64,
-    /// The least limit up to the next node, mV; infinite where no silence is required.
+    /// The lowest limit up to the next node, mV; infinite if no silence is required.
     least: f64,
-    /// Where the inputs at this node end.
+    /// The inputs at this node end before this index.
     inputs: u32,
-    /// Everything before is lost from here on.
+    /// Whether all earlier inputs are lost at this node.
     reset: bool,
 }
 
-/// The limit of silence from a node to the next.
+/// The limit of silence between two nodes.
 #[derive(Debug, Clone, Copy)]
 struct Asked {
     t: f64,
-    /// The next node.
+    /// The time of the next node.
     to: f64,
     theta: f64,
-    /// What is left of the threshold's rise at the node, mV.
+    /// The remaining threshold rise at the node, mV.
     rise: f64,
-    /// The margin at the node: in a taper as a state of the kernel's family, else constant.
+    /// The margin at the node: within a taper a state of the kernel's family, otherwise the constant `height`.
     taper: KernelSum,
     height: f64,
 }
@@ -42,11 +42,11 @@ struct Asked {
 struct Strip {
     nodes: Vec<Node>,
     asked: Vec<Asked>,
-    /// Trains of the inputs that count, by time.
+    /// The trains of the inputs that have an effect, in order of time.
     trains: Vec<u32>,
 }
 
-/// All silent times of a problem, laid out for sweeping.
+/// All silent times of a problem, prepared for sweeps.
 #[derive(Debug, Clone)]
 pub(crate) struct SilentTimes {
     shape: Shape,
@@ -60,8 +60,8 @@ impl SilentTimes {
         Self { shape: statement.shape, tau_rec: statement.neuron.tau_rec(), strips }
     }
 
-    /// Finds the worst instant of each stretch in which potential, with this share of the margin, exceeds the threshold by
-    /// more than `tolerance`.
+    /// Finds the worst instant of each interval in which the potential plus `share` of the margin exceeds the threshold
+    /// by more than `tolerance`.
     pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
         let mut found = Vec::new();
         let one = self.shape.input();
@@ -95,7 +95,7 @@ impl SilentTimes {
         found
     }
 
-    /// The largest excess from a node to the next, when it is, and the excess at the end.
+    /// The time and value of the largest excess between a node and the next, and the excess at the next node.
     fn largest(&self, asked: &Asked, state: KernelSum, share: f64) -> (f64, f64, f64) {
         let KernelSum { a, b } = asked.taper;
         let state = KernelSum { a: state.a + share * a, b: state.b + share * b };
@@ -117,25 +117,26 @@ impl SilentTimes {
     }
 }
 
-/// Values above 0, and NaN, unchanged; 0 for all others.
+/// Returns 0 for values below 0, and other values and NaN unchanged.
 fn positive(x: f64) -> f64 {
     if x <= 0.0 { 0.0 } else { x }
 }
 
 fn strip(statement: &Statement, example: &Example) -> Strip {
     let Statement { neuron, shape, taper, .. } = statement;
-    // Inputs that are lost just after their own time never count: no spike but a target is between.
+    // An input that is lost just after its own time has no effect at all, because spikes occur only at targets.
     let counts = |&(t, _): &(f64, u32)| t <= example.end && !lost(neuron, &example.targets, t, t.next_up());
-    let heard: Vec<(f64, u32)> = example.inputs.iter().copied().filter(counts).collect();
+    let counted: Vec<(f64, u32)> = example.inputs.iter().copied().filter(counts).collect();
 
     let mut times = vec![example.start, example.end];
-    times.extend(heard.iter().map(|i| i.0));
+    times.extend(counted.iter().map(|i| i.0));
     for &target in &example.targets {
         times.extend([target, target - taper.length, until(target), target + neuron.refractory]);
     }
     if neuron.first_threshold == FirstThreshold::Printed {
         let rise = example.start + neuron.refractory;
-        // Silence is required at the lower threshold up to there, as the neuron's edge is rounded.
+        // Silence below the lower threshold is required up to slightly before the printed rise, because the neuron
+        // rounds the time at which this rise starts.
         times.extend([rise - 2.0 * rounding_ms(rise), rise]);
     }
     times.retain(|&t| example.start <= t && t <= example.end);
@@ -149,13 +150,13 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
             length = t - times[k - 1];
             step = shape.step(length);
         }
-        next += heard[next..].iter().take_while(|i| i.0 <= t).count();
+        next += counted[next..].iter().take_while(|i| i.0 <= t).count();
         let reset = neuron.after_spike == AfterSpike::Reset && example.next(t) == Some(t);
         let mut here = Asked { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
         let (mut reach, mut least) = (0.0, f64::INFINITY);
         if let Some(to) = times.get(k + 1).copied().filter(|&to| asks(statement, example, t, to)) {
             here.to = to;
-            // Just behind the node: a target at the node itself has fired.
+            // The rise just after the node: a target at the node itself has fired.
             here.rise = statement.rise(example, example.fired(to), t);
             reach = shape.value((to - t).min(shape.peak()));
             match example.next(to).filter(|target| target - f64::midpoint(t, to) < taper.length) {
@@ -167,10 +168,10 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
         nodes.push(Node { step, reach, least, inputs: next as u32, reset });
         asked.push(here);
     }
-    Strip { nodes, asked, trains: heard.iter().map(|i| i.1).collect() }
+    Strip { nodes, asked, trains: counted.iter().map(|i| i.1).collect() }
 }
 
-/// Whether silence is required from `t` to `to`, neighbouring nodes.
+/// Whether silence is required between the neighbouring nodes `t` and `to`.
 fn asks(statement: &Statement, example: &Example, t: f64, to: f64) -> bool {
     let neuron = &statement.neuron;
     let fired = example.fired(to);

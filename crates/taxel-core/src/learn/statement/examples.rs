@@ -3,7 +3,8 @@
 use crate::neuron::Neuron;
 use crate::{Result, SpikeTrains, problem};
 
-/// Checks what every learner is given: one list of targets (ms, ascending) a pattern, the same trains in each pattern.
+/// Checks the arguments of every learner: one list of targets (ms, ascending) per pattern, and the same trains in each
+/// pattern.
 ///
 /// # Errors
 ///
@@ -26,7 +27,7 @@ pub(crate) fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets:
     Ok(())
 }
 
-/// Checks that there is a target in some pattern, for learners that learn nothing from silence alone.
+/// Checks that some pattern has a target, for learners that learn nothing from silence alone.
 pub(crate) fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
     if targets.iter().all(Vec::is_empty) {
         return Err(problem!("targets: no pattern has one, so nothing is to be learnt"));
@@ -72,7 +73,7 @@ pub(crate) fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, ta
     Ok(())
 }
 
-/// Checks one pattern to learn from, number `p`.
+/// Checks pattern number `p`.
 pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
     pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
     if pattern.is_empty() {

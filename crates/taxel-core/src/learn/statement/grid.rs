@@ -1,8 +1,8 @@
-//! Silence on the grid (6.9b): what the potential is on every grid point, and what the threshold leaves it there.
+//! Silence on the grid (6.9b): the potential at every grid point, and its limit there.
 //!
-//! Silent rows are never stored: one sweep over the grid gives the potential on all of them (the kernel needs two numbers
-//! a pattern), one sweep backwards gives a weighted sum of all of them. CONE-X finds the points at which silence is
-//! violated, CONE-R sums the violations.
+//! Silent rows are never stored: one sweep over the grid computes the potential at all points (the kernel needs two
+//! numbers per pattern), and one backward sweep computes a weighted sum of all rows. CONE-X searches for points at
+//! which silence is violated, CONE-R sums the violations.
 
 use super::peak::{Peak, exceeds};
 use super::rows::{Example, Statement, lost};
@@ -10,7 +10,7 @@ use crate::neuron::{AfterSpike, Grid, KernelSum, Place, Shape, Step};
 use crate::vectors::{add, dot};
 use crate::{Result, Stop};
 
-/// The contribution of an input to the state at the first grid point not before it.
+/// The contribution of an input to the state at the first grid point at or after it.
 #[derive(Debug, Clone, Copy)]
 struct GridInput {
     point: u32,
@@ -23,9 +23,9 @@ struct GridInput {
 #[derive(Debug, Clone, Copy)]
 struct Jump {
     point: u32,
-    /// Everything before is lost here (`Reset`), ahead of the inputs.
+    /// Whether all earlier inputs are lost here (`Reset`), before the inputs of this point are added.
     reset: bool,
-    /// Where the inputs that come here end among all of the pattern; they begin where those of the jump before end.
+    /// The inputs of this jump end before this index; they begin where those of the previous jump end.
     inputs: u32,
 }
 
@@ -33,30 +33,30 @@ struct Jump {
 #[derive(Debug, Clone)]
 struct Lane {
     inputs: Vec<GridInput>,
-    /// Ascending by point.
+    /// The jumps, ascending by point.
     jumps: Vec<Jump>,
-    /// The number of its first row among all.
+    /// The number of the pattern's first row among all rows.
     first: usize,
     points: usize,
     grid: Grid,
 }
 
-/// All silent rows: one a grid point that lies neither at a target nor in the refractory time behind it.
+/// All silent rows: one for each grid point that is neither a target nor in the refractory time after one.
 #[derive(Debug, Clone)]
 pub(crate) struct SilentRows {
     lanes: Vec<Lane>,
     trains: usize,
     shape: Shape,
     pub(crate) step_ms: f64,
-    /// The effect of 0, 1, 2 ... grid steps, so that a run of points without an input needs no recursion.
+    /// The decay over 0, 1, 2 ... grid steps, so that points between inputs are computed without a recursion.
     steps: Steps,
-    /// Some rows of a grid written out, one after the other, in place of lanes.
+    /// The coefficients of selected rows, row after row, instead of lanes.
     written: Option<Vec<f64>>,
     /// The limit of the potential, mV; infinite where no silence is required.
     pub(crate) limit: Vec<f64>,
 }
 
-/// The entries of `Step` for so many grid steps.
+/// The entries of `Step` for each number of grid steps from 0 to `RUN`.
 #[derive(Debug, Clone)]
 struct Steps {
     aa: [f64; RUN + 1],
@@ -64,7 +64,7 @@ struct Steps {
     bb: [f64; RUN + 1],
 }
 
-/// The longest run of points that is done in one go.
+/// The largest number of points that are computed without a recursion.
 const RUN: usize = 128;
 
 impl Steps {
@@ -83,7 +83,7 @@ impl Steps {
 }
 
 impl SilentRows {
-    /// Lays the grid over each pattern of a statement, from its start to the end of its silence.
+    /// Computes the grid rows of each pattern of a statement, from its start to the end of its silence.
     pub(crate) fn new(statement: &Statement, stop: Stop<'_>) -> Result<Self> {
         let (shape, step_ms) = (statement.shape, statement.neuron.step_ms);
         let mut rows = Self {
@@ -102,7 +102,7 @@ impl SilentRows {
         Ok(rows)
     }
 
-    /// Adds the rows of one more pattern; where the caller stops it, they are as before.
+    /// Adds the rows of one pattern; if the caller stops it, the rows stay unchanged.
     pub(crate) fn push(&mut self, statement: &Statement, pattern: usize, stop: Stop<'_>) -> Result<()> {
         let (neuron, example) = (&statement.neuron, &statement.examples[pattern]);
         let Example { start, end, targets, .. } = example;
@@ -130,7 +130,7 @@ impl SilentRows {
                 stop.check()?;
             }
             let place = grid.place(t);
-            // An input on a point itself acts after it; where its kernel begins above 0, from the next point on.
+            // An input exactly at a point acts after it; with a kernel that jumps at 0, from the next point on.
             let acts_at = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
             if acts_at < points as f64 && !lost(neuron, targets, t, grid.time(acts_at)) {
                 let age = grid.between(place, Place::at(acts_at)).max(0.0);
@@ -152,7 +152,7 @@ impl SilentRows {
         Ok(())
     }
 
-    /// The numbers of the rows that lie in the `near_ms` before `t`, or at it.
+    /// The numbers of the rows from `near_ms` before `t` up to and including `t`.
     pub(crate) fn before(&self, pattern: usize, t: f64, near_ms: f64) -> std::ops::Range<usize> {
         let Lane { first, points, grid, .. } = self.lanes[pattern];
         let after = (grid.place(t).behind() as usize).min(points);
@@ -160,19 +160,19 @@ impl SilentRows {
         first + after.saturating_sub(near + 1)..first + after
     }
 
-    /// The number of rows of the first pattern, those without a requirement included.
+    /// The number of rows of the first pattern, including points without a requirement.
     pub(crate) fn of_first(&self) -> usize {
         self.lanes.first().map_or(0, |lane| lane.points)
     }
 
-    /// Takes the rows of the first pattern away; the others are numbered anew from 0.
+    /// Removes the rows of the first pattern; the others are renumbered from 0.
     pub(crate) fn drop_first(&mut self) {
         let gone = self.lanes.remove(0).points;
         self.limit.drain(..gone);
         self.lanes.iter_mut().for_each(|lane| lane.first -= gone);
     }
 
-    /// The named rows (ascending) alone, written out.
+    /// A copy with the given rows only (ascending), as coefficients.
     pub(crate) fn written_out(&self, rows: &[usize]) -> Self {
         Self {
             lanes: vec![],
@@ -183,12 +183,12 @@ impl SilentRows {
         }
     }
 
-    /// The number of rows, those without a requirement included.
+    /// The number of rows, including points without a requirement.
     pub(crate) fn len(&self) -> usize {
         self.limit.len()
     }
 
-    /// What `points` grid steps do.
+    /// The decay over `points` grid steps.
     fn step(&self, points: u32) -> Step {
         if points as usize <= RUN {
             self.steps.of(points as usize)
@@ -197,7 +197,7 @@ impl SilentRows {
         }
     }
 
-    /// The potential on every row, mV.
+    /// Computes the potential at every row, mV.
     pub(crate) fn potential(&self, weights: &[f64], out: &mut Vec<f64>) {
         out.clear();
         out.resize(self.len(), 0.0);
@@ -213,7 +213,7 @@ impl SilentRows {
         }
     }
 
-    /// The potential on the rows of one pattern.
+    /// Computes the potential at the rows of one pattern.
     fn potential_of(&self, lane: &Lane, weights: &[f64], rows: &mut [f64]) {
         let mut state = KernelSum::default();
         let (mut input, mut at) = (0, 0);
@@ -234,7 +234,7 @@ impl SilentRows {
         }
     }
 
-    /// Finds the worst point of each stretch in which the potential exceeds what it must not by more than `tolerance`.
+    /// Finds the worst point of each interval in which the potential exceeds its limit by more than `tolerance`.
     pub(crate) fn broken(&self, weights: &[f64], tolerance: f64) -> Vec<Peak> {
         let (mut found, mut potential) = (vec![], vec![]);
         for (pattern, lane) in self.lanes.iter().enumerate() {
@@ -256,7 +256,7 @@ impl SilentRows {
         found
     }
 
-    /// The potential on a run of rows without an input, from the state at the first of them.
+    /// Computes the potential at consecutive rows without inputs, from the state at the first of them.
     fn run(&self, mut state: KernelSum, rows: &mut [f64]) {
         for rows in rows.chunks_mut(RUN) {
             let steps = self.steps.ba.iter().zip(&self.steps.bb);
@@ -265,7 +265,7 @@ impl SilentRows {
         }
     }
 
-    /// Adds the sum of all rows, each times its factor, to `sum` (one entry a train): the adjoint of `potential`.
+    /// Adds the sum of all rows, each times its factor, to `sum` (one entry per train); the adjoint of `potential`.
     pub(crate) fn add_sum(&self, factors: &[f64], sum: &mut [f64]) {
         if let Some(written) = &self.written {
             let rows = factors.iter().zip(written.chunks_exact(self.trains));
@@ -273,39 +273,39 @@ impl SilentRows {
         }
         for lane in &self.lanes {
             let factors = &factors[lane.first..lane.first + lane.points];
-            // The sensitivity of the rows from here on to the state here.
-            let mut heard = KernelSum::default();
+            // The derivative of the factors' sum over all rows from here on with respect to the state here.
+            let mut derivative = KernelSum::default();
             let mut end = lane.points;
             for (k, jump) in lane.jumps.iter().enumerate().rev() {
                 let at = jump.point as usize;
-                heard = self.run_back(heard, &factors[at..end]);
+                derivative = self.run_back(derivative, &factors[at..end]);
                 let from = if k == 0 { 0 } else { lane.jumps[k - 1].inputs as usize };
                 for i in &lane.inputs[from..jump.inputs as usize] {
-                    sum[i.train as usize] += heard.a * i.a + heard.b * i.b;
+                    sum[i.train as usize] += derivative.a * i.a + derivative.b * i.b;
                 }
                 if jump.reset {
-                    heard = KernelSum::default();
+                    derivative = KernelSum::default();
                 }
                 end = at;
             }
         }
     }
 
-    /// The sensitivity of a run of rows, and of all after it, to the state at the first of them.
-    fn run_back(&self, mut heard: KernelSum, factors: &[f64]) -> KernelSum {
+    /// That derivative at the first of consecutive rows without inputs, given the derivative after the last of them.
+    fn run_back(&self, mut derivative: KernelSum, factors: &[f64]) -> KernelSum {
         for factors in factors.rchunks(RUN) {
             let step = self.steps.of(factors.len());
-            let KernelSum { a, b } = heard;
-            heard = KernelSum { a: a * step.aa + b * step.ba, b: b * step.bb };
+            let KernelSum { a, b } = derivative;
+            derivative = KernelSum { a: a * step.aa + b * step.ba, b: b * step.bb };
             if factors.iter().any(|&f| f != 0.0) {
-                heard.a += factors.iter().zip(&self.steps.ba).map(|(f, ba)| f * ba).sum::<f64>();
-                heard.b += factors.iter().zip(&self.steps.bb).map(|(f, bb)| f * bb).sum::<f64>();
+                derivative.a += factors.iter().zip(&self.steps.ba).map(|(f, ba)| f * ba).sum::<f64>();
+                derivative.b += factors.iter().zip(&self.steps.bb).map(|(f, bb)| f * bb).sum::<f64>();
             }
         }
-        heard
+        derivative
     }
 
-    /// The coefficients of the named rows (ascending), row after row.
+    /// The coefficients of the given rows (ascending), row after row.
     pub(crate) fn coefficients(&self, rows: &[usize]) -> Vec<f64> {
         let n = self.trains;
         if let Some(written) = &self.written {
@@ -350,7 +350,7 @@ impl SilentRows {
     }
 }
 
-/// Where the state jumps, by inputs and resets, both ascending.
+/// The points at which the state jumps, from inputs and resets, both ascending.
 fn jumps(inputs: &[GridInput], resets: &[u32]) -> Vec<Jump> {
     let mut found = Vec::new();
     let (mut input, mut reset) = (0, 0);

@@ -1,4 +1,4 @@
-//! What the objective is made of: 6.14, of which 6.11 is the case without C and D.
+//! The terms of the objective 6.14; 6.11 is the case without C and D.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,20 +6,20 @@ use super::bounds::Bounds;
 use super::targets::{TargetRow, Targets};
 use crate::vectors::dot;
 
-/// An objective that is known to this share of what it is of no weights at all is known; one below that share of it is 0.
+/// The relative accuracy of an objective, as a share of its value at weights of 0; values below that share count as 0.
 pub(crate) const NOTHING: f64 = 1e-10;
 
-/// What B(w) is divided by.
+/// The normaliser of B(w).
 ///
-/// Reading: 6.14 prints `B_max`, under which kappa is nearly powerless; divided by the number of targets it does what 6.4.5
-/// and figure 6.9 say.
+/// Reading: 6.14 prints `B_max`, with which kappa has almost no effect; with the number of targets it has the effect
+/// described in 6.4.5 and figure 6.9.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Divisor {
-    /// Its largest value over the bounds, as printed.
+    /// The largest value of B over the bounds, as printed.
     #[default]
     #[serde(rename = "B_max")]
     Largest,
-    /// How many targets there are.
+    /// The number of targets.
     #[serde(rename = "targets")]
     Targets,
 }
@@ -39,15 +39,15 @@ pub enum Norm {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[allow(non_snake_case)]
 pub struct Parts {
-    /// Sum of absolute weights.
+    /// The sum of absolute weights.
     pub l1: f64,
-    /// Length of the weights, or its square.
+    /// The length of the weights, or its square.
     pub l2: f64,
-    /// Missed lift behind the targets (6.10).
+    /// The squared distance of the potential after the targets to `kappa` thresholds (6.10).
     pub B: f64,
-    /// Missed targets (6.12).
+    /// The distances of the potential to the threshold at the targets (6.12).
     pub C: f64,
-    /// Broken silence (6.13).
+    /// The violations of silence (6.13).
     pub D: f64,
 }
 
@@ -57,7 +57,7 @@ impl Parts {
     }
 }
 
-/// Everything that turns potentials into 6.14: what each term counts by, over its largest value, and the bounds.
+/// The normalised factors of the terms of 6.14, and the bounds.
 #[derive(Debug, Clone)]
 pub(crate) struct Objective {
     pub(crate) l1: f64,
@@ -65,16 +65,16 @@ pub(crate) struct Objective {
     pub(crate) b: f64,
     pub(crate) c: f64,
     pub(crate) d: f64,
-    /// What the potential shall reach behind a target, in thresholds.
+    /// The potential that B aims at after a target, in thresholds.
     pub(crate) kappa: f64,
     pub(crate) norm: Norm,
     pub(crate) bounds: Bounds,
 }
 
-/// What a caller chooses of the objective.
+/// The caller's choices for the objective.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Choice {
-    /// `lambda_1` to `lambda_5`; where all are 0 any weights will do.
+    /// `lambda_1` to `lambda_5`; if all are 0, any feasible weights are optimal.
     pub(crate) lambdas: [f64; 5],
     pub(crate) kappa: f64,
     pub(crate) norm: Norm,
@@ -82,13 +82,13 @@ pub(crate) struct Choice {
 }
 
 impl Objective {
-    /// Normalises the terms; `d_max` gives what D comes to at the largest weights, `unit` is what a potential of 1 is, mV.
+    /// Normalises the terms; `d_max` computes D at the largest weights, `unit` is the internal unit of potentials, mV.
     ///
-    /// `silent` are the largest weights of trains without a spike, which no row has a coefficient for: their weights are 0, and
-    /// the normalisers of l1 and l2 count them as they count every train.
+    /// `silent` are the largest absolute weights of trains without a spike. No row has a coefficient for them, so their
+    /// weights are 0, but the normalisers of l1 and l2 include them like every train.
     ///
-    /// Reading: 6.3.2 takes each term's largest value over the bounds, which lie at -ub and ub; where they do not, over
-    /// -max(|lb|, |ub|) to max(|lb|, |ub|), synapse by synapse.
+    /// Reading: 6.3.2 takes each term's largest value over bounds at -ub and ub; for other bounds, the largest value is
+    /// taken over -max(|lb|, |ub|) to max(|lb|, |ub|), synapse by synapse.
     pub(crate) fn new(
         choice: Choice,
         bounds: Bounds,
@@ -113,7 +113,8 @@ impl Objective {
             },
             b: match divisor {
                 Divisor::Largest => over(b, targets.iter().map(lifted).sum()),
-                // A sum of squares over a number: the one term that is no ratio of potentials.
+                // B is a sum of squares and the number of targets has no unit, so this term alone scales with the unit
+                // of potentials.
                 Divisor::Targets => over(b, targets.len() as f64) * unit.powi(2),
             },
             c: if c > 0.0 { over(c, targets.iter().map(missed).sum()) } else { 0.0 },
@@ -124,45 +125,45 @@ impl Objective {
         }
     }
 
-    /// The terms of the weights alone: l1, and l2.
+    /// The terms l1 and l2 at these weights.
     pub(crate) fn norms(&self, weights: &[f64]) -> (f64, f64) {
         (self.l1 * weights.iter().map(|w| w.abs()).sum::<f64>(), self.of_square(dot(weights, weights)))
     }
 
-    /// The l2 term of weights whose squares sum to this.
+    /// The l2 term, given the sum of squared weights.
     pub(crate) fn of_square(&self, square: f64) -> f64 {
         self.l2 * if self.norm == Norm::Norm { square.sqrt() } else { square }
     }
 
-    /// How far the potential misses `kappa` thresholds behind each target, mV.
+    /// The distance of the potential after each target to `kappa` thresholds, mV.
     pub(crate) fn unlifted(&self, targets: &Targets, weights: &[f64]) -> Vec<f64> {
         targets.iter().map(|row| dot(row.behind, weights) - self.kappa * row.threshold).collect()
     }
 
-    /// 6.11 at these weights, by its terms.
+    /// The terms of 6.11 at these weights.
     pub(crate) fn exact_parts(&self, targets: &Targets, weights: &[f64]) -> Parts {
         let (l1, l2) = self.norms(weights);
         let missed = if self.b > 0.0 { self.unlifted(targets, weights) } else { vec![] };
         Parts { l1, l2, B: self.b * dot(&missed, &missed), ..Parts::default() }
     }
 
-    /// The same, every term times `scale`.
+    /// This objective with every term multiplied by `scale`.
     pub(crate) fn scaled(&self, scale: f64) -> Self {
         let (l1, l2, b, c, d) = (self.l1 * scale, self.l2 * scale, self.b * scale, self.c * scale, self.d * scale);
         Self { l1, l2, b, c, d, ..self.clone() }
     }
 
-    /// No weights whose objective is `most` or less hold one larger than this: l1 and l2 alone would come to more.
+    /// An upper bound on each weight if the objective is at most `most`: l1 and l2 alone would exceed it otherwise.
     pub(crate) fn reach(&self, most: f64) -> f64 {
         let reach = match self.norm {
             Norm::Norm => most / (self.l1 + self.l2),
             Norm::Square => (most / self.l1).min((most / self.l2).sqrt()),
         };
-        // Widened against rounding; without l1 and l2 there is no limit.
+        // Widened against rounding; without l1 and l2 there is no bound.
         if reach.is_nan() { f64::INFINITY } else { reach * (1.0 + 1e-9) }
     }
 
-    /// The same within bounds as narrow as that: the least lies within them too.
+    /// This objective with bounds no wider than `reach(most)`, which exclude no optimum.
     pub(crate) fn within_reach(&self, most: f64) -> Self {
         let (reach, Bounds { lower, upper }) = (self.reach(most), &self.bounds);
         let lower = lower.iter().map(|l| l.max(-reach)).collect();
@@ -171,7 +172,7 @@ impl Objective {
     }
 }
 
-/// The share of an objective that a bound below its least value leaves open; all where either is no number.
+/// The relative difference between an objective and a lower bound; infinite if either is NaN.
 pub(crate) fn relative_gap(objective: f64, bound: f64) -> f64 {
     let gap = if objective <= bound { 0.0 } else { (objective - bound) / objective };
     if gap.is_nan() { f64::INFINITY } else { gap }

@@ -2,13 +2,13 @@
 
 use super::rows::Row;
 
-/// The worst instant of a stretch in which silence is violated.
+/// The worst instant of an interval in which silence is violated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Peak {
     pub(crate) pattern: usize,
-    /// ms.
+    /// The time, ms.
     pub(crate) t: f64,
-    /// Potential less threshold plus the share of the margin, mV.
+    /// The potential plus the share of the margin, minus the threshold, mV.
     pub(crate) excess: f64,
 }
 
@@ -23,7 +23,7 @@ pub(crate) fn exceeds(x: f64, limit: f64) -> bool {
     x > limit || x.is_nan()
 }
 
-/// The largest value; NaN where one is NaN.
+/// The largest value; NaN if any value is NaN.
 pub(crate) fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(f64::NEG_INFINITY, |most, x| if x <= most || most.is_nan() { most } else { x })
 }

@@ -1,5 +1,5 @@
-//! The relaxed problem (6.12 to 6.14): violations of rows are penalised. Its value at given weights, and a bound from
-//! below on the least it can be.
+//! The relaxed problem (6.12 to 6.14), in which violations of rows are penalised: its value at given weights, and a
+//! lower bound on its least value.
 
 use std::sync::Arc;
 
@@ -10,23 +10,23 @@ use super::targets::Targets;
 use crate::vectors::{add, dot};
 use crate::{Result, Stop};
 
-/// The rows of some examples, on the grid, as 6.14 reads them.
+/// The rows of a set of examples on the grid, for 6.14.
 ///
-/// Rows are numbered: those of the grid, then the targets.
+/// Rows are numbered: grid points first, then targets.
 #[derive(Debug, Clone)]
 pub(crate) struct Relaxed {
     pub(crate) theta_0: f64,
-    /// How far below the threshold a potential may end and still count as reaching it, mV.
+    /// A potential this far below the threshold still counts as reaching it, mV.
     pub(crate) touch: f64,
     pub(crate) trains: usize,
     pub(crate) targets: Arc<Targets>,
     pub(crate) silent: SilentRows,
-    /// `B'B` of the rows behind the targets, by columns.
+    /// `B'B` of the rows after the targets, by columns.
     pub(crate) gram: Arc<Vec<f64>>,
 }
 
 impl Relaxed {
-    /// Lays out the rows of a statement; B takes the potential `delta_t` ms after the targets.
+    /// Computes the rows of a statement; B evaluates the potential `delta_t` ms after the targets.
     pub(crate) fn new(statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<Self> {
         let (neuron, trains) = (&statement.neuron, statement.trains);
         let mut rows = Self {
@@ -44,7 +44,7 @@ impl Relaxed {
         Ok(rows)
     }
 
-    /// Counts the row behind target `k` into B's matrix, or, with -1, out of it.
+    /// Adds the row after target `k` to B's matrix, or subtracts it if `sign` is -1.
     fn lift(&mut self, k: usize, sign: f64) {
         let row = self.targets.row(k).behind;
         for (column, &v) in Arc::make_mut(&mut self.gram).chunks_exact_mut(self.trains).zip(row) {
@@ -52,7 +52,7 @@ impl Relaxed {
         }
     }
 
-    /// Adds the rows of the statement's last pattern; where the caller stops it, they are as before.
+    /// Adds the rows of the statement's last pattern; if the caller stops it, nothing changes.
     pub(crate) fn push(&mut self, statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<()> {
         let (pattern, before) = (statement.examples.len() - 1, self.targets.len());
         let mut targets = Targets::clone(&self.targets);
@@ -65,7 +65,7 @@ impl Relaxed {
         Ok(())
     }
 
-    /// Takes the rows of the first pattern away.
+    /// Removes the rows of the first pattern.
     pub(crate) fn drop_first(&mut self) {
         for k in 0..self.targets.of_first() {
             self.lift(k, -1.0);
@@ -74,7 +74,7 @@ impl Relaxed {
         self.silent.drop_first();
     }
 
-    /// The same, but of the silent rows the named ones alone, written out; for solving, not for judging.
+    /// A copy with the given silent rows only, as coefficients; for solving, since its value leaves out the other rows.
     pub(crate) fn of_rows(&self, rows: &[usize]) -> Self {
         Self {
             targets: Arc::clone(&self.targets),
@@ -84,7 +84,7 @@ impl Relaxed {
         }
     }
 
-    /// The size of weights that reach the threshold at the targets, mV.
+    /// The typical size of weights that reach the threshold at the targets, mV.
     pub(crate) fn needed(&self) -> f64 {
         let (thresholds, lengths) = self
             .targets
@@ -93,7 +93,7 @@ impl Relaxed {
         if lengths > 0.0 { thresholds / lengths } else { f64::INFINITY }
     }
 
-    /// What D comes to at these weights, without its factor.
+    /// D at these weights, without its factor.
     pub(crate) fn broken_silence(&self, weights: &[f64]) -> f64 {
         let mut potential = Vec::new();
         self.silent.potential(weights, &mut potential);
@@ -101,19 +101,19 @@ impl Relaxed {
     }
 }
 
-/// Weights, and where they bring the potential.
+/// Weights, and their potentials relative to the limits.
 #[derive(Debug, Clone)]
 pub(crate) struct Point {
     pub(crate) weights: Vec<f64>,
-    /// Potential less limit on the silent rows, then potential less threshold at the targets, mV.
+    /// Potential minus limit at the silent rows, then potential minus threshold at the targets, mV.
     pub(crate) excess: Vec<f64>,
-    /// Potential less `kappa` thresholds behind the targets, mV.
+    /// Potential minus `kappa` thresholds after the targets, mV.
     pub(crate) behind: Vec<f64>,
     pub(crate) parts: Parts,
 }
 
 impl Relaxed {
-    /// 6.14 at these weights.
+    /// The weights with their potentials and the terms of 6.14.
     pub(crate) fn point(&self, objective: &Objective, weights: Vec<f64>) -> Point {
         let mut excess = Vec::with_capacity(self.silent.len() + self.targets.len());
         self.silent.potential(&weights, &mut excess);
@@ -132,12 +132,12 @@ impl Relaxed {
         Point { weights, excess, behind, parts }
     }
 
-    /// A value that 6.14 cannot fall below, whatever the weights within the bounds, given that it can be `most` or less.
+    /// A lower bound on 6.14 over all weights within the bounds, given that its least value is at most `most`.
     ///
-    /// Every term is replaced by a tangent below it, taken at some weights (which need not lie within the bounds): silence by
+    /// Every term is replaced by a tangent below it at some weights (which need not be within the bounds): silence by
     /// multipliers between 0 and D's weight, targets by multipliers between minus and plus C's, the norm by a `pull` no
-    /// longer than its factor, a square by its slope. What is left is linear and l1 over the box, and has its least value
-    /// synapse by synapse. So the bound holds whoever found the multipliers, and however.
+    /// longer than its factor, a square by its slope. The remaining function, linear plus l1 over the box, is minimised
+    /// synapse by synapse. The bound therefore holds for any multipliers, however they were found.
     pub(crate) fn bound(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> f64 {
         let reach = objective.reach(most);
         let silent = self.silent.len();
@@ -175,7 +175,7 @@ impl Relaxed {
 }
 
 impl Point {
-    /// The relative gap to a bound; 0 where the objective is 0.
+    /// The relative gap to a lower bound; 0 if the objective is 0.
     pub(crate) fn gap(&self, bound: f64) -> f64 {
         match self.parts.sum() {
             least if least <= NOTHING => 0.0,
@@ -184,7 +184,7 @@ impl Point {
     }
 }
 
-/// Where 6.14 is touched from below: weights, what they do to the rows, a multiplier a row, and the pull of the norm.
+/// The data of the tangents below 6.14: weights, their rows' excess, one multiplier per row, and the pull of the norm.
 pub(crate) struct Tangents<'a> {
     pub(crate) weights: &'a [f64],
     pub(crate) excess: &'a [f64],

@@ -1,88 +1,89 @@
-//! The rows of the stated problem (6.9, 6.10), named by pattern and time, written out on demand.
+//! The rows of the stated problem (6.9, 6.10), identified by pattern and time, and computed on demand.
 //!
-//! A *row* holds the coefficients of the weights in one linear function of them (the potential at a time, or its slope), and
-//! what it must equal or not exceed. After a spike some inputs are lost (`after_spike`); as the spikes of a learning problem
-//! are its targets, everything stays linear. No table of all rows exists (7.7 GB at 4000 inputs): a row is summed up from the
-//! inputs before it.
+//! A *row* has the coefficients of one linear function of the weights (the potential at a time, or its slope) and the
+//! value that this function must equal or not exceed. After a spike some inputs are lost (`after_spike`); because the
+//! spikes of a learning problem are its targets, everything stays linear. The rows are not stored as a table (7.7 GB at
+//! 4000 inputs): each is computed from the inputs before its time.
 //!
-//! In continuous time silence keeps a *tapered margin* below the threshold: `height` mV, and from some time before a target on
-//! less and less, as the potential has to come up to the threshold there; behind it the neuron is free until the end of its
-//! refractory time, where silence begins at once. On the grid it is the printed set of points (6.9b), with one margin for all.
+//! In continuous time silence keeps a *tapered margin* below the threshold: `height` mV, decreasing to 0 before a
+//! target, at which the potential must reach the threshold. After the target the neuron is unconstrained until the end
+//! of its refractory time, from which silence is required at once. On the grid silence is the printed set of points
+//! (6.9b), with one margin.
 
 use serde::{Deserialize, Serialize};
 
 use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Grid, KernelSum, Neuron, Shape, Time, rounding_ms};
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// From so near a target on the target's row and its slope row stand for silence, ms: rows of silence nearer than that are
-/// parallel to the target's to rounding. A neuron that crosses its threshold there fires at the target.
+/// This close before a target, ms, the target's row and its slope row replace rows of silence, which would be parallel
+/// to the target's row to within rounding. A neuron that crosses its threshold there fires at the target.
 const AT_TARGET: f64 = 0.99 * AT_EDGE;
 
-/// The name of a row.
+/// The identity of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Row {
     /// The potential at a target equals the threshold (6.9a).
     Target {
-        /// Which pattern.
+        /// The number of the pattern.
         pattern: usize,
-        /// Which of its targets.
+        /// The number of the target within the pattern.
         target: usize,
     },
-    /// The potential at a time stays below the threshold, less the margin (6.9b).
+    /// The potential at a time stays below the threshold minus the margin (6.9b).
     Silence {
-        /// Which pattern.
+        /// The number of the pattern.
         pattern: usize,
-        /// When, ms.
+        /// The time, ms.
         t: f64,
     },
-    /// The potential comes up to a target from below: its slope exceeds the threshold's by that of the margin.
+    /// The potential reaches a target from below: its slope exceeds the threshold's slope by that of the margin.
     Slope {
-        /// Which pattern.
+        /// The number of the pattern.
         pattern: usize,
-        /// Which of its targets.
+        /// The number of the target within the pattern.
         target: usize,
     },
 }
 
-/// A row written out: `coefficients.w = limit` at a target, `<= limit` else.
+/// A computed row: `coefficients.w = limit` at a target, `<= limit` otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
-    /// One a train: at a target and in silence those of the potential, in a slope row those of its slope, negated.
+    /// One per train: those of the potential at targets and in silence, those of its negated slope in a slope row.
     pub coefficients: Vec<f64>,
-    /// mV; mV/ms in a slope row.
+    /// The limit, mV; mV/ms in a slope row.
     pub limit: f64,
 }
 
-/// How far below the threshold silence stays.
+/// The distance that silence keeps below the threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Margin {
-    /// Away from targets, mV.
+    /// The distance away from targets, mV.
     pub height: f64,
-    /// How steeply it falls to 0 at a target, hence how much more steeply than the threshold the potential rises there, mV/ms;
-    /// 0 on the grid, where nothing tapers.
+    /// The slope with which the margin falls to 0 at a target, by which the potential must rise more steeply than the
+    /// threshold there, mV/ms; 0 on the grid, where the margin is constant.
     pub slope: f64,
 }
 
 impl Margin {
-    /// This margin, times a factor.
+    /// The margin multiplied by `factor`.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self { height: factor * self.height, slope: factor * self.slope }
     }
 }
 
-/// The end of the silence before a target: far from time 0 neighbouring times are farther apart than `AT_TARGET`.
+/// The end of the silence before a target: far from time 0, neighbouring times are farther apart than `AT_TARGET`.
 pub(crate) fn until(target: f64) -> f64 {
     (target - AT_TARGET).min(target.next_down())
 }
 
-/// The taper: in the kernel's own family, so that potential and margin together are one state.
+/// The taper of the margin, in the kernel's own family, so that potential and margin together are one state.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Taper {
     shape: Shape,
-    /// The state at the target, which is 0 there and falls with `slope`.
+    /// The state at the target, where the margin is 0 and falls with `slope`.
     end: KernelSum,
-    /// Where it reaches `height`, ms before the target.
+    /// The time before the target at which the margin reaches `height`, ms.
     pub(crate) length: f64,
 }
 
@@ -92,7 +93,7 @@ impl Taper {
             return Self { shape, end: KernelSum::default(), length: 0.0 };
         }
         let end = KernelSum { a: -margin.slope / shape.slope(KernelSum { a: 1.0, b: 0.0 }), b: 0.0 };
-        // The family lies above its tangent, so its height is reached within height/slope.
+        // The taper's curve is above its tangent, so it reaches the height within height/slope.
         let (mut low, mut high) = (0.0, margin.height / margin.slope);
         loop {
             let middle = f64::midpoint(low, high);
@@ -108,7 +109,7 @@ impl Taper {
         Self { shape, end, length: high }
     }
 
-    /// The state `x` ms before the target; its potential is the margin there.
+    /// The state `x` ms before the target; its potential is the margin at that time.
     pub(crate) fn before(&self, x: f64) -> KernelSum {
         self.shape.after(self.end, -x)
     }
@@ -121,15 +122,15 @@ pub(crate) struct Example {
     /// The end of the time in which silence is required, ms.
     pub(crate) end: f64,
     pub(crate) targets: Vec<f64>,
-    /// Time (ms) and train, by time.
+    /// The inputs as time (ms) and train, in order of time.
     pub(crate) inputs: Vec<(f64, u32)>,
 }
 
-/// Where silence ends in pattern `p`, ms: at the horizon, or at the later of its stop and its last target + `tau`.
+/// The end of silence in pattern `p`, ms: the horizon, or the later of the pattern's stop and its last target + `tau`.
 ///
 /// # Errors
 ///
-/// `Problem` where a target, or the pattern's start, lies behind the horizon.
+/// `Problem` if a target, or the pattern's start, is after the horizon.
 pub(crate) fn end_of(
     neuron: &Neuron,
     horizon: Option<f64>,
@@ -149,7 +150,7 @@ pub(crate) fn end_of(
 }
 
 impl Example {
-    /// The inputs before `t`, by time.
+    /// The inputs before `t`, in order of time.
     fn before(&self, t: f64) -> &[(f64, u32)] {
         &self.inputs[..self.inputs.partition_point(|i| i.0 < t)]
     }
@@ -159,7 +160,7 @@ impl Example {
         last_before(&self.targets, t)
     }
 
-    /// The first target at `t` or later.
+    /// The first target at or after `t`.
     pub(crate) fn next(&self, t: f64) -> Option<f64> {
         self.targets.get(self.targets.partition_point(|&target| target < t)).copied()
     }
@@ -170,7 +171,7 @@ fn last_before(targets: &[f64], t: f64) -> Option<f64> {
     targets.partition_point(|&target| target < t).checked_sub(1).map(|k| targets[k])
 }
 
-/// Whether an input at `s` no longer counts at `t`, the neuron having fired at these targets.
+/// Whether an input at `s` has no effect at `t`, given that the neuron fired at these targets.
 pub(crate) fn lost(neuron: &Neuron, targets: &[f64], s: f64, t: f64) -> bool {
     match neuron.after_spike {
         AfterSpike::Keep => false,
@@ -179,13 +180,13 @@ pub(crate) fn lost(neuron: &Neuron, targets: &[f64], s: f64, t: f64) -> bool {
     }
 }
 
-/// The problem, ready to state any row.
+/// The stated problem, from which any row can be computed.
 #[derive(Debug, Clone)]
 pub struct Statement {
     pub(crate) neuron: Neuron,
     pub(crate) shape: Shape,
     pub(crate) margin: Margin,
-    /// What a potential of 1 in here is, mV.
+    /// The internal unit of potentials, mV.
     pub(crate) unit: f64,
     pub(crate) taper: Taper,
     pub(crate) trains: usize,
@@ -193,14 +194,15 @@ pub struct Statement {
 }
 
 impl Statement {
-    /// Of no pattern yet, for so many trains; what a potential of 1 in here is, is `unit` mV.
+    /// A statement without patterns, for `trains` trains; `unit` is the internal unit of potentials, mV.
     pub(crate) fn new(neuron: &Neuron, margin: Margin, unit: f64, trains: usize) -> Self {
         let shape = neuron.shape();
         let (neuron, taper) = (neuron.clone(), Taper::new(shape, margin));
         Self { neuron, shape, margin, unit, taper, trains, examples: vec![] }
     }
 
-    /// Adds one more pattern, which has been checked, and where silence ends in it, ms; where the caller stops it, all is as before.
+    /// Adds a pattern, which the caller has checked, and the end of its silence, ms; if the caller stops it, nothing
+    /// changes.
     pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64, stop: Stop<'_>) -> Result<()> {
         let spikes = pattern.by_time(stop)?;
         self.examples.push(Example {
@@ -212,7 +214,7 @@ impl Statement {
         Ok(())
     }
 
-    /// Removes the first pattern; the others are numbered anew from 0.
+    /// Removes the first pattern; the others are renumbered from 0.
     pub(crate) fn drop_first(&mut self) {
         self.examples.remove(0);
     }
@@ -222,12 +224,12 @@ impl Statement {
         self.examples.pop();
     }
 
-    /// The same with another margin.
+    /// This statement with another margin.
     pub(crate) fn with_margin(&self, margin: Margin) -> Self {
         Self { margin, taper: Taper::new(self.shape, margin), ..self.clone() }
     }
 
-    /// What the margin takes off a row's limit, mV (mV/ms in a slope row).
+    /// The part of a row's limit that the margin takes, mV (mV/ms in a slope row).
     #[must_use]
     pub fn margin_of(&self, row: Row) -> f64 {
         match row {
@@ -242,7 +244,7 @@ impl Statement {
         self.examples.iter().enumerate().flat_map(|(p, example)| (0..example.targets.len()).map(move |k| (p, k)))
     }
 
-    /// When a row's time is, ms.
+    /// The time of a row, ms.
     #[must_use]
     pub fn time(&self, row: Row) -> f64 {
         match row {
@@ -251,18 +253,18 @@ impl Statement {
         }
     }
 
-    /// Writes a row out.
+    /// Computes a row.
     ///
     /// # Errors
     ///
-    /// `Problem` where the problem has no such row.
+    /// `Problem` if the problem has no such row.
     pub fn state(&self, row: Row) -> Result<Stated> {
         let mut coefficients = vec![0.0; self.trains];
         let limit = self.state_into(row, &mut coefficients)?;
         Ok(Stated { coefficients, limit })
     }
 
-    /// Writes a row out into `coefficients`, one a train; gives its limit.
+    /// Computes a row's `coefficients`, one per train, and returns its limit.
     pub(crate) fn state_into(&self, row: Row, coefficients: &mut [f64]) -> Result<f64> {
         match row {
             Row::Target { pattern, target } => {
@@ -294,18 +296,18 @@ impl Statement {
 
     /// The row of B(w) (6.10): the coefficients `delta_t` ms after a target, and the threshold at the target, mV.
     ///
-    /// Inputs after the target count: B takes the potential as it would be, had the neuron not fired there.
+    /// Inputs after the target count: B evaluates the potential as if the neuron had not fired there.
     ///
     /// # Errors
     ///
-    /// `Problem` where the problem has no such target.
+    /// `Problem` if the problem has no such target.
     pub fn behind(&self, pattern: usize, target: usize, delta_t: f64) -> Result<Stated> {
         let mut coefficients = vec![0.0; self.trains];
         let limit = self.behind_into(pattern, target, delta_t, &mut coefficients)?;
         Ok(Stated { coefficients, limit })
     }
 
-    /// Writes that out into `coefficients`, one a train; gives the threshold.
+    /// Computes the row of B in `coefficients`, one per train, and returns the threshold.
     pub(crate) fn behind_into(
         &self,
         pattern: usize,
@@ -334,7 +336,7 @@ impl Statement {
         }
     }
 
-    /// Checks that silence is required at this time.
+    /// Returns an error unless silence is required at this time.
     fn check_silent(&self, pattern: usize, t: f64) -> Result<()> {
         let example = self.example(pattern)?;
         let Example { start, end, .. } = example;
@@ -356,7 +358,7 @@ impl Statement {
         Ok(())
     }
 
-    /// Whether two patterns hold the same up to `t`: inputs, and targets that the neuron fires at.
+    /// Whether two patterns have the same inputs and the same targets before `t`.
     pub(crate) fn is_same_before(&self, t: f64, pattern: usize, other: usize) -> bool {
         let [a, b] = [pattern, other].map(|p| &self.examples[p]);
         let fired = |example: &'_ Example| example.targets.partition_point(|&target| target < t);
@@ -374,12 +376,12 @@ impl Statement {
         Grid::new(example.start, self.neuron.step_ms).place(t).is_point()
     }
 
-    /// Whether `t` lies neither at a target nor in the refractory time behind it.
+    /// Whether `t` is neither a target nor in the refractory time after one.
     pub(crate) fn is_silent(&self, example: &Example, t: f64) -> bool {
         self.is_silent_between(example.fired(t), t, example.next(t))
     }
 
-    /// The same of a time between the last target before it and the first one not before it.
+    /// Like `is_silent`, given the last target before `t` and the first one at or after `t`.
     pub(crate) fn is_silent_between(&self, fired: Option<f64>, t: f64, next: Option<f64>) -> bool {
         let free = fired.is_some_and(|target| match self.neuron.time {
             Time::Grid => t <= target + self.neuron.refractory + rounding_ms(t),
@@ -388,12 +390,12 @@ impl Statement {
         !free && next.is_none_or(|target| t <= until(target))
     }
 
-    /// The threshold at `t`, the neuron having fired at the targets before, mV.
+    /// The threshold at `t`, given that the neuron fired at the targets before, mV.
     pub(crate) fn threshold(&self, example: &Example, t: f64) -> f64 {
         self.neuron.theta_0 + self.rise(example, example.fired(t), t)
     }
 
-    /// What is left at `t` of the threshold's rise, the neuron having last fired at `fired`, mV.
+    /// The remaining threshold rise at `t`, given that the neuron last fired at `fired`, mV.
     pub(crate) fn rise(&self, example: &Example, fired: Option<f64>, t: f64) -> f64 {
         let printed = (self.neuron.first_threshold == FirstThreshold::Printed).then_some(example.start);
         self.neuron.rise(fired.or(printed), t)
@@ -407,7 +409,8 @@ impl Statement {
         }
     }
 
-    /// Adds up, by train, what `part` gives at `t` of the inputs before, the neuron having fired at `earlier` targets only.
+    /// Sums `part` of the kernels' states at `t` by train over the inputs before `t`, given spikes at the `earlier`
+    /// targets only.
     fn sum(&self, example: &Example, t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
         out.fill(0.0);
         let inputs = example.before(t);
@@ -415,7 +418,7 @@ impl Statement {
         let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
         let (mut at, mut one) = (f64::NAN, 0.0);
         for &(s, train) in &inputs[from..] {
-            // Many inputs share a time where times are whole ms: an exponential a time, not an input.
+            // With times in whole ms, many inputs share a time: the exponential is computed once per time.
             if s != at {
                 at = s;
                 one = if lost(&self.neuron, earlier, s, t) {

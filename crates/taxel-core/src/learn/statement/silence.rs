@@ -1,4 +1,4 @@
-//! Silence, in the neuron's time: on the grid or at every instant.
+//! Silence in either kind of time: at grid points or at every instant.
 
 use super::continuous::SilentTimes;
 use super::grid::SilentRows;
@@ -7,7 +7,7 @@ use super::rows::Statement;
 use crate::neuron::Time;
 use crate::{Result, Stop};
 
-/// All silence of a problem, ready to be evaluated.
+/// All silence of a problem, prepared for evaluation.
 #[derive(Debug, Clone)]
 pub(crate) enum Silence {
     /// At the points of the grid.
@@ -24,8 +24,8 @@ impl Silence {
         })
     }
 
-    /// The worst instant of each stretch in which potential, with this share of the margin, exceeds the threshold by more
-    /// than `tolerance`. On the grid the whole margin counts, as nothing lies between its rows.
+    /// The worst instant of each interval in which the potential plus `share` of the margin exceeds the threshold by
+    /// more than `tolerance`. On the grid the whole margin counts, as its rows are isolated points.
     pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
         match self {
             Self::Grid(rows) => rows.broken(weights, tolerance),
@@ -33,7 +33,7 @@ impl Silence {
         }
     }
 
-    /// The worst violation of silence with this share of the margin, mV; negative where there is none.
+    /// The worst violation of silence with this share of the margin, mV; negative if silence holds.
     pub(crate) fn worst(&self, weights: &[f64], share: f64) -> f64 {
         largest(self.broken(weights, share, f64::NEG_INFINITY).iter().map(|peak| peak.excess))
     }

@@ -1,21 +1,21 @@
-//! The rows that are read whole, whatever the learner: those at the targets (6.9a), and those behind them that B lifts (6.10).
+//! The rows that are stored: those at the targets (6.9a), and those of B shortly after them (6.10).
 
 use super::rows::{Row, Statement};
 use crate::{Result, Stop};
 
-/// The rows at all targets, written out one after the other.
+/// The rows of all targets, stored one after the other.
 #[derive(Debug, Clone)]
 pub(crate) struct Targets {
     trains: usize,
-    /// Pattern, and which of its targets.
+    /// Pattern and number of each target.
     pub(crate) names: Vec<(usize, usize)>,
-    /// ms, one a target.
+    /// The time of each target, ms.
     pub(crate) times: Vec<f64>,
-    /// mV.
+    /// The threshold at each target, mV.
     pub(crate) thresholds: Vec<f64>,
     /// Coefficients at the targets.
     pub(crate) at: Vec<f64>,
-    /// Coefficients `delta_t` later, as though the neuron had not fired at the target.
+    /// Coefficients `delta_t` later, as if the neuron had not fired at the target.
     pub(crate) behind: Vec<f64>,
 }
 
@@ -28,7 +28,7 @@ pub(crate) struct TargetRow<'a> {
 }
 
 impl Targets {
-    /// Those of all patterns of a statement, and the rows `delta_t` ms behind them.
+    /// The target rows of all patterns of a statement, and the rows `delta_t` ms after them.
     pub(crate) fn new(statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<Self> {
         let mut targets = Self {
             trains: statement.trains,
@@ -44,7 +44,7 @@ impl Targets {
         Ok(targets)
     }
 
-    /// Adds those of one more pattern.
+    /// Adds the rows of one pattern.
     pub(crate) fn push(&mut self, statement: &Statement, pattern: usize, delta_t: f64, stop: Stop<'_>) -> Result<()> {
         let mut row = vec![0.0; self.trains];
         let mut new = Self { names: vec![], times: vec![], thresholds: vec![], at: vec![], behind: vec![], ..*self };
@@ -65,7 +65,7 @@ impl Targets {
         Ok(())
     }
 
-    /// Takes those of the first pattern away; the others are numbered anew from 0.
+    /// Removes the rows of the first pattern; the others are renumbered from 0.
     pub(crate) fn drop_first(&mut self) {
         let gone = self.of_first();
         self.names.drain(..gone);
@@ -76,7 +76,7 @@ impl Targets {
         self.behind.drain(..gone * self.trains);
     }
 
-    /// How many targets the first pattern has.
+    /// The number of targets in the first pattern.
     pub(crate) fn of_first(&self) -> usize {
         self.names.partition_point(|name| name.0 == 0)
     }
@@ -90,7 +90,7 @@ impl Targets {
         TargetRow { threshold: self.thresholds[k], at: &self.at[columns.clone()], behind: &self.behind[columns] }
     }
 
-    /// The pattern's first target at `t` or later: its time, ms, and its rows.
+    /// The pattern's first target at or after `t`: its time, ms, and its rows.
     pub(crate) fn next(&self, pattern: usize, t: f64) -> Option<(f64, TargetRow<'_>)> {
         let k = self.names.iter().zip(&self.times).position(|(name, &time)| name.0 == pattern && time >= t)?;
         Some((self.times[k], self.row(k)))

@@ -1,4 +1,4 @@
-//! Matrices of van Rossum distances, train after train by stored exponentials.
+//! Matrices of van Rossum distances, train after train, by stored exponentials.
 
 use std::sync::OnceLock;
 
@@ -8,11 +8,11 @@ use crate::metrics::pairwise::Matrix;
 use crate::metrics::stored::{Entries, Frame, Query};
 use crate::metrics::{Patterns, Work};
 
-/// Rows that go together: each column's spikes are fetched once for all of them.
+/// The number of rows processed together: each column's spikes are loaded once for all of them.
 const ROWS: usize = 4;
 
 impl VanRossum {
-    /// Fills a matrix with the sums over trains.
+    /// Fills a matrix with the sums of distances over trains.
     pub(in crate::metrics) fn fill(
         &self,
         matrix: &Matrix,
@@ -27,11 +27,11 @@ impl VanRossum {
             let rows = Train::all(frame.as_ref(), a, n, work)?;
             let columns = b.map(|b| Train::all(frame.as_ref(), b, n, work)).transpose()?;
             let columns = columns.as_ref().unwrap_or(&rows);
-            let told = |group: usize| {
+            let report = |group: usize| {
                 let share = pairs * (group * ROWS).min(a.count) / a.count;
                 ((pairs * n + share) / a.trains, pairs)
             };
-            work.each(a.count.div_ceil(ROWS), &told, |group, stop| {
+            work.each(a.count.div_ceil(ROWS), &report, |group, stop| {
                 let group = group * ROWS..((group + 1) * ROWS).min(a.count);
                 for (j, column) in columns.iter().enumerate().skip(matrix.first(group.start)) {
                     stop.check()?;
@@ -51,12 +51,12 @@ impl VanRossum {
     }
 }
 
-/// A train as others are compared with it.
+/// A train prepared for comparison with others.
 struct Train {
     queries: Vec<Query>,
     entries: Entries,
     sums: Vec<[f64; 2]>,
-    /// Squared distance from no spike at all, in units of tau / 2.
+    /// The squared distance to the empty train, in units of tau / 2.
     square: f64,
 }
 
@@ -70,7 +70,7 @@ impl Train {
         Self { queries, entries, sums, square }
     }
 
-    /// Train n of each pattern.
+    /// Train n of each pattern, prepared.
     fn all(
         frame: Option<&Frame>,
         patterns: &Patterns<'_>,
@@ -86,7 +86,7 @@ impl Train {
         Ok(trains)
     }
 
-    /// The squared distance from another train, in units of tau / 2; none where it is so small beside both trains' own
+    /// The squared distance to another train, in units of tau / 2; `None` if it is so small relative to both trains'
     /// squares that their difference has lost its digits.
     #[inline]
     fn far(&self, other: &Self) -> Option<f64> {

@@ -1,8 +1,8 @@
 //! Matrices of distances with a spatial kernel, by stored exponentials.
 //!
 //! The inner product of two smoothed patterns is a sum over their spikes of the inner products of trains, weighted by
-//! what the taxels' smoothings have in common. For each row and taxel n, the row's whole pattern is stored as taxel n sees
-//! it through these weights; then each column's spikes at n are looked up once.
+//! the overlap of the taxels' spatial kernels. For each row and taxel n, the row's whole pattern is stored with the
+//! weights of taxel n; then each column's spikes at n are looked up once.
 
 use super::{Kernel, VanRossumSpatial};
 use crate::metrics::pairwise::Matrix;
@@ -11,14 +11,14 @@ use crate::metrics::van_rossum::NEAR;
 use crate::metrics::{Patterns, Work};
 use crate::{Result, Stop};
 
-/// Spikes of columns that are held ready at a time: half a GB.
+/// The number of column spikes that are stored at a time: half a GB.
 const HELD: usize = 1 << 24;
 
-/// What a look-up costs, in steps of a walk through both patterns.
+/// The cost of a look-up, in steps of a traversal of both patterns.
 const LOOK_UP: usize = 8;
 
 impl VanRossumSpatial {
-    /// Fills a matrix, by stored exponentials where that is faster.
+    /// Fills a matrix, by stored exponentials if that is faster.
     pub(in crate::metrics) fn fill(
         &self,
         kernel: &Kernel,
@@ -52,7 +52,7 @@ impl VanRossumSpatial {
 }
 
 impl Kernel {
-    /// Taxels that spike in any pattern, in any of its layers.
+    /// The taxels with a spike in any pattern, in any layer.
     fn active(&self, a: &Patterns<'_>, b: &Patterns<'_>) -> Vec<usize> {
         let mut active = vec![false; self.taxels()];
         for side in [a, b] {
@@ -63,8 +63,8 @@ impl Kernel {
         (0..self.taxels()).filter(|&n| active[n]).collect()
     }
 
-    /// What the smoothings of two taxels have in common: the sum over existing taxels of what both add there, for each two
-    /// of these.
+    /// The overlap of the spatial kernels of each two of these taxels: the sum over existing taxels of the product of
+    /// both kernels.
     fn common(&self, taxels: &[usize]) -> Vec<f64> {
         let count = taxels.len();
         let mut common = vec![0.0; count * count];
@@ -87,12 +87,12 @@ impl Kernel {
     }
 }
 
-/// A matrix in the making.
+/// The state of a matrix computation.
 struct Stored<'s> {
     metric: &'s VanRossumSpatial,
     kernel: &'s Kernel,
     frame: Frame,
-    /// Taxels that spike, and what each two have in common.
+    /// The taxels with spikes, and the overlap of each two of them.
     active: Vec<usize>,
     weights: Vec<f64>,
     rows: &'s Patterns<'s>,
@@ -115,11 +115,11 @@ impl Stored<'_> {
                 let ends = &self.columns.offsets[j * trains + n..=j * trains + n + 1];
                 &held[ends[0] - first..ends[1] - first]
             };
-            let told = |row: usize| {
+            let report = |row: usize| {
                 let pairs = matrix.pairs();
                 ((pairs * number + pairs * row / self.rows.count) / tiles, pairs)
             };
-            work.each(self.rows.count, &told, |i, stop| {
+            work.each(self.rows.count, &report, |i, stop| {
                 let begin = matrix.first(i).max(from);
                 let mut products = vec![0.0; to.saturating_sub(begin)];
                 if products.is_empty() {
@@ -146,7 +146,7 @@ impl Stored<'_> {
         Ok(())
     }
 
-    /// Row `i` as each train that spikes anywhere sees it.
+    /// The sums of row `i` with the weights of each train that has spikes.
     fn products(&self, i: usize, stop: Stop<'_>, mut seen: impl FnMut(usize, &Entries, &[[f64; 2]])) -> Result<()> {
         let (taxels, count) = (self.kernel.taxels(), self.active.len());
         let (mut sums, mut weights) = (Vec::new(), Vec::new());
@@ -175,7 +175,7 @@ impl Stored<'_> {
         Ok(())
     }
 
-    /// The squared distance of each pattern from none at all, in units of tau / 2.
+    /// The squared distance of each pattern to the empty pattern, in units of tau / 2.
     fn squares(&self, patterns: &Patterns<'_>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let offsets = vec![0; patterns.trains + 1];
         let none = Patterns { count: 1, times: &[], offsets: &offsets, ..patterns.clone() };

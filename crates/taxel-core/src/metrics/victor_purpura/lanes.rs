@@ -1,12 +1,12 @@
-//! One train against as many others, side by side, as four of the machine's vectors hold.
+//! One train compared with as many others side by side as fit in four of the machine's vectors.
 //!
-//! The same operations in the same order as for one pair, so the same bits; lanes differ only in which pairs they look
-//! at for nothing, as a step looks at all that are near enough in any lane.
+//! The operations and their order are those for a single pair, so the results are the same to the bit; a lane only
+//! considers additional pairs, since a step includes all pairs that are near enough in any lane.
 
 use crate::vectors::{Instructions, LANES, Vector, kernel, lines, lines_mut};
 use crate::{Result, Stop};
 
-/// How many pairs go side by side: four vectors' numbers, as then none waits for its own last result.
+/// The number of pairs processed side by side: those in four vectors, so that no vector waits for its own last result.
 pub(super) fn lanes(set: Instructions) -> usize {
     match set {
         Instructions::Plain => 1,
@@ -15,19 +15,19 @@ pub(super) fn lanes(set: Instructions) -> usize {
     }
 }
 
-/// Trains side by side: spike j of each, then spike j + 1.
+/// Trains stored side by side: spike j of each, then spike j + 1.
 pub(super) struct Block {
     lanes: usize,
-    /// By spike and lane; behind a lane's last spike there are infinite times.
+    /// The times by spike and lane, padded with infinity after a lane's last spike.
     times: Vec<f64>,
-    /// By spike: the earliest and the latest of all lanes.
+    /// The earliest and the latest time of all lanes, by spike.
     first: Vec<f64>,
     last: Vec<f64>,
     lengths: Vec<usize>,
 }
 
 impl Block {
-    /// As many trains as there are lanes, or fewer; the last one fills the lanes left over. There must be one.
+    /// Stores `trains`, at least one and at most one per lane; the last one also fills the remaining lanes.
     pub(super) fn new(lanes: usize, trains: &[&[f64]]) -> Self {
         let lane = |l: usize| trains[l.min(trains.len() - 1)];
         let longest = (0..lanes).map(|l| lane(l).len()).max().unwrap_or(0);
@@ -49,7 +49,7 @@ impl Block {
         }
     }
 
-    /// The distance of `a` from each train; `q` is above 0 and finite, `cost` is room that is used again.
+    /// The distance of `a` to each train; `q` must be above 0 and finite, `cost` is reusable memory.
     pub(super) fn distances(
         &self,
         set: Instructions,
@@ -82,8 +82,8 @@ kernel! {
     }
 }
 
-/// Fills the costs of turning all of `a` into the first spikes of each lane, for numbers of spikes up to the one that it
-/// gives; see [`super::VictorPurpura::between`] for what is left out.
+/// Computes the cost of turning all of `a` into the first spikes of each lane, up to the number of spikes that is
+/// returned; see [`super::VictorPurpura::between`] for the costs that are left out.
 #[inline(always)]
 fn against<V: Vector, const SIDE: usize>(
     block: &Block,
@@ -130,13 +130,13 @@ fn against<V: Vector, const SIDE: usize>(
     Ok(hi)
 }
 
-/// One spike of every lane a row.
+/// The numbers as rows of one spike of every lane.
 #[inline(always)]
 fn rows<const SIDE: usize>(numbers: &[f64]) -> &[[[f64; LANES]; SIDE]] {
     lines(numbers).as_chunks().0
 }
 
-/// As [`rows`].
+/// Mutable [`rows`].
 #[inline(always)]
 fn rows_mut<const SIDE: usize>(numbers: &mut [f64]) -> &mut [[[f64; LANES]; SIDE]] {
     lines_mut(numbers).as_chunks_mut().0

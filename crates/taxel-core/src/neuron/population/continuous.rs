@@ -1,4 +1,4 @@
-//! A block in continuous time: from one input time to the next, exact.
+//! A block of neurons in continuous time: advances exactly from one input time to the next.
 
 use super::lanes::{FADED, LANES, LOOK, Lanes, SLACK, Weight};
 use crate::neuron::continuous::ContinuousStream;
@@ -8,36 +8,37 @@ use crate::neuron::threshold::OutputSpike;
 use crate::vectors::wide;
 use crate::{Result, SpikeTrains, Stop};
 
-/// From this share of tau on the tangent is a weaker bound than the kernel's largest value.
+/// In intervals longer than this share of tau, the kernel's largest value is a tighter bound than the tangent.
 const LONG: f64 = 0.3;
 
-/// What all neurons have in common: the inputs by time, and what passes between them.
+/// The inputs in order of time and the intervals between them, shared by all neurons.
 pub(super) struct Script {
     begin: ContinuousStream,
     intervals: Vec<Interval>,
-    /// The trains of all inputs, by time.
+    /// The train of each input, in order of time.
     inputs: Vec<u32>,
-    all_hear: bool,
-    /// The slope that a state of 1 gives, of `a` and of `b`, 1/ms.
+    loses_none: bool,
+    /// The contributions of `a` and of `b` to the slope of the potential, per mV, 1/ms.
     slope: KernelSum,
-    /// The base of the threshold, less the rounding of the bound, mV.
+    /// The base of the threshold minus the rounding error of the bound, mV.
     floor: f64,
 }
 
-/// The time from one input to the next.
+/// The time from one input time to the next.
 struct Interval {
     from: f64,
     until: f64,
-    /// The inputs at its beginning end here.
+    /// The inputs at `from` end before this index.
     inputs_end: usize,
     step: Step,
-    /// What is left at its end of a rise at its beginning.
+    /// The share of a threshold rise at `from` that remains at `until`.
     fade: f64,
-    /// The time after an input up to which crossings are found, ms: an input that is so little before a crossing is at it.
+    /// The time after `from` up to which crossings are searched, ms: `AT_EDGE` beyond `until`, because an input so
+    /// shortly before a crossing counts as simultaneous with it.
     ahead: f64,
-    /// The least that is left there of the rise.
+    /// A lower bound of the share of the rise that remains after `ahead`.
     faded: f64,
-    /// Long intervals are judged by the largest value within them of a kernel that begins with them.
+    /// The largest kernel value within the interval; only for long intervals, whose potential is bounded by it.
     reach: Option<f64>,
 }
 
@@ -73,7 +74,7 @@ impl Script {
         Ok(Self {
             begin: ContinuousStream::new(neuron, threshold, trains.start),
             inputs: spikes.iter().map(|s| s.train).collect(),
-            all_hear: neuron.after_spike == AfterSpike::Keep,
+            loses_none: neuron.after_spike == AfterSpike::Keep,
             slope: KernelSum {
                 a: shape.slope(KernelSum { a: 1.0, b: 0.0 }),
                 b: shape.slope(KernelSum { a: 0.0, b: 1.0 }),
@@ -84,7 +85,7 @@ impl Script {
     }
 }
 
-/// Runs a block of neurons from start to stop; adds each one's spikes to `fired`.
+/// Runs a block of neurons from start to stop and appends each neuron's spikes to `fired`.
 pub(super) fn run<W: Weight>(
     neuron: &Neuron,
     script: &Script,
@@ -129,7 +130,8 @@ pub(super) fn run<W: Weight>(
 
 /// Whether a neuron may cross its threshold within an interval, or its refractory time may end.
 ///
-/// While a potential rises above 0 it bends down, so it stays below its tangent; where it falls it is highest now.
+/// While the potential is positive and rising, its curve is concave and stays below its tangent; while it falls, its
+/// largest value is the present one.
 #[inline(always)]
 fn may_matter(a: f64, b: f64, rise: f64, edge: f64, script: &Script, interval: &Interval) -> bool {
     let top = match interval.reach {
@@ -139,11 +141,11 @@ fn may_matter(a: f64, b: f64, rise: f64, edge: f64, script: &Script, interval: &
         }
         Some(reach) => (if b > 0.0 { b } else { 0.0 }) + (if a > 0.0 { a } else { 0.0 }) * reach,
     };
-    // A rise only falls, so what is left at the end is the least that stands in the way.
+    // The rise only decays, so the threshold is lowest at the end.
     (top >= script.floor + rise * interval.faded) | (edge <= interval.until)
 }
 
-/// Advances through the interval before, adds an input, and returns whether any neuron may fire.
+/// Decays the states through the preceding interval, adds an input, and returns whether any neuron may fire.
 #[inline(always)]
 fn one_input<W: Weight>(
     lanes: &mut Lanes,
@@ -151,12 +153,12 @@ fn one_input<W: Weight>(
     interval: &Interval,
     (step, fade): (Step, f64),
     weights: &[W; LANES],
-    hears: Option<&[f64; LANES]>,
+    receives: Option<&[f64; LANES]>,
 ) -> bool {
     let mut any = false;
     for l in 0..LANES {
         let (a, b, w) = (lanes.a[l], lanes.b[l], weights[l].into());
-        let w: f64 = hears.map_or(w, |hears| w * hears[l]);
+        let w: f64 = receives.map_or(w, |receives| w * receives[l]);
         let (a, b, rise) = (a * step.aa + w, b * step.bb + a * step.ba, lanes.rise[l] * fade);
         (lanes.a[l], lanes.b[l], lanes.rise[l]) = (a, b, rise);
         any |= may_matter(a, b, rise, lanes.edge[l], script, interval);
@@ -165,7 +167,7 @@ fn one_input<W: Weight>(
 }
 
 wide! {
-    /// Moves a block through an interval without inputs or spikes.
+    /// Decays the states of a block through an interval without spikes.
     fn pass(lanes: &mut Lanes, interval: &Interval) {
         let Step { aa, ba, bb } = interval.step;
         for l in 0..LANES {
@@ -178,8 +180,9 @@ wide! {
 }
 
 wide! {
-    /// Moves a block on from the beginning of interval `from`, its inputs still to come, up to the next one in which a
-    /// neuron may matter, or the next at which to look for Ctrl-C; that one is given, its inputs added, with who may.
+    /// Advances a block from the beginning of interval `from`, before its inputs, to the next interval in which a
+    /// neuron may fire or leave its refractory time, or at which Ctrl-C is checked. Returns that interval's index with
+    /// its inputs added, and marks in `perhaps` the neurons that may fire in it.
     fn quiet<W: Weight>(
         lanes: &mut Lanes,
         script: &Script,
@@ -195,13 +198,13 @@ wide! {
             next = interval.inputs_end;
             let mut any = false;
             if let &[train] = inputs {
-                // Mostly there is one input: all in one go.
+                // Most intervals begin with a single input: decay and input in one pass.
                 let weights = &block[train as usize];
-                any = if script.all_hear {
+                any = if script.loses_none {
                     one_input(lanes, script, interval, (step, fade), weights, None)
                 } else {
-                    let hears = lanes.hears(interval.from);
-                    one_input(lanes, script, interval, (step, fade), weights, Some(&hears))
+                    let receives = lanes.receives(interval.from);
+                    one_input(lanes, script, interval, (step, fade), weights, Some(&receives))
                 };
             } else {
                 for l in 0..LANES {
@@ -210,11 +213,11 @@ wide! {
                     lanes.b[l] = b * step.bb + a * step.ba;
                     lanes.rise[l] *= fade;
                 }
-                let hears = if script.all_hear { [1.0; LANES] } else { lanes.hears(interval.from) };
+                let receives = if script.loses_none { [1.0; LANES] } else { lanes.receives(interval.from) };
                 for &train in inputs {
                     let weights = &block[train as usize];
                     for l in 0..LANES {
-                        lanes.a[l] += weights[l].into() * hears[l];
+                        lanes.a[l] += weights[l].into() * receives[l];
                     }
                 }
                 for l in 0..LANES {

@@ -1,4 +1,4 @@
-//! A block on a grid: from point to point.
+//! A block of neurons on a grid: advances from point to point.
 
 use super::lanes::{FADED, LANES, LOOK, Lanes, SLACK, Weight};
 use crate::neuron::kernel::{KernelSum, Step};
@@ -9,37 +9,37 @@ use crate::neuron::threshold::Threshold;
 use crate::vectors::wide;
 use crate::{Result, SpikeTrains, Stop};
 
-/// What all neurons have in common: the grid and its inputs.
+/// The grid and the inputs at its points, shared by all neurons.
 pub(super) struct Script {
     threshold: Threshold,
     grid: Grid,
-    /// The base of the threshold, less the rounding of the bound, mV.
+    /// The base of the threshold minus the rounding error of the bound, mV.
     floor: f64,
     points: Vec<Point>,
     inputs: Vec<Input>,
     step: Step,
-    /// What a step leaves of a rise.
+    /// The share of a threshold rise that remains after one step.
     fade: f64,
-    all_hear: bool,
+    loses_none: bool,
 }
 
 struct Point {
     t: f64,
-    /// Inputs since the point before end here ...
+    /// The inputs after the preceding point and before this one end before this index.
     aged_end: usize,
-    /// ... and those at the point itself here: they move nothing before it is left.
+    /// The inputs exactly at the point end before this index; they change the potential only after it.
     arriving_end: usize,
 }
 
 struct Input {
     train: u32,
     t: f64,
-    /// What a weight of 1 has become at the point.
+    /// The state that an input of weight 1 has reached at the point.
     one: KernelSum,
 }
 
 impl Lanes {
-    /// The rise sets in where it is time.
+    /// Starts the decay of the threshold rise if the refractory time has ended by `t`.
     fn recover(&mut self, lane: usize, threshold: &Threshold, t: f64) {
         if self.edge[lane] <= t + rounding_ms(t) {
             self.edge[lane] = f64::INFINITY;
@@ -47,16 +47,16 @@ impl Lanes {
         }
     }
 
-    /// Adds inputs one after the other; all of them come at `now`, where it is given.
+    /// Adds inputs one after the other; if `now` is given, all of them arrive at that time.
     #[inline(always)]
-    fn hear<W: Weight>(&mut self, block: &[[W; LANES]], inputs: &[Input], now: Option<f64>, all_hear: bool) {
-        // The sums stay in registers.
+    fn add_inputs<W: Weight>(&mut self, block: &[[W; LANES]], inputs: &[Input], now: Option<f64>, loses_none: bool) {
+        // Local copies, so that the compiler keeps the sums in registers.
         let (mut a, mut b) = (self.a, self.b);
-        let hears = now.map(|now| self.hears(now));
+        let receives = now.map(|now| self.receives(now));
         for input in inputs {
             let weights = &block[input.train as usize];
             let one = input.one;
-            match (all_hear, &hears) {
+            match (loses_none, &receives) {
                 (true, _) if one.b == 0.0 => {
                     for l in 0..LANES {
                         a[l] += weights[l].into() * one.a;
@@ -69,15 +69,15 @@ impl Lanes {
                         b[l] += w * one.b;
                     }
                 }
-                (false, Some(hears)) if one.b == 0.0 => {
+                (false, Some(receives)) if one.b == 0.0 => {
                     for l in 0..LANES {
-                        a[l] += weights[l].into() * one.a * hears[l];
+                        a[l] += weights[l].into() * one.a * receives[l];
                     }
                 }
-                (false, hears) => {
-                    let hears = hears.unwrap_or_else(|| self.hears(input.t));
+                (false, receives) => {
+                    let receives = receives.unwrap_or_else(|| self.receives(input.t));
                     for l in 0..LANES {
-                        let w = weights[l].into() * hears[l];
+                        let w = weights[l].into() * receives[l];
                         a[l] += w * one.a;
                         b[l] += w * one.b;
                     }
@@ -124,14 +124,14 @@ impl Script {
             grid,
             step: shape.step(step_ms),
             fade: (-step_ms / neuron.tau_rec()).exp(),
-            all_hear: neuron.after_spike == AfterSpike::Keep,
+            loses_none: neuron.after_spike == AfterSpike::Keep,
             points,
             inputs,
         })
     }
 }
 
-/// Runs a block of neurons from start to stop; adds each one's spikes to `fired`.
+/// Runs a block of neurons from start to stop and appends each neuron's spikes to `fired`.
 pub(super) fn run<W: Weight>(
     neuron: &Neuron,
     script: &Script,
@@ -174,8 +174,9 @@ fn may_matter(lanes: &Lanes, l: usize, t: f64, floor: f64) -> bool {
 }
 
 wide! {
-    /// Moves a block on from point `from`, left with its own inputs, or from before the first one, up to the next point at
-    /// which a neuron may matter; that one is given, with who may.
+    /// Advances a block from point `from` (whose own inputs are added on leaving it), or from before the first point,
+    /// to the next point at which a neuron may fire or leave its refractory time, or Ctrl-C is checked. Returns that
+    /// point, and marks in `perhaps` the neurons that may fire there.
     fn quiet<W: Weight>(
         lanes: &mut Lanes,
         script: &Script,
@@ -189,7 +190,7 @@ wide! {
         if let Some(from) = from {
             let point = &script.points[from];
             next = point.arriving_end;
-            lanes.hear(block, &script.inputs[point.aged_end..next], Some(point.t), script.all_hear);
+            lanes.add_inputs(block, &script.inputs[point.aged_end..next], Some(point.t), script.loses_none);
         }
         for (k, point) in script.points.iter().enumerate().skip(from.map_or(0, |from| from + 1)) {
             for l in 0..LANES {
@@ -198,7 +199,7 @@ wide! {
                 lanes.b[l] = b * bb + a * ba;
                 lanes.rise[l] *= script.fade;
             }
-            lanes.hear(block, &script.inputs[next..point.aged_end], None, script.all_hear);
+            lanes.add_inputs(block, &script.inputs[next..point.aged_end], None, script.loses_none);
             let mut any = false;
             for l in 0..LANES {
                 any |= may_matter(lanes, l, point.t, floor);
@@ -209,7 +210,7 @@ wide! {
                 }
                 return Some(k);
             }
-            lanes.hear(block, &script.inputs[point.aged_end..point.arriving_end], Some(point.t), script.all_hear);
+            lanes.add_inputs(block, &script.inputs[point.aged_end..point.arriving_end], Some(point.t), script.loses_none);
             next = point.arriving_end;
         }
         None

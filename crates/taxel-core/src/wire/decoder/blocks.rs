@@ -1,8 +1,8 @@
-//! Plain stretches of a stream, many words at a time, with what instructions the machine has.
+//! Decodes plain stretches of a stream many words at a time, with the best vector instructions of the machine.
 //!
-//! Words are plain when all their bytes are in place, they are changes and intensities on the array, and their stamps do
-//! not fall. Anything else stops the loop, and the decoder takes the next word by itself: it alone says what damage,
-//! markers and steps back mean, so every set of instructions gives the same events and counts.
+//! Words are plain if all their bytes are in place, if they are changes and intensities on the array, and if their
+//! stamps do not fall. Any other word ends the loop, and the decoder decodes it alone. Only the decoder defines the
+//! meaning of damage, markers and steps back, so all instruction sets return the same events and counts.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -17,14 +17,14 @@ use super::filling::{Filling, STREAMED};
 use crate::vectors::Instructions;
 use crate::wire::v1::WORD_BYTES;
 
-/// Of a cache line.
+/// Size of a cache line, bytes.
 const LINE_BYTES: usize = 64;
 
-/// Words of the longest block.
+/// Number of words in the longest block.
 const BLOCK_WORDS: usize = 32;
 
-/// Decodes plain words from the start of `bytes` into `filling`, up to the first that is not plain; gives how many
-/// bytes they had.
+/// Decodes plain words from the start of `bytes` into `filling`, up to the first word that is not plain; returns the
+/// number of their bytes.
 pub(super) fn plain(
     set: Instructions,
     bytes: &[u8],
@@ -35,7 +35,7 @@ pub(super) fn plain(
 ) -> usize {
     let mut done = 0;
     if bytes.len() >= STREAMED {
-        // Rows that go past the caches begin where a line does.
+        // Non-temporal stores need rows that begin at a cache line.
         let ahead = filling.room.x[filling.rows..].as_ptr().align_offset(LINE_BYTES);
         let words = scalar::words(bytes, columns, rows, state, filling, ahead);
         done = words * WORD_BYTES;
@@ -45,7 +45,7 @@ pub(super) fn plain(
     }
     loop {
         done += blocks(set, &bytes[done..], columns, rows, state, filling);
-        // An odd number, so that pairs that lie across the edges of AVX2's blocks come to lie inside.
+        // An odd number, so that pairs split by the edges of AVX2's blocks are whole in the next block.
         let most = if set < Instructions::Avx2 { usize::MAX } else { BLOCK_WORDS - 1 };
         let words = scalar::words(&bytes[done..], columns, rows, state, filling, most);
         done += words * WORD_BYTES;
@@ -55,7 +55,7 @@ pub(super) fn plain(
     }
 }
 
-/// As [`plain`], whole blocks only.
+/// As [`plain`], but decodes whole blocks only.
 #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
 fn blocks(
     set: Instructions,
@@ -75,8 +75,8 @@ fn blocks(
     );
     match set {
         Instructions::Plain => 0,
-        // SAFETY: `Decoder::instructions` and `best` let a set through only where the machine has it, and every column has
-        // room for as many rows more as there are words in `bytes`, as just asserted.
+        // SAFETY: `Decoder::instructions` and `best` select a set only if the machine has it, and the assertion above
+        // guarantees that each column has room for one row per word of `bytes`.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 | Instructions::Avx512 => unsafe { avx2::blocks(bytes, columns, rows, state, filling) },
         // SAFETY: as above.

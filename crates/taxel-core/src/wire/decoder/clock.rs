@@ -1,14 +1,14 @@
-//! Stamps to time: which turn of the 16-bit counter a stamp belongs to.
+//! Unwraps the stamps of version 1: finds the turn of the 16-bit counter to which a stamp belongs.
 
 use crate::events::FARTHEST_BACK_US;
 use crate::wire::silence::silence;
 use crate::wire::v1::STAMP_US;
 
-/// How far a stamp may lie behind the latest time and still be a step back (reordered datagrams), in stamps: 0.1 s.
-/// Reading: any other lies ahead, so silences up to 6.45 s are right from the stamps alone.
+/// How far a stamp may be behind the latest time and still count as a step back (reordered datagrams), in stamps: 0.1
+/// s. Reading: any other stamp is ahead, so silences of up to 6.45 s are correct from the stamps alone.
 pub const FARTHEST_BACK: i64 = FARTHEST_BACK_US / STAMP_US;
 
-/// Stamps to a turn of the 16-bit counter: 6.5536 s.
+/// Number of stamps in a turn of the 16-bit counter: 6.5536 s.
 pub(super) const TURN: i64 = 65_536;
 
 /// Unwraps stamps into 64 bits.
@@ -16,14 +16,14 @@ pub(super) const TURN: i64 = 65_536;
 pub(in crate::wire) struct Clock {
     /// The latest time, in stamps.
     pub(super) latest: Option<i64>,
-    /// Where the last stamp was a step back: its time, in stamps.
+    /// The time of the last stamp if it was a step back, in stamps.
     pub(super) behind: Option<i64>,
-    /// When, by the host's clock, the last stamp came, us.
+    /// The host's clock when the last stamp arrived, us.
     pub(super) arrived: Option<i64>,
 }
 
 impl Clock {
-    /// Gives the unwrapped time in stamps, and whether it is a step back.
+    /// Returns the unwrapped time in stamps, and whether it is a step back.
     pub(in crate::wire) fn unwrap(&mut self, stamp: u16, arrived: Option<i64>) -> (i64, bool) {
         let Some(latest) = self.latest else {
             (self.latest, self.arrived) = (Some(i64::from(stamp)), arrived);
@@ -32,7 +32,7 @@ impl Clock {
         let ahead = (i64::from(stamp) - latest).rem_euclid(TURN);
         let mut time = if ahead >= TURN - FARTHEST_BACK { latest + ahead - TURN } else { latest + ahead };
         if let (Some(now), Some(before)) = (arrived, self.arrived) {
-            // The host's clock shows how many whole turns of the stamps the silence had.
+            // The host's clock shows how many whole turns of the counter passed during the silence.
             let expected = latest + silence(before, now) / STAMP_US;
             time += ((expected - time + TURN / 2).div_euclid(TURN)).max(0) * TURN;
         }

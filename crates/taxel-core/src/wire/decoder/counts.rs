@@ -1,26 +1,26 @@
-//! What a decoder of version 1 read, and what it dropped.
+//! Counts of what a decoder of version 1 read and dropped.
 
 use serde::{Deserialize, Serialize};
 
-/// What a decoder read, and all that it dropped, by cause.
+/// Counts of what a decoder of version 1 read and, by cause, dropped.
 ///
-/// The sums close at any time: `bytes = 5 words + skipped`, and
+/// These equations hold at any time: `bytes = 5 words + skipped`, and
 /// `words = changes + intensities + unpaired + markers + contradictory + outside`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
-    /// Bytes read; up to four of a word that is not complete count when it is, or when it is given up.
+    /// Bytes read; the bytes of an incomplete word count once it is completed or discarded.
     pub bytes: u64,
-    /// Complete words, of whatever kind.
+    /// Complete words of any kind.
     pub words: u64,
-    /// Bytes that belong to no complete word: those of short events, and those before the next first byte.
+    /// Bytes that belong to no complete word: those of incomplete words, and those before the next first byte.
     pub skipped: u64,
-    /// Events cut off by the next first byte, or by the end.
+    /// Words cut off by the next first byte, or by the end of the stream.
     pub short: u64,
-    /// Changes on the array: rows of `Events`.
+    /// Changes on the array, which are the rows of `Events`.
     pub changes: u64,
-    /// Intensities that found their change.
+    /// Intensities paired with a change.
     pub intensities: u64,
-    /// Intensities that found none.
+    /// Intensities without a change.
     pub unpaired: u64,
     /// Starts and stops.
     pub markers: u64,
@@ -28,12 +28,12 @@ pub struct Counts {
     pub contradictory: u64,
     /// Changes and intensities outside the array.
     pub outside: u64,
-    /// Changes and markers that lie behind the latest time; kept.
+    /// Changes and markers before the latest time; they are decoded.
     pub back: u64,
 }
 
 impl Counts {
-    /// What was counted since an earlier time.
+    /// The difference from an earlier state of these counts.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {

@@ -1,8 +1,9 @@
-//! Columns as version 1 fills them: an intensity comes behind its change.
+//! Columns that version 1 fills, with each intensity in the row of its change.
 
 use crate::wire::columns::Room;
 
-/// From so many bytes on, rows go to memory past the caches, which they would only fill, and without being read first.
+/// From this many bytes on, rows are written with non-temporal stores, past the caches: they would only evict other
+/// data.
 pub(super) const STREAMED: usize = 4 << 20;
 
 /// A change whose intensity may be the next word.
@@ -14,7 +15,8 @@ pub(super) struct Change {
     pub(super) p: bool,
 }
 
-/// Columns as they fill: the first `rows` entries of t, x, y, p are written, and with `paired` those of ticks, present.
+/// Columns being filled: the first `rows` entries of t, x, y, p are written, and with `paired` those of ticks and
+/// present.
 pub(super) struct Filling<'a> {
     pub(super) room: Room<'a>,
     pub(super) rows: usize,
@@ -38,14 +40,14 @@ impl Filling<'_> {
         }
     }
 
-    /// Writes "none" for the last row; there must be one.
+    /// Marks the last row as without intensity; there must be a row.
     #[inline]
     pub(super) fn without_intensity(&mut self) {
         self.room.ticks[self.rows - 1].write(0);
         self.room.present[self.rows - 1].write(false);
     }
 
-    /// Gives the last row its intensity, if it is of that taxel.
+    /// Sets the last row's intensity, if it is of the same taxel.
     #[inline]
     pub(super) fn pair(&mut self, ticks: u16, x: u16, y: u16) -> bool {
         if self.last_taxel() != (x, y) {
@@ -66,7 +68,7 @@ impl Filling<'_> {
         unsafe { (self.room.x[k].assume_init(), self.room.y[k].assume_init()) }
     }
 
-    /// Writes "none" for the rows so far, before the first intensity.
+    /// Marks all rows so far as without intensity; called before the first intensity.
     #[inline]
     pub(super) fn begin_pairs(&mut self) {
         if !self.paired {
@@ -79,7 +81,7 @@ impl Filling<'_> {
         self.rows -= 1;
         let k = self.rows;
         let Room { t, x, y, p, .. } = &self.room;
-        // SAFETY: the row was written; now it is free again.
+        // SAFETY: the row was written; its entries may be overwritten from here on.
         unsafe { Change { t: t[k].assume_init(), x: x[k].assume_init(), y: y[k].assume_init(), p: p[k].assume_init() } }
     }
 }

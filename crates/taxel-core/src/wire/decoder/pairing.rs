@@ -1,4 +1,4 @@
-//! Which change an intensity belongs to, where it is not the one before it.
+//! Pairs intensities with changes other than the word before.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,20 +9,21 @@ use crate::{Array, Events, Intensities};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Pairing {
-    /// The word directly before it, where that is a change of the same taxel. Reading: so the board sends them.
+    /// The word directly before it, if that word is a change of the same taxel. Reading: the board sends them in this
+    /// order.
     #[default]
     Direct,
-    /// The latest change of that taxel that has none yet, for boards that order otherwise. Every event waits for
-    /// [`Decoder::finish`](super::Decoder::finish), for an intensity may come at any time: for whole recordings.
+    /// The latest change of the taxel that has no intensity yet, for boards with another order. An intensity may arrive
+    /// at any time, so all events wait until [`Decoder::finish`](super::Decoder::finish): for whole recordings.
     Taxel,
 }
 
-/// Changes that wait for intensities from anywhere later in the stream.
+/// Changes that wait for an intensity from anywhere later in the stream.
 #[derive(Debug, Clone)]
 pub(super) struct ByTaxel {
     changes: Vec<Change>,
     ticks: Vec<Option<u16>>,
-    /// For each change, the unpaired change of its taxel before it.
+    /// For each change, the previous unpaired change of its taxel.
     before: Vec<Option<usize>>,
     /// For each taxel, its latest unpaired change.
     latest: Vec<Option<usize>>,
@@ -47,7 +48,7 @@ impl ByTaxel {
         self.ticks.push(None);
     }
 
-    /// Whether there was a change to pair with.
+    /// Pairs an intensity; returns whether there was an unpaired change of its taxel.
     pub(super) fn intensity(&mut self, taxel: usize, ticks: u16) -> bool {
         let Some(k) = self.latest[taxel] else { return false };
         self.ticks[k] = Some(ticks);
@@ -64,7 +65,7 @@ impl ByTaxel {
     }
 }
 
-/// Adds a change to events, with its intensity where it has one.
+/// Appends a change to events, with its intensity if it has one.
 pub(super) fn append(out: &mut Events, change: Change, ticks: Option<u16>) {
     out.t.push(change.t);
     out.x.push(change.x);

@@ -1,4 +1,4 @@
-//! Words of version 1 to events.
+//! Tests of the decoder of version 1.
 
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
 
@@ -199,12 +199,12 @@ fn sums_close_over_damage() {
     }
 }
 
-/// So many rounds; under Miri, which is thousands of times slower, two.
+/// The rounds of a test; two under Miri, which is thousands of times slower.
 fn rounds(many: u64) -> std::ops::Range<u64> {
     0..if cfg!(miri) { 2 } else { many }
 }
 
-/// A stream of runs: clean changes, pairs, a mix, stamps that jump or fall, rare kinds, damage.
+/// A stream of stretches: clean changes, pairs, a mix, stamps that jump or fall, rare kinds, damage.
 fn stream(random: &mut StdRng, words: usize) -> Vec<u8> {
     let mut bytes = vec![];
     let mut stamp: u16 = random.random();
@@ -252,7 +252,7 @@ fn stream(random: &mut StdRng, words: usize) -> Vec<u8> {
     bytes
 }
 
-/// Decodes in pieces of at most `longest` bytes; arrivals are given where `heard` is.
+/// Decodes in pieces of at most `longest` bytes, with arrival times if `heard` is set.
 fn pieces(mut decoder: Decoder, bytes: &[u8], longest: usize, heard: bool, seed: u64) -> (Events, Counts) {
     let mut random = StdRng::seed_from_u64(seed);
     let mut events = Events::empty(decoder.array().clone());
@@ -307,7 +307,7 @@ fn long_stretches_into_aligned_columns_decode_alike() {
         }
     }
     let rows = bytes.len() / WORD_BYTES + 100;
-    /// A column that begins `shift` rows behind a line's edge.
+    /// A column that begins `shift` rows after the start of a cache line.
     fn behind_edge<T>(column: &mut [T], shift: usize) -> &mut [T] {
         let edge = column.as_ptr().align_offset(64);
         let end = column.len() - 64 + edge;
@@ -424,7 +424,7 @@ fn a_thousand_million_random_bytes_neither_panic_nor_grow() {
     for round in 0..1000 {
         random.fill(&mut bytes[..]);
         if round % 2 == 1 {
-            // Bytes that are nearly words reach further into the decoder.
+            // Damage to a few bits of valid words exercises more of the decoder than random bytes do.
             for (k, byte) in bytes.iter_mut().enumerate() {
                 *byte = if k % 5 == 0 { *byte | 0x80 } else { *byte & 0x7f } ^ (u8::from(k % 977 == 0) << 7);
             }

@@ -1,4 +1,4 @@
-//! Streams and datagrams to columns that the caller lays out.
+//! Decodes streams and datagrams into columns that the caller allocated.
 
 use super::Decoder;
 use super::filling::Filling;
@@ -6,13 +6,13 @@ use crate::wire::columns::{Columns, Filled, Room};
 use crate::{Marker, Result, Stop, problem};
 
 impl Decoder {
-    /// As [`Self::push`], into columns that the caller lays out, from their first row on; where these bytes are the `last`,
-    /// the stream ends behind them. Gives the markers too. With `Pairing::Taxel` all events wait for [`Self::finish`].
+    /// As [`Self::push`], but fills columns that the caller allocated from their first row on; with `last` the stream
+    /// ends after these bytes. Also returns the markers. With `Pairing::Taxel` all events wait for [`Self::finish`].
     ///
     /// # Errors
     ///
-    /// `Problem` where a column has fewer entries than [`Self::most_rows`] asks for, and nothing was read; `Interrupted`
-    /// where asked to stop.
+    /// `Problem` if a column has fewer entries than [`Self::most_rows`] requires, in which case nothing is read;
+    /// `Interrupted` if asked to stop.
     pub fn fill(
         &mut self,
         bytes: &[u8],
@@ -21,7 +21,7 @@ impl Decoder {
         last: bool,
         stop: Stop<'_>,
     ) -> Result<Columns> {
-        /// Bytes between two looks at `stop`: some milliseconds of work.
+        /// Bytes between two checks of `stop`: some milliseconds of work.
         const PIECE: usize = 16 << 20;
         self.check_room(&room, bytes.len())?;
         let (mut done, mut markers) = (Filled { rows: 0, paired: false }, vec![]);
@@ -36,13 +36,13 @@ impl Decoder {
         Ok(Columns { filled: done, repaired: None, markers })
     }
 
-    /// As [`Self::fill`] to the end of the stream, of datagrams that lie one behind the other, each as long as `lengths` say and
-    /// decoded by itself: a change whose intensity is not in its datagram has none.
+    /// As [`Self::fill`] to the end of the stream, but decodes consecutive datagrams with these `lengths` separately: a
+    /// change whose intensity is not in its datagram has none.
     ///
     /// # Errors
     ///
-    /// `Problem` where the lengths together are not those of the bytes, or a column has too few entries, and nothing was read;
-    /// `Interrupted` where asked to stop.
+    /// `Problem` if the lengths together are not those of the bytes, or a column has too few entries, and nothing was read;
+    /// `Interrupted` if asked to stop.
     pub fn fill_datagrams(
         &mut self,
         bytes: &[u8],
@@ -50,7 +50,7 @@ impl Decoder {
         mut room: Room<'_>,
         stop: Stop<'_>,
     ) -> Result<Columns> {
-        /// Datagrams between two looks at `stop`: some milliseconds of work.
+        /// Datagrams between two checks of `stop`: some milliseconds of work.
         const PIECE: usize = 1 << 14;
         let total = lengths.iter().try_fold(0, |sum: usize, &n| sum.checked_add(usize::try_from(n).ok()?));
         if total != Some(bytes.len()) {
@@ -71,7 +71,7 @@ impl Decoder {
         Ok(Columns { filled: done, repaired: None, markers })
     }
 
-    /// Refuses columns with less room than so many bytes may need.
+    /// Checks that the columns have room for the rows of this many bytes.
     fn check_room(&self, room: &Room<'_>, bytes: usize) -> Result<()> {
         let most = self.most_rows(bytes);
         if room.len() < most {
@@ -80,7 +80,7 @@ impl Decoder {
         Ok(())
     }
 
-    /// Fills columns on from what is done.
+    /// Fills columns from the first row that is not `done`.
     fn fill_behind(
         &mut self,
         bytes: &[u8],
@@ -96,7 +96,7 @@ impl Decoder {
         *done = Filled { rows: done.rows + filled.rows, paired: filled.paired };
     }
 
-    /// Writes the change that waits for its intensity, if there is one: it has none.
+    /// Writes the change that still waits for its intensity, if there is one, without an intensity.
     fn release(&mut self, room: &mut Room<'_>, done: &mut Filled) {
         if let Some(change) = self.waiting.take() {
             let mut filling = Filling { room: room.behind(done.rows), rows: 0, paired: done.paired, open: false };

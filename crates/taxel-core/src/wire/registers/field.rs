@@ -1,38 +1,38 @@
-//! What a field of a register is, and the numbers of the array that rules need.
+//! The type of a register's field, and the numbers of the array that the rules need.
 
-/// Where a field lies, and what it may hold (Table 5.5).
+/// Position of a field in its register, and the values that it can have (Table 5.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Field {
-    /// taxel's name.
+    /// Name in taxel.
     pub name: &'static str,
-    /// The manual's.
+    /// Name in the manual.
     pub manual: &'static str,
-    /// "flag" for one that is on or off.
+    /// Unit; "flag" for a field that is on or off.
     pub unit: &'static str,
-    /// What it is for.
+    /// Description.
     pub text: &'static str,
-    /// Which of the eight.
+    /// Number of the register, 0 to 7.
     pub register: u8,
-    /// Its lowest bit.
+    /// Lowest bit.
     pub shift: u32,
-    /// Its bits, shifted down.
+    /// Mask of its bits, after shifting down.
     pub mask: u32,
-    /// What is added to the bits.
+    /// Added to the bits.
     pub offset: u32,
-    /// The least value.
+    /// Smallest valid value.
     pub least: u32,
-    /// The greatest value.
+    /// Largest valid value.
     pub greatest: u32,
 }
 
-/// What the rules know of an array on a board.
+/// The numbers of an array on a board that the rules need.
 pub(super) struct Scanned {
     pub(super) steps: u32,
     pub(super) driven_lines: u16,
     pub(super) sense_lines: u16,
 }
 
-/// 10 ns units as us, with two places.
+/// Formats a time in units of 10 ns as us, with two decimals.
 pub(super) fn us(units: i64) -> String {
     let sign = if units < 0 { "-" } else { "" };
     format!("{sign}{}.{:02}", units.abs() / 100, units.abs() % 100)

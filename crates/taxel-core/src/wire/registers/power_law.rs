@@ -1,9 +1,9 @@
 //! Made from registers.toml by tools/registers.py (`make registers`): edit that.
 
-/// Bits behind the point of [`POWER_LAW`].
+/// Number of fractional bits of [`POWER_LAW`].
 pub const POWER_LAW_FRACTION: u32 = 16;
 
-/// Ticks to the power of 0.7 (5.1), in fixed point, as the logic looks it up.
+/// Ticks to the power of 0.7 (5.1), in fixed point: the lookup table of the logic.
 pub const POWER_LAW: [u32; 2048] = [
     0, 65536, 106464, 141405, 172951, 202190, 229713, 255887, 280959, 305105, 328458, 351119, 373170, 394676, 415690,
     436258, 456419, 476205, 495645, 514763, 533582, 552120, 570395, 588423, 606217, 623789, 641152, 658316, 675290,

@@ -2,18 +2,18 @@
 
 use super::table::Registers;
 
-/// A set of registers by name.
+/// A named set of register values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Preset {
-    /// What it is called.
+    /// Name of the preset.
     pub name: &'static str,
-    /// For how many sense lines it is made.
+    /// Number of sense lines of the boards for which it is made.
     pub sense_lines: u16,
-    /// What the registers hold.
+    /// The values of the registers.
     pub registers: Registers,
 }
 
-/// The presets, in the order of the reference; the first for an array's size is what its board holds at reset.
+/// The presets, in the order of the reference; a board's registers at reset are the first preset for its array's size.
 pub const PRESETS: [Preset; 8] = [
     Preset {
         name: "5.2 kHz",

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What the registers hold, in the registers' own units (Table 5.5).
+/// The values of the registers, in the registers' own units (Table 5.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Registers {
@@ -54,7 +54,7 @@ pub struct Registers {
     pub channels: u8,
 }
 
-/// What fields that older files lack hold at reset.
+/// Values at reset of the fields that older files lack.
 mod at_reset {
     pub(super) const fn wire_version() -> u8 {
         1
@@ -71,7 +71,7 @@ mod at_reset {
 }
 
 impl Registers {
-    /// Register `n` as the board holds it; 0 where it has no such register.
+    /// The word of register `n`; 0 if there is no such register.
     #[must_use]
     pub fn word(&self, n: u8) -> u32 {
         match n {
@@ -97,7 +97,7 @@ impl Registers {
         }
     }
 
-    /// Which bits register `n` has; the others are reserved and must be 0.
+    /// Mask of the bits of register `n`; the others are reserved and must be 0.
     #[must_use]
     pub fn mask(n: u8) -> u32 {
         match n {
@@ -112,7 +112,7 @@ impl Registers {
         }
     }
 
-    /// Sets a register's fields, whatever the rules say.
+    /// Sets a register's fields without checking the rules.
     pub(super) fn store(&mut self, register: u8, value: u32) {
         match register {
             0 => {

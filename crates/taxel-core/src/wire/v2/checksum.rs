@@ -1,13 +1,14 @@
-//! CRC-32C (Castagnoli), which short datagrams want quickly too.
+//! CRC-32C (Castagnoli), with fast paths for short datagrams.
 
 #[cfg(target_arch = "x86_64")]
 use crate::vectors::Instructions;
 
-/// From so many bytes on the crate's way, several strands at once, is the faster one.
+/// From this length on, bytes, the crate's implementation is faster: it computes several strands in parallel.
 #[cfg(target_arch = "x86_64")]
 const LONG: usize = 192;
 
-/// No more bytes are summed without a branch, which lengths of a scene's datagrams would make the processor guess wrong.
+/// Longest message that is summed without a branch, bytes: the datagrams of a scene vary in length, which would cause
+/// branch mispredictions.
 #[cfg(target_arch = "x86_64")]
 pub(super) const EVEN: usize = 64;
 
@@ -21,17 +22,18 @@ pub(super) fn crc32c(bytes: &[u8]) -> u32 {
     }
     #[cfg(target_arch = "x86_64")]
     if (8..LONG).contains(&bytes.len()) && is_x86_feature_detected!("sse4.2") {
-        // SAFETY: the machine has SSE 4.2, as was just asked, and there are 8 bytes or more.
+        // SAFETY: the machine has SSE 4.2, as was just checked, and there are 8 bytes or more.
         return unsafe { short(bytes) };
     }
     crc32c::crc32c(bytes)
 }
 
-/// Bytes of a register.
+/// Size of a register, bytes.
 #[cfg(target_arch = "x86_64")]
 const REGISTER: usize = 16;
 
-/// A register with which a sum begins, by how many zero bytes come before the message: all ones are left behind those.
+/// Initial value of the CRC register, by the number of zero bytes before the message: after these zeros the register is
+/// all ones.
 #[cfg(target_arch = "x86_64")]
 static BEFORE_ZEROS: [u32; EVEN - REGISTER + 1] = {
     let mut out = [u32::MAX; EVEN - REGISTER + 1];
@@ -39,7 +41,7 @@ static BEFORE_ZEROS: [u32; EVEN - REGISTER + 1] = {
     while zeros < out.len() {
         let (mut sum, mut bit) = (out[zeros - 1], 0);
         while bit < 8 {
-            // A step back: the top bit shows whether the polynomial was added.
+            // One step backwards: the top bit shows whether the polynomial was added.
             sum = if sum >> 31 == 1 { (sum ^ 0x82f6_3b78) << 1 | 1 } else { sum << 1 };
             bit += 1;
         }
@@ -49,7 +51,8 @@ static BEFORE_ZEROS: [u32; EVEN - REGISTER + 1] = {
     out
 };
 
-/// From place `16 - k` on: a register's bytes moved `k` places to the back (`pshufb`), zeros before them.
+/// Indices for `pshufb`: those from place `16 - k` on move a register's bytes back by `k` places, with zeros before
+/// them.
 #[cfg(target_arch = "x86_64")]
 static TO_BACK: [u8; 2 * REGISTER] = {
     let mut out = [0x80; 2 * REGISTER];
@@ -61,7 +64,7 @@ static TO_BACK: [u8; 2 * REGISTER] = {
     out
 };
 
-/// Eight steps for whatever length: the message behind so many zeros that they are [`EVEN`] bytes together.
+/// The CRC-32C in eight steps at any length: zeros before the message extend it to [`EVEN`] bytes.
 ///
 /// # Safety
 ///
@@ -75,8 +78,8 @@ pub(super) unsafe fn even(bytes: &[u8]) -> u32 {
     let mut sum = u64::from(BEFORE_ZEROS[zeros]);
     for at in (0..EVEN).step_by(REGISTER) {
         let (from, moved) = (at.saturating_sub(zeros), zeros.saturating_sub(at).min(REGISTER));
-        // SAFETY: `from` is at most 16 before the end of the bytes, as `at` is before that of the 64, and 0 at least; the table has
-        // 16 bytes from place 0 to 16 on.
+        // SAFETY: `from` is at least 0 and at most 16 bytes before the end of `bytes`, as `at` is before the end of the
+        // 64 bytes; the table has 16 bytes from each of its places 0 to 16 on.
         let lanes = unsafe {
             let lanes = _mm_loadu_si128(bytes.as_ptr().add(from).cast());
             _mm_shuffle_epi8(lanes, _mm_loadu_si128(TO_BACK.as_ptr().add(REGISTER - moved).cast()))
@@ -87,8 +90,9 @@ pub(super) unsafe fn even(bytes: &[u8]) -> u32 {
     !(sum as u32)
 }
 
-/// One strand of eight bytes at a time. Zeros before a message do not change a sum that begins at 0, and beginning at all ones
-/// is the same as turning the message's first 32 bits over: so the bytes that are no whole eight come first, behind zeros.
+/// One strand, eight bytes at a time. Zeros before a message do not change a CRC that begins at 0, and beginning with
+/// all ones is equivalent to inverting the message's first 32 bits. So the bytes that do not fill a group of eight are
+/// processed first, with zeros before them.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "sse4.2")]
 fn short(bytes: &[u8]) -> u32 {
@@ -99,7 +103,8 @@ fn short(bytes: &[u8]) -> u32 {
         u64::from_le_bytes(word)
     };
     let first = eight(0) ^ 0xffff_ffff;
-    // Of `odd` bytes before the first whole eight; the turned bits that do not fit go into those.
+    // The `odd` bytes before the first group of eight; the inverted bits that do not fit into them are applied to that
+    // group.
     let odd = bytes.len() % 8;
     let (mut sum, mut at) = (0, odd);
     if odd > 0 {

@@ -1,76 +1,76 @@
-//! What a decoder of version 2 received and missed, and the board's own totals.
+//! Counts of what a decoder of version 2 received and missed, and the board's own totals.
 
 use serde::{Deserialize, Serialize};
 
-/// The board's own totals since reset, as its status datagrams say them.
+/// The board's own totals since reset, as its status datagrams report them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Status {
-    /// Frames scanned.
+    /// Number of scanned frames.
     pub frames: u64,
-    /// Events put into datagrams.
+    /// Number of events sent in datagrams.
     pub events: u64,
-    /// Events dropped, because the queue was full.
+    /// Number of events dropped because the queue was full.
     pub dropped: u64,
-    /// Datagrams made before this one.
+    /// Number of datagrams sent before this one.
     pub datagrams: u64,
-    /// Conversions whose comparator had not returned.
+    /// Number of conversions whose comparator had not returned.
     pub faults: u64,
 }
 
-/// What a decoder received, and all that it missed, by cause.
+/// Counts of what a decoder received and, by cause, missed.
 ///
-/// `datagrams = intact + repeated + old + short + long + foreign + checksum`; of each session `missing` numbers lie between the first and the last
-/// intact one and never came.
+/// `datagrams = intact + repeated + old + short + long + foreign + checksum`; `missing` counts, for each session, the
+/// numbers between its first and its last intact datagram that never arrived.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
-    /// Datagrams given to the decoder.
+    /// Number of datagrams passed to the decoder.
     pub datagrams: u64,
-    /// Those that were decoded.
+    /// Number of datagrams that were decoded.
     pub intact: u64,
-    /// Came again, and were not decoded again.
+    /// Datagrams received before; not decoded again.
     pub repeated: u64,
-    /// Came more than 65 536 numbers late, so that it is unknown whether they came before; not decoded.
+    /// Datagrams more than 65 536 numbers late, for which it is unknown whether they were received before; not decoded.
     pub old: u64,
-    /// Refused: too short.
+    /// Refused datagrams: too short.
     pub short: u64,
-    /// Refused: longer than 1400 bytes.
+    /// Refused datagrams: longer than 1400 bytes.
     pub long: u64,
-    /// Refused: not of version 2, or of another board.
+    /// Refused datagrams: not of version 2, or of another board.
     pub foreign: u64,
-    /// Refused: the checksum disagrees.
+    /// Refused datagrams: the checksum does not match.
     pub checksum: u64,
-    /// Sequence numbers that never came intact, between the first and the last of each session.
+    /// Sequence numbers that never arrived intact, between the first and the last of each session.
     pub missing: u64,
-    /// Of a kind that is not known; skipped.
+    /// Datagrams of an unknown kind; skipped.
     pub unknown_kind: u64,
-    /// With flags that are not known; decoded.
+    /// Datagrams with unknown flags; decoded.
     pub unknown_flags: u64,
-    /// Bodies that end within a word or have an offset that is too late; what stands before is decoded.
+    /// Bodies that end within a word or have an offset that is too late; the words before are decoded.
     pub malformed: u64,
-    /// Events on the array.
+    /// Number of events on the array.
     pub events: u64,
-    /// Of these, those that a state gave, because its value differed from the held one.
+    /// Events among these that were decoded from a state because its value differed from the taxel's.
     pub repaired: u64,
-    /// States on the array.
+    /// Number of states on the array.
     pub states: u64,
-    /// Of these, those that came too late: the taxel's value is newer, or the board was reset since.
+    /// States among these that were too late: the taxel's value is newer, or the board was reset since.
     pub stale: u64,
-    /// Events and states outside the array.
+    /// Number of events and states outside the array.
     pub outside: u64,
-    /// Starts and stops.
+    /// Number of starts and stops.
     pub markers: u64,
-    /// Markers of a code that is not known; left out.
+    /// Markers with an unknown code; dropped.
     pub unknown_marker: u64,
-    /// Datagrams in which the board reports dropped events.
+    /// Datagrams that report events dropped by the board.
     pub dropped: u64,
-    /// Resets that were noticed.
+    /// Number of detected resets.
     pub resets: u64,
-    /// Differences from an unknown value: their events have none.
+    /// Differences from an unknown value; their events have no value.
     pub unknown_value: u64,
 }
 
 impl Counts {
-    /// What was counted since an earlier time; numbers that were missing then and came later leave none missing.
+    /// The difference from an earlier state of these counts; 0 for `missing` if missing numbers have arrived since.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {

@@ -1,4 +1,5 @@
-//! Datagrams of version 2 to events: each intact one exactly once, whatever was lost, repeated, reordered or damaged.
+//! Decodes datagrams of version 2 to events: each intact one exactly once, whatever was lost, repeated, reordered or
+//! damaged.
 
 mod body;
 mod held;
@@ -21,53 +22,54 @@ use session::{Session, WINDOW};
 use taken::Taken;
 pub use words::stream_rows;
 
-/// Sessions that are remembered, for datagrams that come behind a reset.
+/// Number of sessions that are kept, for datagrams that arrive after a reset.
 const SESSIONS: usize = 4;
 
-/// What one datagram was.
+/// The outcome of decoding one datagram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Decoded.
     Intact {
-        /// Nothing before this comes with a higher number, us; none where nothing is promised.
+        /// No datagram with a higher number has an event before this time, us; none if nothing is promised.
         until: Option<i64>,
-        /// Numbers between the first and this one that have not come.
+        /// Sequence numbers between the session's first and this one that have not arrived.
         missing: u64,
-        /// Whether the board was reset before it.
+        /// Whether the board was reset before this datagram.
         reset: bool,
     },
-    /// It was received before, or is too old to know.
+    /// Received before, or too old to decide.
     Repeated,
-    /// No datagram of this board.
+    /// Not a datagram of this board.
     Refused(Refused),
 }
 
-/// Turns one board's datagrams into events, in the order in which they come.
+/// Decodes one board's datagrams to events, in the order in which they arrive.
 ///
-/// It keeps what each taxel holds, so that differences are added up and a state with another value becomes an event,
-/// marked as repaired. A difference from an unknown value gives an event without a value. Memory is bounded, whatever comes.
+/// The decoder stores each taxel's value, so that differences accumulate and a state with another value becomes an
+/// event, marked as repaired. A difference from an unknown value becomes an event without a value. Memory is bounded
+/// for any input.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     array: Array,
     instructions: Instructions,
     board: Option<u16>,
     sessions: Vec<Session>,
-    /// Missing numbers of sessions that are remembered no more.
+    /// Missing sequence numbers of sessions that are no longer kept.
     missed_before: u64,
-    /// When the last datagram arrived, by the host's clock, and the latest time then, us.
+    /// The host's clock when the last datagram arrived, and the latest time at that moment, us.
     last_arrival: Option<(i64, i64)>,
     latest: i64,
-    /// Whether there was time before the first session.
+    /// Whether events were received by other means before the first session.
     goes_on: bool,
     held: Held,
     status: Option<Status>,
-    /// The number of the datagram that had it, in the latest session.
+    /// Sequence number of the datagram with the latest status, in the latest session.
     status_number: i64,
     counts: Counts,
 }
 
 impl Decoder {
-    /// A decoder for the given array; it belongs to the first board of which it receives a datagram.
+    /// A decoder for the given array; it is bound to the first board from which it receives a datagram.
     #[must_use]
     pub fn new(array: Array) -> Self {
         let held = Held::new(&array);
@@ -91,7 +93,7 @@ impl Decoder {
     ///
     /// # Errors
     ///
-    /// `Problem` where this machine does not have them.
+    /// `Problem` if this machine does not have them.
     pub fn instructions(mut self, instructions: Instructions) -> Result<Self> {
         self.instructions = instructions.checked()?;
         Ok(self)
@@ -110,13 +112,14 @@ impl Decoder {
         Counts { missing, ..self.counts }
     }
 
-    /// The totals that the board last sent.
+    /// The totals in the board's last status datagram.
     #[must_use]
     pub fn status(&self) -> Option<&Status> {
         self.status.as_ref()
     }
 
-    /// Continues what was received by other means: time reached `latest` us, by the host's clock at `arrived`.
+    /// Continues after events that were received by other means: the time was `latest` us when the host's clock was
+    /// `arrived`.
     pub(crate) fn go_on_from(&mut self, latest: i64, arrived: Option<i64>) {
         self.latest = self.latest.max(latest);
         self.last_arrival = arrived.map(|now| (now, latest));
@@ -128,32 +131,32 @@ impl Decoder {
         self.latest
     }
 
-    /// Sets what the taxels hold, by index, none where that is not known: differences add up from there, and a state of the
-    /// same is no event. It holds until the board's next reset.
+    /// Sets each taxel's value, by index, none if it is unknown: differences accumulate from these values, and a state
+    /// with an equal value is no event. The values are valid until the board's next reset.
     pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
         self.held.begin_with(held);
     }
 
-    /// What each taxel holds, by index; none where that is not known.
+    /// Each taxel's value, by index; none if it is unknown.
     #[must_use]
     pub fn held(&self) -> Vec<Option<u16>> {
         self.held.by_index()
     }
 
-    /// Takes a datagram; appends its events.
+    /// Decodes a datagram; appends its events.
     ///
-    /// `arrived` is the host's clock in us. After a reset it shows how much time has passed, else time goes on from the latest
-    /// that was received.
+    /// `arrived` is the host's clock in us. After a reset it shows how much time has passed; without it, time continues
+    /// from the latest received time.
     #[inline]
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Outcome {
         self.push_table(datagram, arrived, out)
     }
 
-    /// As [`Self::push`], into columns that the caller laid out, from their first row on.
+    /// As [`Self::push`], but fills columns that the caller allocated, from their first row on.
     ///
     /// # Errors
     ///
-    /// `Problem` where a column has fewer entries than [`stream_rows`] asks for, and nothing was read.
+    /// `Problem` if a column has fewer entries than [`stream_rows`] returns; nothing is read then.
     pub fn fill(&mut self, datagram: &[u8], arrived: Option<i64>, room: Room<'_>) -> Result<(Columns, Outcome)> {
         let mut laid = Laid::new(check_room(room, datagram.len())?);
         let heard = self.push_table(datagram, arrived, &mut laid);
@@ -191,7 +194,7 @@ impl Decoder {
         }
     }
 
-    /// As [`Self::push`], of a datagram that was read and found intact.
+    /// As [`Self::push`], for a datagram that was already parsed and found intact.
     pub(in crate::wire) fn push_read(
         &mut self,
         header: &Header,
@@ -205,7 +208,7 @@ impl Decoder {
             return Outcome::Refused(Refused::Foreign);
         }
         let (which, reset) = match self.sessions.last() {
-            // As nearly all come.
+            // The usual case.
             Some(last) if last.is_next(header) => (self.sessions.len() - 1, false),
             _ => self.session(header, arrived),
         };
@@ -231,7 +234,7 @@ impl Decoder {
         if which + 1 == self.sessions.len() {
             self.body(header, body, base, Some(number), out);
         } else {
-            // An event of before a reset changes nothing that the taxels hold since.
+            // An event from before the latest reset must not change the taxels' current values.
             let blank = self.held.blank();
             let since = std::mem::replace(&mut self.held, blank);
             self.body(header, body, base, None, out);
@@ -245,8 +248,8 @@ impl Decoder {
         Outcome::Intact { until, missing, reset }
     }
 
-    /// Takes datagrams as far as they are plain and of a few words, where the machine has the instructions; `out` has room for
-    /// `most` rows. As [`Self::push_read`] of each, without arrivals.
+    /// Decodes datagrams while they are plain and short, if the machine has the instructions; `out` has room for `most`
+    /// rows. The result equals that of [`Self::push_read`] for each datagram, without arrival times.
     #[inline]
     #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
     pub(in crate::wire::v2) fn plain<'d>(
@@ -263,8 +266,8 @@ impl Decoder {
             && let Some((mut run, value)) = Run::new(first, board, session, held, latest, counts)
             && (value == 0 || out.paired())
         {
-            // SAFETY: the machine has this set, as `instructions` and `best` see to. A run writes each row that it counts, and
-            // with `paired` its ticks and present.
+            // SAFETY: `instructions` and `best` select a set only if the machine has it. A run writes each row that it
+            // counts, and with `paired` its ticks and present.
             unsafe {
                 out.rows(most, false, false, |room, row, paired| match value {
                     0 => run.take::<0>(datagrams, room, row, paired),
@@ -277,12 +280,12 @@ impl Decoder {
         Taken::default()
     }
 
-    /// Which session a datagram belongs to, and whether it begins one.
+    /// The session of a datagram, and whether the datagram begins it.
     fn session(&mut self, header: &Header, arrived: Option<i64>) -> (usize, bool) {
-        // The latest of a number, should two have drawn it.
+        // The latest session with this number, in case two resets drew the same one.
         if let Some(which) = self.sessions.iter().rposition(|session| session.number == header.session) {
             let session = &self.sessions[which];
-            // The same number drawn twice: everything begins at 0 again.
+            // Two successive resets drew the same number: the session begins again.
             let again = session.number_of(header.sequence) <= session.highest - WINDOW as i64
                 && header.sequence < 1024
                 && header.base < session.latest;
@@ -300,8 +303,8 @@ impl Decoder {
             };
             self.latest + passed.max(0) - header.base as i64
         };
-        // After its reset the board compares with 0, and sends every taxel that differs from it. Its first datagrams may be lost,
-        // and where it sent version 1 before there may have been no reset.
+        // After its reset the board compares with 0, and sends every taxel whose value differs. If its first datagrams
+        // are lost, or if it only changed from version 1 without a reset, the other taxels' values are unknown.
         let whole = header.sequence == 0 && !(began && self.goes_on);
         if whole || !began {
             self.held.forget(whole.then_some(0));
@@ -316,7 +319,7 @@ impl Decoder {
     }
 }
 
-/// Columns with room for what so many bytes may give.
+/// The columns, if they have room for the rows of this many bytes.
 pub(in crate::wire::v2) fn check_room(room: Room<'_>, bytes: usize) -> Result<Room<'_>> {
     let most = stream_rows(bytes);
     if room.len() < most {

@@ -1,49 +1,44 @@
-//! Events of any origin as datagrams of version 2, in their own order: what a file keeps of a table.
+//! Encodes events of any origin as datagrams of version 2, in their own order, for files that store a table of events.
 //!
-//! Unlike a board ([`super::Packer`]) a table may step back in time, mix events with values and without, and hold events
-//! that states gave. Every event is written; decoding gives back the same columns.
+//! Unlike a board ([`super::Packer`]), a table may step back in time, mix events with values and without, and contain
+//! events that were decoded from states. Every event is written; decoding returns the same columns.
 
 use super::packer::{add, first_line, put, steps};
 use super::{
-    BASE_BITS, DATAGRAM_BYTES, HEADER_BYTES, Header, Kind, LATEST_OFFSET, Layout, START, STOP, TRAILER_BYTES, before,
+    BASE_BITS, BODY_BYTES, DATAGRAM_BYTES, Header, Kind, LATEST_OFFSET, Layout, NEVER, START, STOP, before,
     checked_stride,
 };
 use crate::events::EventsView;
 use crate::{Result, problem};
 
-/// Bytes of a body at most.
-const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
-
-/// The first number: 0 would say that the board was reset, and that every taxel holds 0.
+/// The first sequence number: 0 would mean that the board was reset, and that every taxel's value is 0.
 const FIRST_SEQUENCE: u32 = 1;
-
-/// Before any time.
-const NEVER: i64 = i64::MIN;
 
 /// Events as datagrams.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Encoded {
-    /// What is added to times in the datagrams, us.
+    /// Added to times in the datagrams, us.
     pub origin_us: i64,
-    /// Where each begins, and at last where all end.
+    /// Where each datagram begins, and where the last one ends.
     pub offsets: Vec<i64>,
-    /// Their bytes.
+    /// Their bytes, one datagram after the other.
     pub bytes: Vec<u8>,
-    /// A time of each, us: what it promises, or the latest of its events.
+    /// A time of each datagram, us: its promise, or the latest time of its events.
     pub times: Vec<i64>,
-    /// The numbers of events that are marked as repaired and could not be written as states: a decoder would have made another
-    /// event of them.
+    /// Indices of events that are marked as repaired but could not be written as states, because a decoder would decode
+    /// another event.
     pub unmarked: Vec<i64>,
 }
 
 /// Writes events as datagrams.
 ///
-/// `held` is what the taxels hold at first by index, 65 535 where that is not known: what a file says before its first datagram.
-/// With `promised` each datagram promises that nothing before a time follows, as far as that is so.
+/// `held` is each taxel's value before the first event, by index, 65 535 if it is unknown; a file stores it before the
+/// first datagram. With `promised` each datagram promises that no later one has an event before a time, if that is
+/// true.
 ///
 /// # Errors
 ///
-/// `Problem` where the array has more than 65 536 positions, or times span more than 8.9 years.
+/// `Problem` if the array has more than 65 536 positions, or times span more than 8.9 years.
 pub fn encode(events: EventsView<'_>, held: Option<&[u16]>, promised: bool) -> Result<Encoded> {
     let times = || events.t.iter().copied().chain(events.markers.iter().map(|marker| marker.t));
     let (first, last) = (times().min().unwrap_or(0), times().max().unwrap_or(0));
@@ -53,7 +48,7 @@ pub fn encode(events: EventsView<'_>, held: Option<&[u16]>, promised: bool) -> R
         return Err(problem!("times from {first} to {last} us: a file of datagrams holds at most 8.9 years"));
     }
     let mut writer = Writing::new(events, held, origin_us)?;
-    // The earliest time from each event on, and behind the last one.
+    // The earliest time from each event on; the last entry belongs to the end.
     let mut from_here = vec![i64::MAX; events.t.len() + 1];
     if promised {
         for k in (0..events.t.len()).rev() {
@@ -78,13 +73,13 @@ pub fn encode(events: EventsView<'_>, held: Option<&[u16]>, promised: bool) -> R
     Ok(writer.out)
 }
 
-/// The datagram that fills, and what a decoder holds after what is written.
+/// The current datagram, and the taxels' values as a decoder will have them.
 struct Writing<'a> {
     events: EventsView<'a>,
     out: Encoded,
     sequence: u32,
     stride: u8,
-    /// Whether every value fits 8 bits.
+    /// Whether every value fits in 8 bits.
     small: bool,
     kind: Kind,
     body: Vec<u8>,
@@ -121,7 +116,7 @@ impl<'a> Writing<'a> {
         })
     }
 
-    /// Adds an event; nothing from here on is earlier than `promise`.
+    /// Adds an event; no later event is earlier than `promise`.
     fn event(&mut self, k: usize, promise: i64) {
         let events = self.events;
         let (t, x, y, p) = (events.t[k], events.x[k], events.y[k], events.p[k]);
@@ -132,7 +127,7 @@ impl<'a> Writing<'a> {
         let Some(word) = kind.layout() else { return };
         let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
         let offset = t.checked_sub(self.base).and_then(|us| u64::try_from(us).ok());
-        // A state's time is that of its datagram, and its places ascend.
+        // A state has the time of its datagram, and positions of states ascend.
         let goes_on = !self.body.is_empty()
             && kind == self.kind
             && offset.is_some_and(|us| if states { us == 0 && position > self.position } else { us <= LATEST_OFFSET })
@@ -157,7 +152,7 @@ impl<'a> Writing<'a> {
         }
     }
 
-    /// What an event is written as: a state only where a decoder makes the same event of it.
+    /// The kind as which an event is written; a state only if a decoder decodes the same event from it.
     fn kind_of(&mut self, k: usize, index: usize, value: Option<u16>) -> Kind {
         let repaired = self.events.is_repaired(k);
         let Some(value) = value else {
@@ -177,20 +172,20 @@ impl<'a> Writing<'a> {
         }
     }
 
-    /// Bytes that an event takes at most in the body that fills.
+    /// Most bytes that an event takes in the current body.
     fn room(&self, word: Layout, t: i64, position: i64) -> usize {
         let again = t != self.at || position <= self.position;
         let gap = if again { position } else { position - self.position - 1 };
         word.bytes * (steps(word, gap) + if again { 2 } else { 0 })
     }
 
-    /// Ends the datagram that fills, where there is one; nothing behind it is earlier than `promise`.
+    /// Ends the current datagram, if there is one; no later event is earlier than `promise`.
     fn flush(&mut self, promise: i64) {
         if self.body.is_empty() {
             return;
         }
         let body = std::mem::take(&mut self.body);
-        // A promise at the end of all is that of the last event.
+        // The promise of the last datagram is the time after the last event.
         let until = if promise == i64::MAX { self.latest + 1 } else { promise };
         let span = until.saturating_sub(self.base).clamp(0, i64::from(u16::MAX)) as u16;
         let time = if span > 0 { self.base + i64::from(span) } else { self.latest };
@@ -233,7 +228,7 @@ mod tests {
     use crate::wire::v2::Decoder;
     use crate::{Array, Events, Intensities, Marker};
 
-    /// Decodes what was written, as a file's reader does.
+    /// Decodes what was written, as a reader of files does.
     fn again(encoded: &Encoded, array: &Array, held: Option<&[u16]>) -> Events {
         let (mut decoder, mut events) = (Decoder::new(array.clone()), Events::empty(array.clone()));
         decoder.begin_with(held.unwrap_or_default().iter().map(|&h| (h != u16::MAX).then_some(h)));
@@ -314,7 +309,7 @@ mod tests {
     fn what_a_state_gave_stays_marked_where_a_decoder_can_give_it_again() {
         let array = Array::new(2, 2, 1.0, "four").unwrap();
         let mut events = Events::empty(array.clone());
-        // Known 5 to 9, unknown to 7, 9 to 9 (no event of a decoder), 9 to 3 said to rise.
+        // Values 5 to 9, unknown to 7, 9 to 9 (no decoder outputs this event), and 9 to 3 with rising polarity.
         for (t, x, p, repaired) in [(0, 0, true, true), (1, 1, true, true), (2, 0, true, true), (3, 0, true, true)] {
             events.t.push(t);
             events.x.push(x);

@@ -1,39 +1,36 @@
-//! Events to datagrams of version 2, as the board sends them.
+//! Encodes events as datagrams of version 2, as the board sends them.
 
 use super::{
-    DATAGRAM_BYTES, DIFFERENCES, DROPPED, FRAME_SYNC, HEADER_BYTES, Header, Kind, LAST_LINE, LATEST_OFFSET, Layout,
-    START, STOP, Status, TRAILER_BYTES, before, checked_stride,
+    BODY_BYTES, DATAGRAM_BYTES, DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, LAST_LINE, LATEST_OFFSET, Layout,
+    START, STOP, Status, before, checked_stride,
 };
 use crate::{Array, Result, problem};
 
-/// Bytes of a body at most.
-const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
-
-/// For so long after an event every frame is promised, us.
+/// For how long after an event the end of every frame is promised, us.
 const RESTLESS_US: u64 = 100_000;
 
-/// What a board's datagrams have in common.
+/// The settings that a board's datagrams share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// Which board.
+    /// Number of the board.
     pub board: u16,
-    /// Which reset.
+    /// Random number drawn at each reset.
     pub session: u16,
-    /// What its events are sent as: changes, small or large ones.
+    /// The kind in which its events are sent: changes without values, with small or with large values.
     pub kind: Kind,
     /// All events of a frame carry its time.
     pub frame_sync: bool,
     /// Values are differences.
     pub differences: bool,
-    /// For how long events may wait for company, us; 0 sends each frame at its end.
+    /// Longest time that an event may wait for more events, us; 0 sends each frame at its end.
     pub hold_us: u64,
-    /// How often time is promised where nothing happens, us.
+    /// Interval between promises while there are no events, us.
     pub heartbeat_us: u64,
 }
 
-/// Gathers events into datagrams; gives each to a sink, with how many events it holds.
+/// Gathers events into datagrams and passes each datagram to a sink, with its number of events.
 ///
-/// Times are us since reset and never step back; within one time and line, rows ascend.
+/// Times are us since reset and never decrease; within one time and line, rows ascend.
 #[derive(Debug, Clone)]
 pub struct Packer {
     settings: Settings,
@@ -45,10 +42,10 @@ pub struct Packer {
     events: usize,
     base: u64,
     at: u64,
-    /// From where the positions of the datagram that fills count.
+    /// The line from which the positions of the current datagram count.
     line: u8,
     position: i64,
-    /// Nothing before this comes any more.
+    /// No later event is before this time, us.
     promised: u64,
     last_event: Option<u64>,
     datagram: Vec<u8>,
@@ -59,7 +56,7 @@ impl Packer {
     ///
     /// # Errors
     ///
-    /// `Problem` where the array's positions need more than 16 bits, or the kind is none of events.
+    /// `Problem` if the array's positions need more than 16 bits, or the kind is not one of events.
     pub fn new(settings: Settings, array: &Array) -> Result<Self> {
         let stride = checked_stride(array)?;
         let word = layout(settings.kind)?;
@@ -81,7 +78,7 @@ impl Packer {
         })
     }
 
-    /// Goes on with other settings; nothing may wait ([`Self::flush`]), and the kind must be one of events.
+    /// Continues with other settings; no event may be waiting ([`Self::flush`]), and the kind must be one of events.
     pub(crate) fn follow(&mut self, settings: Settings) {
         debug_assert_eq!(self.events, 0);
         if let Ok(word) = layout(settings.kind) {
@@ -89,13 +86,13 @@ impl Packer {
         }
     }
 
-    /// How many events wait in the datagram that fills.
+    /// Number of events in the current datagram.
     #[must_use]
     pub fn waiting(&self) -> usize {
         self.events
     }
 
-    /// Says that an event was dropped: the next datagram carries the flag.
+    /// Notes that an event was dropped; the next datagram carries the flag.
     pub fn dropped(&mut self) {
         self.dropped = true;
     }
@@ -124,8 +121,8 @@ impl Packer {
         self.last_event = Some(t);
     }
 
-    /// Ends a frame: everything before `now` was added, and the next frame ends at `next`; sends what is due: events, or a
-    /// heartbeat.
+    /// Ends a frame: every event before `now` was added, and the next frame ends at `next`. Sends what is due: events,
+    /// or a heartbeat.
     pub fn over(&mut self, now: u64, next: u64, sink: &mut impl FnMut(&[u8], usize)) {
         if self.events > 0 {
             if next - self.base > self.settings.hold_us {
@@ -140,14 +137,14 @@ impl Packer {
         }
     }
 
-    /// Sends what waits, whatever the hold.
+    /// Sends the events that wait, regardless of the hold time.
     pub fn flush(&mut self, now: u64, sink: &mut impl FnMut(&[u8], usize)) {
         if self.events > 0 {
             self.send(now, sink);
         }
     }
 
-    /// Sends start or stop of a recording, behind what waits.
+    /// Sends the start or stop of a recording, after the events that wait.
     pub fn marker(&mut self, t: u64, start: bool, sink: &mut impl FnMut(&[u8], usize)) {
         self.flush(t, sink);
         let mut body = vec![0; 4];
@@ -157,7 +154,7 @@ impl Packer {
         self.write(Kind::Markers, &body, (0, 0), 0, sink);
     }
 
-    /// Sends the board's totals; how many datagrams went before is known here.
+    /// Sends the board's totals; the packer itself fills in the number of datagrams.
     pub fn status(&mut self, t: u64, status: &Status, sink: &mut impl FnMut(&[u8], usize)) {
         self.flush(t, sink);
         let totals = [status.frames, status.events, status.dropped, self.sequence.into(), status.faults];
@@ -166,7 +163,7 @@ impl Packer {
         self.write(Kind::Status, &body, (0, 0), 0, sink);
     }
 
-    /// Tells values again: taxels by ascending position, each with the value that the board compares with.
+    /// Sends values again as states: taxels by ascending position, each with the value that the board compares with.
     pub fn states(
         &mut self,
         t: u64,
@@ -198,14 +195,14 @@ impl Packer {
         }
     }
 
-    /// What an event takes.
+    /// Number of bytes that an event takes.
     fn bytes(&self, t: u64, position: i64) -> usize {
         let again = t != self.at || position <= self.position;
         let gap = if again { position } else { position - self.position - 1 };
         self.word.bytes * (steps(self.word, gap) + if again { 2 } else { 0 })
     }
 
-    /// Sends the body, with the promise that nothing before `now` comes any more.
+    /// Sends the body, with the promise that no later event is before `now`.
     fn send(&mut self, now: u64, sink: &mut impl FnMut(&[u8], usize)) {
         let body = std::mem::take(&mut self.body);
         let span = now - self.base;
@@ -216,14 +213,14 @@ impl Packer {
         self.body.clear();
         self.events = 0;
         if span > u64::from(u16::MAX) {
-            // A promise longer than 16 bits is an empty datagram with a later base.
+            // A promise that exceeds 16 bits is sent as an empty datagram with a later base.
             self.base = now - u64::from(u16::MAX);
             self.write(self.settings.kind, &[], (0, u16::MAX), 0, sink);
             self.promised = now;
         }
     }
 
-    /// Sends a body whose positions begin in a line, with its span.
+    /// Sends a body whose positions count from a line, with its span.
     fn write(
         &mut self,
         kind: Kind,
@@ -254,12 +251,12 @@ impl Packer {
     }
 }
 
-/// The line that positions begin in where the first event lies in a column.
+/// The line from which positions count if the first event is in column `x`.
 pub(super) fn first_line(x: u16) -> u8 {
     x.min(LAST_LINE) as u8
 }
 
-/// How the words of a kind of events are laid out.
+/// The layout of the words of a kind of events.
 fn layout(kind: Kind) -> Result<Layout> {
     match kind {
         Kind::Changes | Kind::Small | Kind::Large => kind.layout(),
@@ -268,13 +265,13 @@ fn layout(kind: Kind) -> Result<Layout> {
     .ok_or_else(|| problem!("events are sent as changes, small or large ones"))
 }
 
-/// Words that a gap and its event take.
+/// Number of words for a gap and its event.
 pub(super) fn steps(word: Layout, gap: i64) -> usize {
     let (step, most) = word.advance();
     if gap < i64::from(word.control()) { 1 } else { 1 + ((gap / step) as u64).div_ceil(most as u64) as usize }
 }
 
-/// Adds an event `gap` positions behind the one expected.
+/// Appends an event `gap` positions after the expected one.
 pub(super) fn add(body: &mut Vec<u8>, word: Layout, mut gap: i64, p: bool, value: u16) {
     let (step, most) = word.advance();
     if gap >= i64::from(word.control()) {

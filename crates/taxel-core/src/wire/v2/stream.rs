@@ -1,4 +1,4 @@
-//! Datagrams in files and on streams, each behind its length: cut anywhere, and found again after damage.
+//! Datagrams in files and on streams, each preceded by its length; a reader resynchronises after damage.
 
 use super::counts::Counts;
 use super::decoder::{Decoder, check_room, stream_rows};
@@ -6,42 +6,42 @@ use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, LENGTH_BYTES, TRAILER_BYTES};
 use crate::wire::columns::{Columns, Laid, Room};
 use crate::{Array, Result, Stop};
 
-/// Cuts a stream into datagrams. What is none is skipped byte by byte and counted, to the next place where length, magic and
-/// checksum agree.
+/// Cuts a stream into datagrams. Bytes that belong to none are skipped and counted, up to the next place where length,
+/// magic byte and checksum are valid.
 #[derive(Debug, Clone, Default)]
 pub struct StreamReader {
-    /// What may still become a datagram.
+    /// Bytes that may still become part of a datagram.
     rest: Vec<u8>,
     skipped: u64,
 }
 
 impl StreamReader {
-    /// Takes the next bytes; gives each whole datagram to `take`.
+    /// Consumes the next bytes; passes each whole datagram to `take`.
     pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8])) {
         self.rest.extend_from_slice(bytes);
         let done = cut(&self.rest, false, &mut self.skipped, &mut take);
         self.rest.drain(..done);
     }
 
-    /// Bytes that belonged to no datagram so far; those that may still become one are not counted.
+    /// Number of bytes that belonged to no datagram so far, without those that may still become part of one.
     #[must_use]
     pub fn skipped(&self) -> u64 {
         self.skipped
     }
 
-    /// Ends the stream: what waited for more is no datagram, but one that lies within it is given to `take`.
+    /// Ends the stream: the remaining bytes are not a datagram, but a whole datagram within them is passed to `take`.
     pub fn finish(&mut self, mut take: impl FnMut(&[u8])) {
         cut(&self.rest, true, &mut self.skipped, &mut take);
         self.rest.clear();
     }
 }
 
-/// Where the datagrams of a stream go.
+/// The destination of a stream's datagrams.
 trait Sink {
-    /// Takes those that lie ahead, as many as it likes; gives how many bytes they have, with their lengths.
+    /// Consumes any number of the datagrams ahead; returns the number of their bytes, with their lengths.
     fn run(&mut self, ahead: &[u8]) -> usize;
 
-    /// Takes one that was found intact.
+    /// Consumes one intact datagram.
     fn take(&mut self, datagram: &[u8], header: &Header, body: &[u8]);
 }
 
@@ -55,8 +55,8 @@ impl<F: FnMut(&[u8])> Sink for F {
     }
 }
 
-/// Gives each whole datagram that begins in `bytes` to a sink; gives how many bytes are done with: all of them where the
-/// stream ends there.
+/// Passes each whole datagram that begins in `bytes` to a sink; returns the number of bytes consumed: all of them if
+/// the stream ends there.
 fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl Sink) -> usize {
     let mut at = 0;
     loop {
@@ -86,18 +86,18 @@ fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, sink: &mut impl Sink) -> usi
     at
 }
 
-/// What a whole stream held, but for the rows themselves.
+/// The result of decoding a whole stream, apart from the rows themselves.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Decoded {
-    /// What the columns hold.
+    /// Description of the filled columns.
     pub columns: Columns,
-    /// What was received and missed.
+    /// Counts of what was received and missed.
     pub counts: Counts,
-    /// Bytes that belonged to no datagram.
+    /// Number of bytes that belonged to no datagram.
     pub skipped: u64,
 }
 
-/// What lies one behind the other, each behind its length.
+/// Splits consecutive datagrams, each preceded by its length.
 fn ahead(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
     std::iter::from_fn(move || {
         let (length, rest) = bytes.split_first_chunk::<LENGTH_BYTES>()?;
@@ -107,7 +107,7 @@ fn ahead(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
     })
 }
 
-/// A decoder and the columns that it fills.
+/// A decoder, and the columns that it fills.
 struct Filling<'a>(Decoder, Laid<'a>);
 
 impl Sink for Filling<'_> {
@@ -121,14 +121,14 @@ impl Sink for Filling<'_> {
     }
 }
 
-/// Decodes a whole stream of one board's datagrams into columns that the caller laid out, from their first row on.
+/// Decodes a whole stream of one board's datagrams into columns that the caller allocated, from their first row on.
 ///
 /// # Errors
 ///
-/// `Problem` where a column has fewer entries than [`stream_rows`] asks for, and nothing was read; `Interrupted` where asked to
-/// stop.
+/// `Problem` if a column has fewer entries than [`stream_rows`] returns, in which case nothing is read; `Interrupted`
+/// if asked to stop.
 pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Result<Decoded> {
-    /// Bytes between two looks at `stop`: some milliseconds of work, and more than a datagram.
+    /// Bytes between two checks of `stop`: some milliseconds of work, and more than a datagram.
     const PIECE: usize = 1 << 20;
     let laid = Laid::new(check_room(room, bytes.len())?);
     let (mut filling, mut skipped, mut rest) = (Filling(Decoder::new(array), laid), 0, bytes);

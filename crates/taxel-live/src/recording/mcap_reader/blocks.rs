@@ -1,4 +1,4 @@
-//! The chunks of a file, read one at a time.
+//! Reads the chunks of a file one at a time.
 
 use std::fs::File;
 use std::os::unix::fs::FileExt;
@@ -11,7 +11,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use crate::recording::{Header, limits};
 use crate::{Error, Result};
 
-/// A chunk, or a run of records outside chunks (as other tools may write them).
+/// A chunk, or a sequence of records outside chunks (as other tools may write them).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
     pub(super) offset: u64,
@@ -46,7 +46,7 @@ impl Blocks {
         Ok(header)
     }
 
-    /// Hands out the records of a block until `take` returns false; returns whether the block is sound.
+    /// Passes the records of a block to `take` until it returns false; returns whether the block is valid.
     pub(super) fn records(
         &self,
         block: Block,
@@ -66,13 +66,14 @@ impl Blocks {
         while let Some(event) = reader.next_event() {
             match event {
                 Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                    // At the end no bytes are given: the reader then ends, or returns what is missing.
+                    // At the end of the block no bytes are available: the reader then ends, or reports that data are
+                    // missing.
                     let more = wanted.min(length - given);
                     reader.insert(more).copy_from_slice(&bytes[given..given + more]);
                     reader.notify_read(more);
                     given += more;
                 }
-                // Other records are not read, so an error in them does not matter.
+                // The content of other records is not used, so an error in them is ignored.
                 Ok(LinearReadEvent::Record { opcode, .. }) if !matches!(opcode, op::CHANNEL | op::MESSAGE) => {}
                 Ok(LinearReadEvent::Record { data, opcode }) if !texts_fit(opcode, data) => return Ok(false),
                 Ok(LinearReadEvent::Record { data, opcode }) => match parse_record(opcode, data) {
@@ -90,13 +91,14 @@ impl Blocks {
     }
 }
 
-/// Whether the texts of a channel's or a metadata record end within it: the parser asks for their memory before it looks.
+/// Whether the strings in a channel or metadata record end within it: the parser allocates their memory before it
+/// checks.
 pub(super) fn texts_fit(opcode: u8, data: &[u8]) -> bool {
     fn text(data: &[u8]) -> Option<&[u8]> {
         let (length, rest) = data.split_first_chunk::<4>()?;
         rest.get(u32::from_le_bytes(*length) as usize..)
     }
-    /// A table of texts by name, of the length that it states.
+    /// A table of strings by name, whose size in bytes precedes it.
     fn table(data: &[u8]) -> Option<()> {
         let (length, rest) = data.split_first_chunk::<4>()?;
         let mut pairs = rest.get(..u32::from_le_bytes(*length) as usize)?;
@@ -106,7 +108,7 @@ pub(super) fn texts_fit(opcode: u8, data: &[u8]) -> bool {
         Some(())
     }
     match opcode {
-        // Two numbers of 16 bits, topic, encoding, table.
+        // Two 16-bit numbers, topic, encoding, table.
         op::CHANNEL => data.get(4..).and_then(text).and_then(text).and_then(table).is_some(),
         // Name, table.
         op::METADATA => text(data).and_then(table).is_some(),

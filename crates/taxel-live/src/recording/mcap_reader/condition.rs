@@ -1,35 +1,35 @@
-//! The condition of a file: how its recording ended, and what is damaged.
+//! The condition of a file: how its recording ended, and which parts are damaged.
 
 use serde::Serialize;
 
 use crate::recording::Counts;
 
-/// How a recording ended, as it states.
+/// How a recording ended, as the file states.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ending {
-    /// As planned, with what was lost.
+    /// As planned.
     Finished {
-        /// What was received and lost.
+        /// Counts of what was received and lost.
         counts: Counts,
-        /// The writer's line about it.
+        /// The writer's verdict in one line.
         verdict: String,
     },
-    /// Writing failed: the operating system's error.
+    /// Stopped because writing failed, with the operating system's error.
     Stopped(String),
 }
 
-/// What had to be left out of a damaged file.
+/// The parts of a damaged file that were skipped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Rebuilt {
-    /// Whether the file lacks its end: writing was killed, or the file was cut.
+    /// Whether the end of the file is missing: writing was killed, or the file was truncated.
     pub unfinished: bool,
-    /// Bytes at the end of the file that belong to a record which is not whole.
+    /// Number of bytes of an incomplete record at the end of the file.
     pub torn_bytes: u64,
-    /// Places where the walk lost its way and found it again.
+    /// Number of places where the walk met an invalid record and resynchronised.
     pub gaps: u64,
-    /// Bytes skipped there.
+    /// Number of bytes skipped there.
     pub skipped_bytes: u64,
-    /// Chunks left out because they state that they unpack to more than a chunk may.
+    /// Number of chunks that were skipped because the unpacked size that they state exceeds the limit.
     pub large_chunks: u64,
 }

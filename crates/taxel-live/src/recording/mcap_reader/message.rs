@@ -2,15 +2,15 @@
 
 use crate::recording::Topic;
 
-/// One message as it stands in the file.
+/// One message of a file, undecoded.
 #[derive(Debug, Clone, Copy)]
 pub struct Message<'a> {
-    /// Its channel.
+    /// Channel of the message.
     pub topic: Topic,
-    /// Our arrival number, of datagrams.
+    /// Arrival number of a datagram.
     pub number: u64,
-    /// The host's clock, ns since 1970.
+    /// Time by the host's clock, ns since 1970.
     pub at_ns: i64,
-    /// The content.
+    /// Content of the message.
     pub data: &'a [u8],
 }

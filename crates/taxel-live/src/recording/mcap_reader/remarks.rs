@@ -1,4 +1,4 @@
-//! The small messages of a recording: registers, markers, notes, detections, counts.
+//! The small messages of a recording: registers, markers, notes, detections, counts, and others.
 
 use serde_json::Value;
 use taxel_core::Marker;
@@ -14,38 +14,38 @@ use crate::recording::{BoardChange, Counts, Note, Topic};
 /// All small messages of a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Remarks {
-    /// The board's registers as they were set, by time of the host, ns.
+    /// The board's registers each time they were set, with the host's time, ns.
     pub registers: Vec<(i64, Registers)>,
-    /// Starts and stops, as the board marked them.
+    /// Starts and stops, as marked by the board.
     pub markers: Vec<Marker>,
-    /// Notes of people.
+    /// Notes written by users.
     pub notes: Vec<Note>,
-    /// Taxels that people zeroed, and when by the host's clock, ns.
+    /// Taxels that users zeroed, with the host's time, ns.
     pub zeroings: Vec<(i64, Zeroing)>,
-    /// Detections, and when they were recorded by the host's clock, ns.
+    /// Detections, with the host's time at which they were recorded, ns.
     pub detections: Vec<(i64, Detection)>,
-    /// The last counts, from before the end.
+    /// The last counts before the end of the recording.
     pub counts: Option<Counts>,
-    /// How many datagrams there are, and their bytes.
+    /// Number of datagrams.
     pub datagrams: u64,
-    /// Bytes in them.
+    /// Number of bytes in the datagrams.
     pub datagram_bytes: u64,
-    /// First and last arrival, ns since 1970.
+    /// Times of the first and the last arrival, ns since 1970.
     pub arrivals: Option<(i64, i64)>,
-    /// How many pictures there are.
+    /// Number of pictures.
     pub pictures: u64,
     /// Resets of the board, and changes of its version of the wire.
     pub board: Vec<BoardChange>,
-    /// How many lines of a stream there are.
+    /// Number of lines of a stream.
     pub samples: u64,
-    /// The values that the taxels held when the recording began, ticks by index, 65 535 of a taxel without any event so far; where
-    /// it states them.
+    /// The taxels' values at the beginning of the recording, ticks by index, 65 535 for a taxel without any event so
+    /// far; none if the recording does not state them.
     pub held: Option<Vec<u16>>,
 }
 
 impl Remarks {
     /// Adds a message; datagrams and pictures are only counted.
-    pub fn take(&mut self, message: &Message<'_>) {
+    pub fn add(&mut self, message: &Message<'_>) {
         match message.topic {
             Topic::Datagrams => {
                 self.datagrams += 1;
@@ -54,7 +54,8 @@ impl Remarks {
                 self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
             }
             Topic::Pressure => self.pictures += 1,
-            // A message that does not parse has a sound checksum: another program wrote it, and it is left alone.
+            // The checksum of a message that does not parse is valid, so another program wrote the message; it is
+            // ignored.
             Topic::Registers => {
                 if let Ok(value) = serde_json::from_slice(message.data) {
                     self.registers.push((message.at_ns, value));
@@ -84,7 +85,7 @@ impl Remarks {
                     && let (Some(label), Some(t), Some(known)) =
                         (value["label"].as_str(), value["t_us"].as_i64(), value["known_us"].as_i64())
                 {
-                    // JSON has no NaN: a slope that is not known is written as null.
+                    // JSON has no NaN: an unknown slope is written as null.
                     let slope = value["slope"].as_f64().unwrap_or(f64::NAN);
                     let (label, repaired) = (label.to_owned(), value["repaired"].as_bool().unwrap_or(false));
                     self.detections.push((message.at_ns, Detection { label, t, known, slope, repaired }));
@@ -104,17 +105,18 @@ impl Remarks {
     }
 }
 
-/// The values that the taxels held by such a message, ticks by taxel index; 65 535 of a taxel without any event so far.
+/// The taxels' values in a message of the channel `held`, ticks by taxel index; 65 535 for a taxel without any event so
+/// far.
 fn held(data: &[u8]) -> Option<Vec<u16>> {
     let value: Value = serde_json::from_slice(data).ok()?;
     let ticks = unbase64(value["ticks"].as_str()?)?;
     Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect())
 }
 
-/// Gives a decoder the values that the taxels held before the recording's first datagram.
-pub fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
+/// Passes the taxels' values before the recording's first datagram to a decoder.
+pub fn begin_with(decoder: &mut wire::SenderDecoder, data: &[u8]) {
     if let Some(held) = held(data) {
-        receiver.begin_with(held.iter().map(|ticks| (*ticks != UNKNOWN).then_some(*ticks)));
+        decoder.begin_with(held.iter().map(|ticks| (*ticks != UNKNOWN).then_some(*ticks)));
     }
 }
 

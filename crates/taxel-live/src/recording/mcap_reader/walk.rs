@@ -1,4 +1,4 @@
-//! The walk from record to record, which rebuilds the index of a file and finds its way again behind damage.
+//! Walks from record to record, which rebuilds the index of a file and resynchronises after damage.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,10 +14,10 @@ use crate::recording::metadata::{BEGIN, END};
 use crate::recording::{Counts, Header, limits};
 use crate::{Error, Result};
 
-/// Opcode, length.
+/// Size of a record's opcode and length, bytes.
 const RECORD_HEAD: u64 = 9;
 
-/// The walk from record to record.
+/// The state of the walk.
 pub(super) struct Walk<'a> {
     path: &'a Path,
     file: &'a File,
@@ -25,10 +25,10 @@ pub(super) struct Walk<'a> {
     pub(super) begin: Option<Header>,
     pub(super) end: Option<Header>,
     pub(super) ending: Option<Ending>,
-    /// The counts of the other sources at their end.
+    /// The final counts of the other sources.
     pub(super) ends: BTreeMap<String, Counts>,
     pub(super) blocks: Vec<Block>,
-    /// Bytes that the chunks so far unpack to, as they state.
+    /// Unpacked size of the chunks so far, as they state it, bytes.
     unpacked: u64,
     pub(super) rebuilt: Rebuilt,
 }
@@ -128,13 +128,13 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Opcode and length of the record at `at`, where they make sense, and what it says that it unpacks to.
+    /// Opcode and length of the record at `at`, where they make sense, and the size that it states to unpack to.
     fn sound(&self, at: u64) -> Result<Option<(u8, u64, u64)>> {
         let head = self.bytes(at, 80)?;
         let (Some(&opcode), Some(length)) = (head.first(), number(&head, 1)) else { return Ok(None) };
         let fits = at.checked_add(RECORD_HEAD).and_then(|a| a.checked_add(length)).is_some_and(|e| e <= self.length);
-        // What may stand before the end of the data. A flipped bit in an opcode must not hide a chunk, so lengths that can
-        // be checked are.
+        // The records that may precede the end of the data. A flipped bit in an opcode must not hide a chunk, so
+        // lengths are checked where the format allows it.
         let known = match opcode {
             op::CHUNK => chunk(&head, length).is_some(),
             op::MESSAGE_INDEX => head.get(11..15).is_some_and(|b| word(b) + 6 == length),
@@ -147,7 +147,7 @@ impl<'a> Walk<'a> {
         Ok((fits && known).then_some((opcode, length, size)))
     }
 
-    /// The next place from `at` on where a chunk or a metadata record of ours stands.
+    /// The next position from `at` on with a chunk or a metadata record of ours.
     fn next_sound(&self, mut at: u64) -> Result<Option<u64>> {
         const WINDOW: u64 = 1 << 20;
         while at < self.length {
@@ -206,7 +206,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// The size that a chunk states that it unpacks to, where the lengths inside its header agree with the record's.
+/// The unpacked size that a chunk states, if the lengths inside its header agree with the record's length.
 fn chunk(head: &[u8], length: u64) -> Option<u64> {
     // opcode 1, length 8, start 8, end 8, size 8, checksum 4, name of the compression, packed size 8
     const NAME: usize = 37;

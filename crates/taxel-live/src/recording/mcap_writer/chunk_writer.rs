@@ -1,7 +1,7 @@
-//! Packs queued messages into chunks of the format, and hands each to the operating system as whole records.
+//! Packs queued messages into chunks of the format, and passes each chunk to the operating system as whole records.
 //!
-//! Chunks are built in memory (the crate's buffered mode) because its direct mode goes back to fill in lengths: a kill in
-//! between would leave a length of 2e16.
+//! Chunks are built in memory (the crate's buffered mode), because its direct mode seeks back to fill in lengths: a
+//! kill in between would leave a length of 2e16 in the file.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,18 +17,18 @@ use super::record_file::RecordFile;
 use crate::recording::metadata::{BEGIN, END};
 use crate::recording::{Compression, Counts, Header, OutputFile, Topic, now_ns};
 
-/// A chunk is closed when it is this large, or when the queue is empty.
+/// Size at which a chunk is closed, bytes; it is closed earlier if the queue is empty.
 pub(super) const CHUNK_BYTES: usize = 1 << 20;
 
-/// Bytes of a message record besides its content.
+/// Size of a message record without its content, bytes.
 const MESSAGE_BYTES: usize = 31;
 
-/// The crate's writer, with the recording's header.
+/// The MCAP crate's writer, after it has written the recording's header.
 pub(super) struct ChunkWriter {
     mcap: mcap::Writer<NoSeek<RecordFile>>,
     header: Header,
-    /// What is being written; its memory becomes the queue's of the next time.
-    pub(super) taken: Queue,
+    /// The messages being written; the buffer is then swapped with the queue's.
+    pub(super) batch: Queue,
 }
 
 impl ChunkWriter {
@@ -48,12 +48,12 @@ impl ChunkWriter {
             })
             .compression_level(u32::from(compression == Compression::Zstd))
             .compression_threads(0)
-            // Each chunk has its own checksum.
+            // Each chunk has its own checksum, so the data section needs none.
             .calculate_data_section_crc(false)
             .disable_seeking(true)
             .chunk_size(Some(2 * CHUNK_BYTES as u64));
         let mcap = options.create(NoSeek::new(RecordFile::new(file, at_disk)))?;
-        let mut writer = Self { mcap, header: header.clone(), taken: Queue::default() };
+        let mut writer = Self { mcap, header: header.clone(), batch: Queue::default() };
         let opening = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
         writer.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: opening.clone() })?;
         for (k, source) in std::iter::once(header).chain(&header.sources).enumerate() {
@@ -62,7 +62,7 @@ impl ChunkWriter {
                     None => 0,
                     Some((name, text)) => writer.mcap.add_schema(name, "jsonschema", text.as_bytes())?,
                 };
-                // Once more where a checksum guards it.
+                // The header is stored a second time in a channel record, which a chunk's checksum protects.
                 let more = if k == 0 && topic == Topic::Datagrams { opening.clone() } else { BTreeMap::new() };
                 let (number, name) = (topic.channel(k), topic.channel_name(k, &source.name));
                 writer.mcap.add_channel_with_id(number, schema, &name, topic.encoding(), &more)?;
@@ -72,17 +72,17 @@ impl ChunkWriter {
         Ok(writer)
     }
 
-    /// Packs messages into chunks and hands each to the operating system: from then on a kill cannot take it.
+    /// Packs messages into chunks and passes each to the operating system, after which a kill no longer loses it.
     pub(super) fn write(&mut self) -> std::result::Result<(), McapError> {
         let (mut at, mut chunk) = (0, 0);
-        for message in &self.taken.messages {
+        for message in &self.batch.messages {
             let header = MessageHeader {
                 channel_id: message.channel,
                 sequence: message.number,
                 log_time: message.at_ns,
                 publish_time: message.at_ns,
             };
-            self.mcap.write_to_known_channel(&header, &self.taken.bytes[at..at + message.bytes])?;
+            self.mcap.write_to_known_channel(&header, &self.batch.bytes[at..at + message.bytes])?;
             at += message.bytes;
             chunk += MESSAGE_BYTES + message.bytes;
             if chunk >= CHUNK_BYTES {
@@ -90,11 +90,11 @@ impl ChunkWriter {
                 chunk = 0;
             }
         }
-        self.taken.clear();
+        self.batch.clear();
         if chunk > 0 { self.mcap.flush() } else { Ok(()) }
     }
 
-    /// Writes what was lost and the summary, and waits until the disk has all.
+    /// Writes the counts and the summary, and waits until everything is on the disk.
     pub(super) fn end(
         &mut self,
         counts: Option<&Counts>,

@@ -4,12 +4,12 @@ use std::time::Instant;
 
 use crate::recording::LATE;
 
-/// Messages in the order in which they came.
+/// Messages in the order in which they were added.
 #[derive(Default)]
 pub(super) struct Queue {
     pub(super) messages: Vec<Queued>,
     pub(super) bytes: Vec<u8>,
-    /// When the first of them came.
+    /// Time when the first of them was added.
     pub(super) since: Option<Instant>,
 }
 

@@ -1,5 +1,5 @@
-//! The recording's file behind a small buffer, which knows how far the file holds whole records: after a failed write it is cut
-//! there and closed soundly.
+//! The recording's file behind a small buffer. It tracks the end of the last whole record: after a failed write the
+//! file is truncated there and closed with a valid end.
 
 use std::io::{self, Seek, SeekFrom, Write};
 use std::sync::Arc;
@@ -10,21 +10,21 @@ use mcap::records::op;
 use crate::recording::OutputFile;
 use crate::recording::metadata::END;
 
-/// The file behind a small buffer that, unlike the standard library's, is thrown away when a write failed.
+/// The file behind a small buffer that, unlike the standard library's, is discarded after a failed write.
 pub(super) struct RecordFile {
     pub(super) file: OutputFile,
     waiting: Vec<u8>,
     written: u64,
-    /// How far the file holds whole records.
+    /// End of the last whole record in the file.
     whole: u64,
     at_disk: Arc<AtomicBool>,
 }
 
-/// From this size on bytes go to the file without a stay in the buffer.
+/// Writes of at least this size bypass the buffer, bytes.
 const LARGE: usize = 1 << 14;
 
-/// The largest piece that the operating system is given at once. It takes as large a block of memory for each as it finds: from
-/// 256 KB on that cost 2 to 4 times the CPU (ext4, Linux 6.18).
+/// Largest piece that is passed to the operating system at once, bytes. The system allocates a contiguous block for
+/// each piece; from 256 KB on that cost 2 to 4 times the CPU (ext4, Linux 6.18).
 const PIECE: usize = 1 << 17;
 
 impl Write for RecordFile {
@@ -50,7 +50,7 @@ impl RecordFile {
         Self { file, waiting: Vec::new(), written: 0, whole: 0, at_disk: Arc::clone(at_disk) }
     }
 
-    /// Waits until the disk has all.
+    /// Waits until everything is on the disk.
     pub(super) fn sync(&mut self) -> io::Result<()> {
         self.flush()?;
         self.file.file().sync_all()
@@ -73,7 +73,7 @@ impl RecordFile {
         Ok(())
     }
 
-    /// After a failed write: cuts what is torn off, and closes the file where the disk still has room for that.
+    /// After a failed write: truncates an incomplete record, and writes a valid end if the disk has room for it.
     pub(super) fn salvage(self, why: &str) {
         let mut file = self.file.file();
         let mut close = |end: &[u8]| -> io::Result<()> {
@@ -83,18 +83,19 @@ impl RecordFile {
         };
         let with_reason = [stopped(why).as_slice(), CLOSING].concat();
         if close(&with_reason).is_err() && close(CLOSING).is_err() {
-            // Not even that: the file then ends with its last whole chunk, which is all that our reader needs.
+            // Even the short end could not be written: the file then ends with its last whole chunk, which is all that
+            // our reader needs.
             let _ = close(&[]);
         }
     }
 }
 
-/// The shortest sound end of a file: the end of the data, a footer without a summary, the magic.
+/// The shortest valid end of a file: the end of the data, a footer without a summary, the magic bytes.
 const CLOSING: &[u8] = b"\x0f\x04\0\0\0\0\0\0\0\0\0\0\0\
     \x02\x14\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\
     \x89MCAP0\r\n";
 
-/// The metadata record of a recording that could not go on.
+/// The metadata record of a recording that had to stop, with the reason.
 fn stopped(why: &str) -> Vec<u8> {
     let text = |s: &str| [&u32::try_from(s.len()).unwrap_or(0).to_le_bytes(), s.as_bytes()].concat();
     let pair = [text("stopped"), text(why)].concat();

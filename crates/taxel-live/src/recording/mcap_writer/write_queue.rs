@@ -1,9 +1,9 @@
-//! Messages that wait in memory, and the thread that writes them, so that no recording thread waits for the disk.
+//! The queue of messages in memory, and the thread that writes them, so that no recording thread waits for the disk.
 //!
-//! The thread empties the queue when it fills a chunk, at the latest every [`FLUSH_EVERY`]. On a busy machine it may get no
-//! processor for seconds, and a kill would lose all that waits for it. So a caller who finds the queue [late](Queue::is_late) writes it itself:
-//! a thread that has something to record has a processor to write it with. Only while the writing thread waits for the disk do
-//! callers go on without it, as long as there is room.
+//! The thread empties the queue whenever it fills a chunk, and at the latest every [`FLUSH_EVERY`]. On a busy machine
+//! the thread may not be scheduled for seconds, and a kill would lose everything in the queue. Therefore a caller that
+//! finds the queue [late](Queue::is_late) writes it itself: a caller that adds a message is being scheduled. Only while
+//! the writing thread waits for the disk do callers continue without writing, as long as the queue has room.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -23,28 +23,29 @@ use crate::locked::lock;
 use crate::recording::{Compression, Counts, FLUSH_EVERY, Header, OutputFile, Topic};
 use crate::{Error, Result};
 
-/// How much may wait in memory for the clock of a recording whose file is not begun yet, bytes: heartbeats of a board of version 2
-/// at rest for hours.
+/// Capacity of the queue while a recording whose file is not begun yet waits for the board's clock, bytes: enough for
+/// hours of heartbeats of a board of version 2 at rest.
 const WAITING_BYTES: usize = 1 << 22;
 
 /// The queue of a recording, and the state of its file: planned, being written, or closed.
 pub(super) struct WriteQueue {
     path: PathBuf,
-    /// How the file is begun, as long as it is not.
+    /// The parameters with which the file will be begun; `None` once it was.
     pub(super) plan: Mutex<Option<Plan>>,
-    /// Locked by the thread that writes, before `state` where it needs both. `None` before the file is begun and after its end.
+    /// Locked by the thread that writes; if both locks are needed, before `state`. `None` before the file is begun and
+    /// after its end.
     pub(super) writer: Mutex<Option<ChunkWriter>>,
     pub(super) thread: Mutex<Option<JoinHandle<Result<()>>>>,
     /// Whether the thread that writes waits for the operating system.
     pub(super) at_disk: Arc<AtomicBool>,
     state: Mutex<Pending>,
-    /// Wakes the thread: the end has arrived, or the queue fills a chunk.
+    /// Wakes the thread: the recording ends, or the queue fills a chunk.
     work: Condvar,
-    /// Wakes callers: there is room in the queue again, or writing has failed.
+    /// Wakes callers: the queue has room again, or writing has failed.
     room: Condvar,
 }
 
-/// A file that is reserved and not begun yet.
+/// A file that is reserved but not begun yet.
 pub(super) struct Plan {
     pub(super) file: OutputFile,
     pub(super) header: Header,
@@ -54,17 +55,17 @@ pub(super) struct Plan {
 #[derive(Default)]
 pub(super) struct Pending {
     pub(super) queue: Queue,
-    /// Whether the file is begun; until then everything waits.
+    /// Whether the file is begun; until then all messages wait.
     pub(super) begun: bool,
     /// Whether the file waits for the board's clock ([`Writer::begin`](super::Writer::begin)), not only for the first data.
     for_clock: bool,
-    /// Datagrams and samples of each source.
+    /// Number of datagrams and samples of each source.
     pub(super) recorded: Vec<u64>,
-    /// What each source but the first counted at its end.
+    /// The final counts of each source except the first.
     pub(super) ends: BTreeMap<String, Counts>,
-    /// How the recording ends: set once.
+    /// How the recording ends; set once. The inner `None` is an end without finishing.
     end: Option<Option<Counts>>,
-    /// Why writing failed; nothing is taken after it.
+    /// Why writing failed; nothing is queued after it.
     failure: Option<WriteFailure>,
 }
 
@@ -94,7 +95,7 @@ impl WriteQueue {
         lock(&self.state)
     }
 
-    /// Adds a message of a source; waits while `most` bytes or more are in the queue.
+    /// Adds a message of a source; waits while the queue contains `most` bytes or more.
     pub(super) fn push(
         self: &Arc<Self>,
         source: usize,
@@ -119,7 +120,7 @@ impl WriteQueue {
         if state.begun && before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
             self.work.notify_all();
         }
-        // The format's number has 32 bits; the reader unwraps it.
+        // The number in the format has 32 bits; the reader unwraps it.
         #[allow(clippy::cast_possible_truncation)]
         let number = number as u32;
         let at_ns = u64::try_from(at_ns).unwrap_or(0);
@@ -141,9 +142,9 @@ impl WriteQueue {
         self.drain()
     }
 
-    /// Begins the file, once; returns whether it was this call that did.
+    /// Begins the file, once; returns whether this call did.
     pub(super) fn begin(self: &Arc<Self>, origin_us: Option<i64>) -> Result<bool> {
-        // Held until the file is begun: a second caller finds it begun.
+        // The lock is held until the file is begun, so that a second caller finds it begun.
         let mut planned = lock(&self.plan);
         let Some(plan) = planned.take() else {
             return self.lock().failure.clone().map_or(Ok(false), |failure| Err(failure.of_file(&self.path)));
@@ -172,15 +173,15 @@ impl WriteQueue {
         *lock(&self.writer) = Some(writer.map_err(|error| WriteFailure::of(error).of_file(&self.path))?);
         let mut state = self.lock();
         state.begun = true;
-        // What waited for the file is as new as the file.
+        // The age of messages that waited for the file counts from now on.
         if state.queue.since.is_some() {
             state.queue.since = Some(Instant::now());
         }
         Ok(())
     }
 
-    /// Ends the recording, with the counts of its first source where it is finished, and waits for the thread: then the file is on
-    /// the disk.
+    /// Ends the recording, with the counts of its first source if it is finished, and waits for the thread; the file is
+    /// then on the disk.
     pub(super) fn finish(&self, counts: Option<Counts>) -> Result<()> {
         {
             let mut state = self.lock();
@@ -196,16 +197,16 @@ impl WriteQueue {
         }
     }
 
-    /// Ends without an end record, and gives the file up.
+    /// Ends without an end record, and returns the file.
     pub(super) fn abandon(&self) -> Option<OutputFile> {
         let planned = lock(&self.plan).take().map(|plan| plan.file);
         let file = planned.or_else(|| lock(&self.writer).take().map(|writer| writer.into_file().file));
-        // Without its writer the thread ends at once.
+        // Without a chunk writer the thread ends at once.
         let _ = self.finish(None);
         file
     }
 
-    /// The thread: writes the queue, and waits.
+    /// The writing thread: writes the queue, and waits for more.
     fn run(&self) -> Result<()> {
         raise_priority();
         loop {
@@ -223,14 +224,15 @@ impl WriteQueue {
         }
     }
 
-    /// Takes all that waits and writes it. Order is kept: the writer is locked from before the one to after the other.
+    /// Writes all that waits, in order: the writer is locked from before the one to after the other.
     fn drain(&self) -> Result<()> {
         let mut slot = lock(&self.writer);
         let Some(writer) = slot.as_mut() else {
-            // Writing failed meanwhile, which the queue keeps; or it is at its end, and nothing is added any more.
+            // Writing has failed meanwhile, with the error in the queue; or the recording has ended, and no message is
+            // added any more.
             return self.lock().failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(&self.path)));
         };
-        std::mem::swap(&mut self.lock().queue, &mut writer.taken);
+        std::mem::swap(&mut self.lock().queue, &mut writer.batch);
         self.room.notify_all();
         match writer.write() {
             Ok(()) => Ok(()),
@@ -238,7 +240,7 @@ impl WriteQueue {
         }
     }
 
-    /// Writes the end, waits for the disk, and checks that the file is where it was.
+    /// Writes the end, waits for the disk, and checks that the file still exists under its name.
     fn close(&self, counts: Option<&Counts>) -> Result<()> {
         let Some(mut writer) = lock(&self.writer).take() else { return Ok(()) };
         let ends = std::mem::take(&mut self.lock().ends);
@@ -255,7 +257,7 @@ impl WriteQueue {
         })
     }
 
-    /// Keeps an error for later callers, and leaves a file that can be read.
+    /// Stores an error for later callers, and leaves a readable file.
     fn fail(&self, error: McapError, file: Option<RecordFile>) -> Error {
         let failure = WriteFailure::of(error);
         if let Some(file) = file {
@@ -296,8 +298,9 @@ impl WriteFailure {
     }
 }
 
-/// Raises the calling thread's priority on a busy machine, where the system allows it (the superuser, or `LimitNICE`).
+/// Raises the calling thread's priority on a busy machine, if the system allows it (the superuser, or `LimitNICE`).
 fn raise_priority() {
-    // SAFETY: a system call on numbers; on Linux 0 means the calling thread alone. Where it is refused nothing changes.
+    // SAFETY: a system call with numbers only; on Linux 0 selects the calling thread. If the call is refused, nothing
+    // changes.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, -10) };
 }

@@ -1,11 +1,11 @@
-//! Bounds from below on 6.14.
+//! Lower bounds on 6.14.
 
 use super::Lagrangian;
 use crate::learn::statement::{Norm, Point, Tangents};
 use crate::vectors::{add, dot};
 
 impl Lagrangian<'_> {
-    /// The bound that the present multipliers prove.
+    /// The lower bound that the present multipliers prove.
     pub(super) fn bound(&mut self) -> f64 {
         self.multipliers();
         let pull = self.pull();
@@ -23,7 +23,8 @@ impl Lagrangian<'_> {
         self.problem.bound(self.objective, &at, self.most)
     }
 
-    /// The bound from weights of 0, with the subgradient of the norm nearest to the sum of all other slopes there.
+    /// The lower bound at weights of 0, with the subgradient of the norm nearest to the sum of all other slopes
+    /// there.
     pub(super) fn bound_at_zero(&self, zero: &Point) -> f64 {
         let (problem, o) = (self.problem, self.objective);
         let silent = problem.silent.len();

@@ -1,14 +1,15 @@
-//! The exact search along a Newton step: the Lagrangian there is piecewise quadratic.
+//! The exact line search along a Newton step, on which the Lagrangian is piecewise quadratic.
 
 use super::Lagrangian;
 use crate::learn::statement::Norm;
 use crate::vectors::{add, dot};
 
-/// A step is taken whole where the slope along it has fallen to this share at its end; a search stops at that of `EXACT`.
+/// A full step is taken if the slope along it has fallen to `WHOLE` at its end; a search ends when it has fallen to
+/// `EXACT`.
 const WHOLE: f64 = 0.05;
 const EXACT: f64 = 1e-3;
 
-/// A kink that the line search passes: share at the start, its change, and its part of the slope.
+/// A kink on the searched line: its share at the start, the share's change, and its part of the slope.
 struct Passing {
     share: f64,
     change: f64,
@@ -55,7 +56,7 @@ impl Lagrangian<'_> {
                 break end;
             }
             let mut t = high;
-            // Illinois: a secant that never keeps the same end twice at full value.
+            // The Illinois method: a secant that halves the value of an end retained twice.
             for _ in 0..60 {
                 t = low + (high - low) * (at_low / (at_low - at_high)).clamp(1e-3, 0.999);
                 let here = slope(t);
@@ -72,7 +73,7 @@ impl Lagrangian<'_> {
             }
             break t;
         };
-        // From an infinite direction not even a step of 0 leads to numbers.
+        // A direction that is not finite makes the weights NaN even with a step of 0.
         if !(t.is_finite() && start.is_finite()) {
             return false;
         }
@@ -82,7 +83,7 @@ impl Lagrangian<'_> {
         true
     }
 
-    /// The kinks that a step as long as `end` passes, and the slope of all that lie beyond theirs throughout.
+    /// The kinks that a step of length `end` crosses, and the slope of all rows that stay beyond their kinks.
     fn passing(&self, rise: &[f64], end: f64) -> (Vec<Passing>, f64) {
         let silent = self.problem.silent.len();
         let (d, c) = (self.objective.d, 2.0 * self.objective.c);

@@ -1,4 +1,4 @@
-//! One Newton step of a round: the curvature comes from the rows on their rounded kinks.
+//! One Newton step of a round: the curvature comes from the rows on their smoothed kinks.
 
 use faer::dyn_stack::MemStack;
 use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place};
@@ -11,7 +11,7 @@ use crate::learn::statement::Norm;
 use crate::vectors::{add, dot};
 
 impl Lagrangian<'_> {
-    /// One Newton step, as long as an exact search along it finds best; false where rounding leaves none.
+    /// Takes one Newton step with an exact line search; returns false if rounding leaves no direction.
     pub(super) fn step(&mut self) -> bool {
         let (problem, o) = (self.problem, self.objective);
         let n = self.weights.len();
@@ -58,7 +58,7 @@ impl Lagrangian<'_> {
                 break;
             }
             self.rho = (self.rho * 100.0).max(f64::EPSILON * steepest);
-            // A Hessian that is no number never factors.
+            // A Hessian with entries that are not finite never factors.
             if !self.rho.is_normal() {
                 return false;
             }

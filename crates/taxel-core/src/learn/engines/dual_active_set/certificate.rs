@@ -1,11 +1,11 @@
-//! Multipliers of the rows as they were stated, and the proof that the rows contradict each other.
+//! Multipliers in terms of the rows as stated, and the proof that the rows contradict each other.
 
 use super::DualActiveSet;
 use super::kernels::add_rows;
 use super::rows::{Kind, Multipliers, Ray};
 
 impl DualActiveSet {
-    /// Multipliers by slot as multipliers of the rows as stated.
+    /// Converts multipliers by slot to multipliers of the rows as stated.
     pub(super) fn stated(&self, by_slot: &[f64]) -> Multipliers {
         let mut out = Multipliers { equalities: vec![0.0; self.equalities.len()], inequalities: Vec::new() };
         for &slot in &self.live {
@@ -20,7 +20,8 @@ impl DualActiveSet {
         out
     }
 
-    /// The ray as a proof, if it is one: multipliers of bounds are left out, and the gap must exceed rounding.
+    /// The ray as a proof, if it is one: the multipliers of bounds are left out, and the gap must exceed
+    /// rounding.
     pub(super) fn proof(&self, by_slot: Vec<f64>) -> Option<Ray> {
         let bounds = |slot: usize| matches!(self.rows[slot].kind, Kind::Lower(_) | Kind::Upper(_));
         let slots: Vec<usize> = self.live.iter().copied().filter(|&s| by_slot[s] != 0.0 && !bounds(s)).collect();

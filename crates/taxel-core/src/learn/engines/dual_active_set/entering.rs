@@ -4,16 +4,16 @@ use super::kernels::{add_rows, rows_times};
 use super::{BLOCK, DEPENDENT, DualActiveSet};
 use crate::vectors::dot;
 
-/// A squared pivot below this is computed again from the vector itself: `1 - |d|^2` has lost its digits.
+/// Below this, a squared pivot is computed again from the vector itself, because `1 - |d|^2` has lost its digits.
 const DOUBTFUL: f64 = 1e-5;
-/// The product from which on two rows, scaled to length 1, hardly differ.
+/// The product above which two rows, scaled to length 1, count as nearly identical.
 const ALIKE: f64 = 0.999;
 
 impl DualActiveSet {
-    /// Replaces active rows by fresh ones that hardly differ from them.
+    /// Replaces active rows by nearly identical fresh ones.
     ///
-    /// Cuts at a peak that moves a little from round to round would else enter and leave in turns. The dual may fall, but no
-    /// row is lost: `solve` ends above where it began.
+    /// Without this, cuts at a peak that moves slightly between rounds would enter and leave in turns. The dual may
+    /// fall, but no row is lost, and `solve` ends above where it began.
     pub(super) fn replace_similar(&mut self, fresh: &[usize]) {
         let mut entering = Vec::new();
         let mut leaves = vec![false; self.active.len()];
@@ -35,7 +35,7 @@ impl DualActiveSet {
         self.drop_negative();
     }
 
-    /// Products of a row with the active ones, in their order, to the end of the line.
+    /// The products of a row with the active ones, in their order, padded to whole lines.
     pub(super) fn products(&self, slot: usize) -> Vec<f64> {
         let row = &self.gram[slot * self.gram_stride..][..self.gram_stride];
         let mut out = vec![0.0; self.factor.padded()];
@@ -45,7 +45,7 @@ impl DualActiveSet {
         out
     }
 
-    /// Activates these rows with multiplier 0, except those that (nearly) depend on others.
+    /// Activates these rows with multiplier 0, except rows that (nearly) depend on others.
     pub(super) fn activate(&mut self, slots: &[usize]) {
         for block in slots.chunks(BLOCK) {
             let block: Vec<usize> = block.iter().copied().filter(|&slot| self.place[slot].is_none()).collect();
@@ -69,7 +69,8 @@ impl DualActiveSet {
         }
     }
 
-    /// Activates these rows with their multipliers: in blocks, then one by one, with exact pivots, those that nearly depend.
+    /// Activates these rows with their multipliers: in blocks first, then the nearly dependent ones one by one with
+    /// exact pivots.
     pub(super) fn restore(&mut self, slots: &[usize], multipliers: &[f64]) {
         self.activate(slots);
         for &slot in slots {
@@ -89,7 +90,7 @@ impl DualActiveSet {
         }
     }
 
-    /// The squared pivot of a row whose `L^-1 g` is `d`, and its coordinates r in the active rows.
+    /// The squared pivot of a row whose `L^-1 g` is `d`, and its coordinates r in terms of the active rows.
     pub(super) fn pivot(&self, slot: usize, d: &[f64]) -> (f64, Vec<f64>) {
         let mut r = d.to_vec();
         self.factor.backward(&mut r);
@@ -120,7 +121,7 @@ impl DualActiveSet {
 
     /// One step of Goldfarb and Idnani: activates a violated row, and deactivates rows whose multiplier reaches 0 on the way.
     ///
-    /// Returns a ray by slot where neither is possible.
+    /// Returns a ray by slot if neither is possible.
     pub(super) fn step(&mut self, slot: usize, sign: f64, mut violation: f64) -> Option<Vec<f64>> {
         let mut d = self.products(slot);
         self.factor.forward(&mut d);

@@ -1,22 +1,22 @@
-//! Cholesky factor of the Gram matrix of the active rows: rows are appended by the block and removed by rotations.
+//! The Cholesky factor of the active rows' Gram matrix: rows are appended in blocks and removed by plane rotations.
 
 use super::kernels::{backward, forward, forward_many, products, rotate};
 use crate::vectors::{Aligned, LANES, dot};
 
-/// L with `L L' = G` over the active rows, in the order in which they came.
+/// L with `L L' = G` over the active rows, in the order of their activation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Factor {
-    /// By columns; above the diagonal anything, below the last row 0 to the end of the line.
+    /// L by columns; entries above the diagonal are undefined, those below the last row are 0 to the end of the line.
     l: Aligned,
     stride: usize,
-    /// One over the diagonal.
+    /// The reciprocals of the diagonal.
     inverse: Vec<f64>,
     /// `L^-1` times the rows' limits.
     limits: Vec<f64>,
 }
 
 impl Factor {
-    /// How many rows it holds.
+    /// The number of rows in the factor.
     pub(super) fn len(&self) -> usize {
         self.inverse.len()
     }
@@ -26,7 +26,7 @@ impl Factor {
         self.limits.clear();
     }
 
-    /// The length that vectors must have for `solve`: the rows, to the end of the line.
+    /// The length that vectors must have for `forward` and `backward`: the number of rows, padded to whole lines.
     pub(super) fn padded(&self) -> usize {
         self.len().next_multiple_of(LANES)
     }
@@ -41,7 +41,7 @@ impl Factor {
         backward(&self.l, self.stride, &self.inverse, self.len(), x);
     }
 
-    /// `-(L L')^-1` times the limits: the multipliers of the rows as equalities.
+    /// `-(L L')^-1` times the limits: the multipliers if all rows were equalities.
     pub(super) fn optimum(&self) -> Vec<f64> {
         let mut x: Vec<f64> = self.limits.iter().map(|y| -y).collect();
         x.resize(self.padded(), 0.0);
@@ -50,7 +50,7 @@ impl Factor {
         x
     }
 
-    /// Appends a row with this limit, whose `L^-1 g` is `d` and whose pivot is `pivot`.
+    /// Appends a row with this limit, given `d = L^-1 g` and its pivot.
     pub(super) fn push(&mut self, d: &[f64], pivot: f64, limit: f64) {
         let m = self.len();
         self.reserve(m + 1);
@@ -62,10 +62,11 @@ impl Factor {
         self.limits.push((limit - dot(&d[..m], &self.limits)) / pivot);
     }
 
-    /// Appends rows, but none whose squared pivot is `least` or below, nor more than `most` in all; returns which were appended.
+    /// Appends rows, except those whose squared pivot is at most `least`, up to `most` rows in all; returns which were
+    /// appended.
     ///
-    /// `g` has a column of `stride` numbers a new row, its products with the rows here, then 0; `own` the products of
-    /// the new rows with each other.
+    /// `g` has a column of `stride` numbers for each new row: its products with the rows in the factor, then 0. `own`
+    /// has the products of the new rows with each other.
     pub(super) fn append(
         &mut self,
         g: &mut [f64],
@@ -130,7 +131,7 @@ impl Factor {
         taken
     }
 
-    /// Removes the rows at these places (ascending); `d`, a row not yet pushed, is turned with the rest.
+    /// Removes the rows at these places (ascending); `d`, the vector of a row not yet pushed, is rotated with the rest.
     pub(super) fn remove(&mut self, places: &[usize], mut d: Option<&mut Vec<f64>>) {
         let Some(&first) = places.first() else { return };
         let (m, stride) = (self.len(), self.stride);
@@ -167,7 +168,7 @@ impl Factor {
             self.limits[to] = self.limits[k];
             let diagonal = column[k];
             close_up(column, m, &places[carries.len()..]);
-            // Rows k and later stand `carries.len()` places too low; those above the diagonal do not matter.
+            // Rows k and later must move up by `carries.len()` places; entries above the diagonal are undefined anyway.
             let shift = carries.len();
             self.l.copy_within(k * stride + k..k * stride + m - (places.len() - shift), to * stride + to);
             self.l[to * stride + left..][..left.next_multiple_of(LANES) - left].fill(0.0);
@@ -191,7 +192,7 @@ impl Factor {
         if rows <= self.stride {
             return;
         }
-        // A stride that is no power of two, so that columns do not fall into the same cache sets.
+        // Strides are not powers of two, so that columns do not map to the same cache sets.
         let stride = (rows + rows / 2).max(64).next_multiple_of(LANES);
         let stride = if stride.is_multiple_of(64) { stride + LANES } else { stride };
         let mut l = Aligned::zeros(stride * stride);
@@ -202,7 +203,7 @@ impl Factor {
     }
 }
 
-/// Takes the entries at `places` out of a column of `m` and sets what is freed to 0.
+/// Removes the entries at `places` from a column of `m` and sets the freed entries to 0.
 fn close_up(column: &mut [f64], m: usize, places: &[usize]) {
     let Some(&first) = places.first() else { return };
     let mut to = first;

@@ -1,9 +1,9 @@
-//! The loops that the time goes into, over rows and columns of whole lines.
+//! The loops that take most of the time, over rows and columns of whole lines.
 
 use crate::vectors::{LANES, add_lines, kernel, lines, lines_mut, times};
 
 kernel! {
-    /// `out[k] = rows[which[k]].x`; rows of `stride` numbers, a multiple of eight, the padding 0.
+    /// `out[k] = rows[which[k]].x`; each row has `stride` numbers, a multiple of eight, padded with 0.
     pub(super) fn rows_times<V>(rows: &[f64], stride: usize, which: &[usize], x: &[f64], out: &mut [f64]) {
         let x = lines(&x[..stride]);
         let row = |k: usize| lines(&rows[k * stride..][..stride]);
@@ -36,7 +36,7 @@ kernel! {
     }
 }
 
-/// Solves for the unknowns k to k + here of `L x = x`, those before being out of it.
+/// Solves `L x = x` for the unknowns k to k + here, after the contributions of earlier unknowns have been subtracted.
 #[inline(always)]
 fn triangle(l: &[f64], stride: usize, inverse: &[f64], k: usize, here: usize, x: &mut [f64]) {
     for j in k..k + here {
@@ -47,14 +47,15 @@ fn triangle(l: &[f64], stride: usize, inverse: &[f64], k: usize, here: usize, x:
     }
 }
 
-/// The eight columns from k on, below the rows that they solve.
+/// The eight columns from k on, below the rows for which they solve.
 #[inline(always)]
 fn below(l: &[f64], stride: usize, k: usize, padded: usize) -> [&[[f64; LANES]]; LANES] {
     std::array::from_fn(|j| lines(&l[(k + j) * stride + k + LANES..(k + j) * stride + padded]))
 }
 
 kernel! {
-    /// Solves `L x = x` in place; L by columns of `stride`, the first `m`; lines beyond `m` are 0.
+    /// Solves `L x = x` in place; L is stored by columns of `stride`, of which the first `m` count; entries beyond `m`
+    /// are 0.
     pub(super) fn forward<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
         let padded = m.next_multiple_of(LANES);
         for k in (0..m).step_by(LANES) {
@@ -68,7 +69,7 @@ kernel! {
 }
 
 kernel! {
-    /// Solves `L' x = x` in place; L as in `forward`.
+    /// Solves `L' x = x` in place; L is stored as in `forward`.
     pub(super) fn backward<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
         let padded = m.next_multiple_of(LANES);
         for k in (0..m).step_by(LANES).rev() {
@@ -103,12 +104,12 @@ fn inverted(l: &[f64], stride: usize, inverse: &[f64], k: usize) -> [[f64; LANES
     columns
 }
 
-/// Right sides that L passes by at once, and lines of them that stay in the nearest cache.
+/// The number of right-hand sides for which L is read once, and of their lines that stay in the nearest cache.
 const SIDES: usize = 16;
 const NEAR: usize = 16;
 
 kernel! {
-    /// `forward` for many right sides, columns of `x_stride` numbers each.
+    /// `forward` for many right-hand sides, columns of `x_stride` numbers each.
     pub(super) fn forward_many<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64], x_stride: usize) {
         let padded = m.next_multiple_of(LANES);
         for x in x.chunks_mut(SIDES * x_stride) {
@@ -160,13 +161,13 @@ kernel! {
     }
 }
 
-/// Rows of the left and of the right whose products are summed at once, and how many coefficients of each.
+/// The size of a tile: left rows, right rows, and the number of coefficients of each that are summed at a time.
 const LEFT: usize = 4;
 const RIGHT: usize = 6;
 const DEEP: usize = 512;
 
 kernel! {
-    /// `out[i][j] += left[i].right[j]`: all products of two sets of rows, of `stride` numbers each; `out` by rows of `width`.
+    /// `out[i][j] += left[i].right[j]` for two sets of rows of `stride` numbers each; `out` has rows of `width`.
     pub(super) fn products<V>(left: &[f64], right: &[f64], stride: usize, out: &mut [f64], width: usize) {
         for from in (0..stride).step_by(DEEP) {
             let to = (from + DEEP).min(stride);
@@ -207,7 +208,7 @@ kernel! {
 }
 
 kernel! {
-    /// Turns `(x, y)` by a plane rotation: `x = c x + s y`, `y = c y - s x`; both of whole lines.
+    /// Rotates `(x, y)` in the plane: `x = c x + s y`, `y = c y - s x`; both have whole lines.
     pub(super) fn rotate<V>(c: f64, s: f64, x: &mut [f64], y: &mut [f64]) {
         let (c, s, minus, zero) = (V::splat(c), V::splat(s), V::splat(-s), V::splat(0.0));
         for (x, y) in lines_mut(x).iter_mut().zip(lines_mut(y)) {

@@ -12,7 +12,7 @@ impl DualActiveSet {
         self.factor.clear();
     }
 
-    /// Deactivates the rows at these places (ascending).
+    /// Deactivates the rows at these places (ascending); `d`, the vector of a row not yet active, is rotated with them.
     pub(super) fn deactivate(&mut self, places: &[usize], d: Option<&mut Vec<f64>>) {
         self.factor.remove(places, d);
         for &place in places {
@@ -27,7 +27,7 @@ impl DualActiveSet {
         }
     }
 
-    /// Finds an optimum of some of the active rows: deactivates all whose multiplier would turn negative, again and again.
+    /// Finds an optimum over some of the active rows: repeatedly deactivates all whose multipliers would turn negative.
     pub(super) fn drop_negative(&mut self) {
         loop {
             let optimum = self.factor.optimum();
@@ -43,7 +43,8 @@ impl DualActiveSet {
         }
     }
 
-    /// As `drop_negative`, but each time only up to where the first multiplier turns 0, so that the dual only rises.
+    /// Like `drop_negative`, but moves each time only until the first multiplier reaches 0, so that the dual only
+    /// rises.
     pub(super) fn ascend(&mut self) {
         loop {
             let optimum = self.factor.optimum();

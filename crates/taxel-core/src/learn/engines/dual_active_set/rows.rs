@@ -1,22 +1,22 @@
-//! Rows of the working set, and their multipliers as a caller gets them.
+//! Rows of the working set, and their multipliers in the caller's terms.
 
-/// Rows count as satisfied within this, as they were stated or scaled to length 1, whichever asks for more.
+/// The tolerance of a row, as stated or scaled to length 1, whichever is stricter.
 pub(super) const TOLERANCE: f64 = 5e-13;
-/// The least tolerance of a long row, scaled to length 1.
+/// The smallest tolerance of a long row, scaled to length 1.
 const FINEST: f64 = 4e-14;
-/// Names an inequality, in the order in which they were added; never given twice.
+/// Identifies an inequality by the order of its addition; never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RowId(pub(super) usize);
 
 impl RowId {
-    /// How many inequalities had been added before it.
+    /// The number of inequalities that had been added before this one.
     #[must_use]
     pub fn index(self) -> usize {
         self.0
     }
 }
 
-/// What a row of the working set limits.
+/// What a row of the working set constrains.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Free,
@@ -41,23 +41,23 @@ impl Row {
     }
 }
 
-/// Multipliers of the active rows, as they were stated (not scaled).
+/// Multipliers of the active rows as stated (not scaled).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Multipliers {
-    /// One an equality, in the order in which they were added; any sign.
+    /// The multiplier of each equality, in the order of their addition; any sign.
     pub equalities: Vec<f64>,
-    /// Of the active inequalities, 0 or more; of all others it is 0.
+    /// The multipliers of the active inequalities, 0 or more; that of every other inequality is 0.
     pub inequalities: Vec<(RowId, f64)>,
 }
 
 /// Proof that the rows contradict each other within the bounds (Farkas).
 ///
-/// With `g = A_eq'y + A_in'z` the rows demand `g.w <= y.value + z.limit`, but no w within the bounds gives less than
-/// `sum_n min(lower_n g_n, upper_n g_n)`, which is larger.
+/// With `g = A_eq'y + A_in'z` the rows require `g.w <= y.value + z.limit`, but the least value of `g.w` within the
+/// bounds, `sum_n min(lower_n g_n, upper_n g_n)`, is larger.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Ray {
     /// y and z.
     pub multipliers: Multipliers,
-    /// By how much it is larger.
+    /// The difference between that least value and what the rows allow.
     pub gap: f64,
 }

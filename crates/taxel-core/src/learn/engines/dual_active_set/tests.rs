@@ -1,11 +1,11 @@
-//! Tests of the dual active set: conditions of optimality, proofs, starts.
+//! Tests of the dual active set: optimality conditions, proofs of infeasibility, starts.
 
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 
 use super::*;
 
-/// Rows as they were stated, to check verdicts by plain sums.
+/// Rows as stated, so that verdicts are checked by plain sums.
 #[derive(Default)]
 struct Stated {
     equalities: Vec<(Vec<f64>, f64)>,
@@ -57,7 +57,7 @@ impl Stated {
         g
     }
 
-    /// The conditions of Karush, Kuhn and Tucker, sufficient as the problem is convex.
+    /// The Karush-Kuhn-Tucker conditions, which are sufficient because the problem is convex.
     fn assert_optimal(&self, solver: &DualActiveSet) {
         let w = solver.weights();
         let dot = |a: &[f64]| a.iter().zip(w).map(|(a, w)| a * w).sum::<f64>();
@@ -151,7 +151,7 @@ fn cuts_that_are_nearly_parallel_are_told_apart() {
     }
 }
 
-/// A row that hardly differs.
+/// A row nearly identical to `a`.
 fn beside(random: &mut StdRng, a: &[f64]) -> Vec<f64> {
     let length = a.iter().map(|a| a * a).sum::<f64>().sqrt();
     a.iter().map(|a| a + 3e-3 * length * random.random_range(-1.0..1.0)).collect()
@@ -185,7 +185,7 @@ fn rows_in_rounds_give_what_all_rows_at_once_give() {
     let mut random = StdRng::seed_from_u64(4);
     for trial in 0..20 {
         let mut stated = Stated::random(&mut random, 40, 6, 60, 0.5);
-        // Every other time each with one beside it, which the rounds exchange for each other.
+        // Every other trial adds a nearly identical row to each one, which row exchanges then swap.
         for k in 0..if trial % 2 == 0 { 0 } else { 60 } {
             let (a, limit) = stated.inequalities[k].clone();
             stated.inequalities.push((beside(&mut random, &a), limit));

@@ -1,10 +1,10 @@
-//! The weights that belong to the multipliers, and by how much they miss each row.
+//! The weights that belong to the multipliers, and the excess of each row.
 
 use super::DualActiveSet;
 use super::kernels::{add_rows, rows_times};
 use super::rows::{Kind, TOLERANCE};
 
-/// Active rows are refined until they are satisfied to this, as they were stated or scaled to length 1.
+/// Active rows are refined until they are satisfied to this, as stated or scaled to length 1.
 const REFINED: f64 = 2e-14;
 
 impl DualActiveSet {
@@ -20,7 +20,7 @@ impl DualActiveSet {
         self.violation(slot) <= self.rows[slot].tolerance()
     }
 
-    /// `-A'u` over the active rows.
+    /// `-A'u` over the active rows A and their multipliers u.
     pub(super) fn combined(&self) -> Vec<f64> {
         let by: Vec<f64> = self.active.iter().map(|&slot| -self.multipliers[slot]).collect();
         let mut weights = vec![0.0; self.stride];
@@ -28,7 +28,7 @@ impl DualActiveSet {
         weights
     }
 
-    /// Excess of the active rows, in their order, to the end of the line.
+    /// The excess of the active rows, in their order, padded to whole lines.
     pub(super) fn residuals(&self, weights: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; self.factor.padded()];
         rows_times(&self.coefficients, self.stride, &self.active, weights, &mut out[..self.active.len()]);
@@ -38,7 +38,7 @@ impl DualActiveSet {
         out
     }
 
-    /// Computes weights and every row's excess; refines the active rows where they need it, or to the end.
+    /// Computes the weights and every row's excess; refines the active rows if they need it, and fully if `last`.
     pub(super) fn update_weights(&mut self, last: bool) {
         let enough = if last { REFINED } else { 0.1 * TOLERANCE };
         let mut worst = f64::INFINITY;
@@ -58,7 +58,8 @@ impl DualActiveSet {
         }
     }
 
-    /// Moves the weights onto the active rows, as large multipliers round their sum by more than the tolerance of the rows.
+    /// Projects the weights onto the active rows, because large multipliers round their sum by more than the rows'
+    /// tolerance.
     pub(super) fn project_weights(&mut self) {
         let lengths: Vec<f64> = self.active.iter().map(|&slot| self.rows[slot].length.max(1.0)).collect();
         let off = |residuals: &[f64]| residuals.iter().zip(&lengths).map(|(r, l)| r.abs() * l).fold(0.0, f64::max);
@@ -83,7 +84,7 @@ impl DualActiveSet {
         self.update_excess();
     }
 
-    /// Computes every row's excess.
+    /// Computes the excess of every row.
     pub(super) fn update_excess(&mut self) {
         let mut values = vec![0.0; self.live.len()];
         rows_times(&self.coefficients, self.stride, &self.live, &self.weights, &mut values);
@@ -92,7 +93,7 @@ impl DualActiveSet {
         }
     }
 
-    /// Violated rows and bounds with their excess, worst first.
+    /// The violated rows and bounds with their excess, worst first.
     pub(super) fn violated(&mut self) -> Vec<(usize, f64)> {
         let mut found: Vec<(usize, f64)> = Vec::new();
         for n in 0..self.lower.len() {

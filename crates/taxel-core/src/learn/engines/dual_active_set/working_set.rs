@@ -1,4 +1,4 @@
-//! The working set: rows by slot, and the products of each with each (the Gram matrix).
+//! The working set: its rows by slot, and their Gram matrix (the products of all pairs).
 
 use super::kernels::products;
 use super::rows::{Kind, Row};
@@ -6,7 +6,8 @@ use super::{BLOCK, DualActiveSet};
 use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, problem};
 
-/// The rows that memory is allocated for at first, where so many could be active; more rows move what is there.
+/// The number of rows for which memory is allocated at first, if that many can be active; growth beyond it
+/// copies the rows.
 const AT_FIRST: usize = 1024;
 
 impl DualActiveSet {
@@ -27,7 +28,7 @@ impl DualActiveSet {
         Ok(slot)
     }
 
-    /// Puts a row into a free slot; its coefficients are 0.
+    /// Puts a row into a free slot, with coefficients of 0.
     pub(super) fn slot(&mut self, row: Row) -> usize {
         let slot = self.free.pop().unwrap_or(self.rows.len());
         if slot == self.rows.len() {
@@ -49,12 +50,12 @@ impl DualActiveSet {
         slot
     }
 
-    /// The number of slots to allocate where so many are in use.
+    /// The number of slots to allocate when `slots` are in use.
     pub(super) fn capacity(&self, slots: usize) -> usize {
         (slots + slots / 2 + 64).max(self.lower.len().min(AT_FIRST))
     }
 
-    /// Enlarges the Gram matrix to all slots.
+    /// Enlarges the Gram matrix to the number of slots.
     pub(super) fn enlarge_gram(&mut self) {
         let slots = self.rows.len();
         if slots <= self.gram_stride {
@@ -69,7 +70,7 @@ impl DualActiveSet {
         (self.gram, self.gram_stride) = (gram, stride);
     }
 
-    /// Computes the products of the fresh rows with all others, in one matrix product; returns those rows.
+    /// Computes the products of the fresh rows with all rows, in one matrix product; returns the fresh rows.
     pub(super) fn extend_gram(&mut self) -> Vec<usize> {
         self.enlarge_gram();
         let fresh = std::mem::take(&mut self.fresh);
@@ -93,7 +94,7 @@ impl DualActiveSet {
         fresh
     }
 
-    /// The slot of a bound's row, added if it has none yet.
+    /// The slot of a bound's row, which is added if there is none yet.
     pub(super) fn bound(&mut self, n: usize, upper: bool) -> usize {
         if let Some(slot) = self.bounds[n][usize::from(upper)] {
             return slot;

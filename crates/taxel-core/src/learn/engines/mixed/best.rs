@@ -1,4 +1,4 @@
-//! The best weights and the best bound so far, from whatever solver.
+//! The best weights and the best bound so far, whichever solver found them.
 
 use super::dense::times;
 use super::interior::PrimalDual;
@@ -9,16 +9,17 @@ use crate::learn::fit::Engine;
 use crate::learn::statement::{NOTHING, relative_gap};
 use crate::{Result, Stop};
 
-/// Where a later call with more rows can go on.
+/// The state from which a later call with more rows can continue.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub(super) state: PrimalDual,
-    /// The last polished point, in the program's units, and what binds there.
+    /// The last polished point, in the program's units, and its binding rows and bounds.
     pub(super) exact: Option<(Point, Guess)>,
 }
 
 impl Start {
-    /// Forgets inequality rows, as the caller does; those added later than the call come last.
+    /// Removes the inequality rows that the caller removes; rows added since the call that made this start come
+    /// last.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         self.state.retain(keep);
         if let Some((point, guess)) = &mut self.exact {
@@ -28,13 +29,13 @@ impl Start {
     }
 }
 
-/// What was found.
+/// The result of a minimisation.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
     pub(crate) weights: Vec<f64>,
-    /// Multipliers of the inequality rows, at least 0.
+    /// The multipliers of the inequality rows, at least 0.
     pub(crate) inequality: Vec<f64>,
-    /// The least objective over these rows is no lower, hence over these and more.
+    /// A lower bound on the objective over these rows, and therefore over these and more.
     pub(crate) bound: f64,
     pub(crate) engine: Engine,
     pub(crate) stopped: bool,
@@ -60,7 +61,7 @@ impl<'a> Best<'a> {
             inequality: vec![0.0; program.limit.len()],
             pull: vec![0.0; program.width()],
         };
-        // No term is below 0.
+        // No term is below 0, so 0 is a lower bound.
         Self { program, point, guess: None, met: false, objective: f64::INFINITY, bound: 0.0 }
     }
 
@@ -81,7 +82,7 @@ impl<'a> Best<'a> {
         if self.gap() <= tolerance {
             return Ok(());
         }
-        // Where the binding rows cannot be identified, good multipliers and the nearest feasible weights are enough.
+        // If the binding rows cannot be identified, good multipliers and the nearest feasible weights are enough.
         self.offer(near.clone(), None);
         if program.gap(near) <= tolerance
             && let Some(weights) = nearest(&near.weights, &program.hard(), &program.lower, &program.upper, stop)?
@@ -91,7 +92,7 @@ impl<'a> Best<'a> {
         Ok(())
     }
 
-    /// Goes on from a polished point with rows added since.
+    /// Continues from a polished point after rows were added.
     pub(super) fn exchange(&mut self, point: &Point, guess: &Guess, tolerance: f64, stop: Stop<'_>) {
         let (mut point, mut guess) = (point.clone(), guess.clone());
         let below = times(&self.program.below, &point.weights);

@@ -1,4 +1,4 @@
-//! Dense products and factors: faer, in one thread, on slices of rows.
+//! Dense products and factors by faer, in one thread, on slices of rows.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -7,12 +7,12 @@ use faer::linalg::matmul::{matmul, triangular};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::{Accum, ColMut, ColRef, Mat, MatMut, MatRef, Par};
 
-/// Rows of `width` numbers, one after the other, as a matrix with a row a column.
+/// Rows of `width` numbers, stored one after the other, as the columns of a matrix.
 fn columns(rows: &[f64], width: usize) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(rows, width, rows.len() / width.max(1))
 }
 
-/// Each row times `w`.
+/// The product of each row with `w`.
 pub(super) fn times(rows: &[f64], w: &[f64]) -> Vec<f64> {
     let rows = columns(rows, w.len());
     let mut out = vec![0.0; rows.ncols()];
@@ -28,10 +28,11 @@ pub(super) fn add_sum(rows: &[f64], factors: &[f64], sum: &mut [f64]) {
     matmul(into.as_mat_mut(), Accum::Add, rows, ColRef::from_slice(factors).as_mat(), 1.0, Par::Seq);
 }
 
-/// Columns of one block of a Gram matrix: the product of a block is quicker than that of a triangle.
+/// The number of columns in a block of a Gram matrix: a product of blocks is faster than one of
+/// triangles.
 const BLOCK: usize = 128;
 
-/// Adds `factor rows'rows` to the lower triangle; what is above it is of no use.
+/// Adds `factor rows'rows` to the lower triangle; entries above it are undefined.
 pub(super) fn add_gram(rows: &[f64], width: usize, factor: f64, sum: &mut Mat<f64>) {
     let rows = columns(rows, width);
     for from in (0..width).step_by(BLOCK) {
@@ -42,11 +43,11 @@ pub(super) fn add_gram(rows: &[f64], width: usize, factor: f64, sum: &mut Mat<f6
     }
 }
 
-/// `L` of a positive definite matrix.
+/// The Cholesky factor `L` of a positive definite matrix.
 pub(super) struct Cholesky(Mat<f64>);
 
 impl Cholesky {
-    /// Factors the lower triangle; none where it is not positive definite.
+    /// Factors the lower triangle; `None` if the matrix is not positive definite.
     pub(super) fn new(mut matrix: Mat<f64>) -> Option<Self> {
         let n = matrix.nrows();
         let scratch = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default());
@@ -57,7 +58,7 @@ impl Cholesky {
         Some(Self(matrix))
     }
 
-    /// The memory, to be used again.
+    /// The memory of the matrix, for reuse.
     pub(super) fn into_matrix(self) -> Mat<f64> {
         self.0
     }
@@ -68,7 +69,7 @@ impl Cholesky {
         solve_upper_triangular_in_place(self.0.transpose(), right.as_mut(), Par::Seq);
     }
 
-    /// `L^-1` times each row, row after row.
+    /// `L^-1` times each row; the rows are stored one after the other.
     pub(super) fn halve(&self, rows: &[f64]) -> Vec<f64> {
         let n = self.0.nrows();
         let mut out = rows.to_vec();
@@ -82,7 +83,7 @@ impl Cholesky {
     }
 }
 
-/// `rows rows'`, its lower triangle.
+/// The lower triangle of `rows rows'`.
 pub(super) fn outer(rows: &[f64], width: usize) -> Mat<f64> {
     use triangular::BlockStructure::{Rectangular, TriangularLower};
     let rows = columns(rows, width);
@@ -101,7 +102,7 @@ pub(super) fn outer(rows: &[f64], width: usize) -> Mat<f64> {
     out
 }
 
-/// `P'LU` of a square matrix.
+/// The factors `P'LU` of a square matrix.
 pub(super) struct Lu {
     factors: Mat<f64>,
     order: Vec<usize>,

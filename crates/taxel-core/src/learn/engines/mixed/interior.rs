@@ -1,9 +1,9 @@
-//! A primal-dual interior point (Mehrotra's predictor and corrector) for the mixed objective.
+//! A primal-dual interior-point method (Mehrotra's predictor-corrector) for the mixed objective.
 //!
-//! With an l1 term a weight whose bounds lie on both sides of 0 is the difference of two *parts*, each between 0 and its
-//! bound; elimination leaves one number a synapse on the diagonal. The norm is one second-order cone, scaled as Nesterov
-//! and Todd do, and adds a multiple of one and one rank to the Newton matrix; its length is eliminated as well. So each
-//! iteration takes the Cholesky factors of one matrix of synapses and one of equality rows.
+//! With an l1 term, a weight whose bounds have opposite signs is the difference of two *parts*, each between 0 and its
+//! bound; elimination leaves one diagonal entry per synapse. The norm is one second-order cone with Nesterov-Todd
+//! scaling, which adds a multiple of the identity and a rank-one matrix to the Newton matrix; its length is eliminated
+//! as well. Each iteration therefore takes the Cholesky factors of one matrix over synapses and one over equality rows.
 
 mod binding;
 mod conditions;
@@ -23,28 +23,28 @@ use crate::learn::statement::Norm;
 use crate::vectors::dot;
 
 const MOST_ITERATIONS: usize = 100;
-/// Share of the way to the next wall that a step takes at most.
+/// The largest share of the way to the boundary that a step takes.
 const NEARLY: f64 = 0.995;
-/// Primal residual that counts as met, in units of rows of length 1.
+/// The primal residual that counts as satisfied, for rows of length 1.
 const MET: f64 = 1e-12;
-/// Steps without gain after which rounding must be in the way.
+/// The number of steps without improvement after which rounding is assumed to prevent any.
 const MOST_IDLE: usize = 15;
-/// An objective below this counts as this in the gap.
+/// The least denominator of the relative gap.
 const NOTHING: f64 = 1e-10;
-/// Corrections of a step towards equal products, as long as they lengthen it.
+/// The largest number of centrality corrections of a step, which are made while they lengthen it.
 const MOST_CORRECTIONS: usize = 2;
 
-/// The longest step that keeps all of `v + step d` above 0.
+/// The longest step for which all of `v + step d` stay at or above 0.
 fn wall(v: &[f64], d: &[f64]) -> f64 {
     v.iter().zip(d).filter(|(_, d)| **d < 0.0).map(|(v, d)| -v / d).fold(f64::INFINITY, f64::min)
 }
 
-/// The solver of one program.
+/// The interior-point solver of one program.
 pub(super) struct Interior<'a> {
     program: &'a Program,
     parts: Vec<Part>,
     base: Vec<f64>,
-    /// `2 lift B'B` and the curvature of a square, lower triangle.
+    /// `2 lift B'B` plus the curvature of a squared l2 term, lower triangle.
     curvature: Mat<f64>,
     normed: bool,
 }
@@ -76,7 +76,8 @@ impl<'a> Interior<'a> {
         Self { program, parts, base, curvature, normed }
     }
 
-    /// The middle of the box, or of what a weight may well be where that is less; all multipliers 1.
+    /// A start in the middle of the box, or of a plausible range for weights if that is narrower, with all multipliers
+    /// 1.
     pub(super) fn start(&self) -> PrimalDual {
         let (n, program) = (self.program.width(), self.program);
         let split = |p: &Part| self.base[p.synapse] == 0.0;
@@ -96,7 +97,8 @@ impl<'a> Interior<'a> {
         }
     }
 
-    /// Goes on from where an earlier call ended, rows having been added since; all that is too near a wall is moved off.
+    /// Continues from the end of an earlier call after rows were added; values too near the boundary are moved away
+    /// from it.
     pub(super) fn resume(&self, start: &PrimalDual) -> PrimalDual {
         let program = self.program;
         let mut state = start.clone();
@@ -143,7 +145,7 @@ impl<'a> Interior<'a> {
         w
     }
 
-    /// Goes on from `state` to a relative gap of about `tolerance`, or as far as rounding and `stop` let it.
+    /// Continues from `state` to a relative gap of about `tolerance`, or until rounding or `stop` ends it.
     pub(super) fn solve(&self, state: &mut PrimalDual, tolerance: f64, stop: Stop<'_>) -> Iterate {
         let program = self.program;
         let (mut best, mut merit, mut least) = (state.clone(), f64::INFINITY, f64::INFINITY);
@@ -157,7 +159,7 @@ impl<'a> Interior<'a> {
             let most = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let primal = most(&r.equality).max(most(&r.inequality));
             let gap = (objective - self.bound(state, &r)).abs() / objective.abs().max(NOTHING);
-            // `max` leaves NaN out.
+            // `f64::max` ignores NaN, so the sum is checked too.
             if !(gap + primal + mu).is_finite() {
                 break;
             }
@@ -199,7 +201,7 @@ impl<'a> Interior<'a> {
         self.finish(state)
     }
 
-    /// The least value over the box of what the multipliers leave, up to rounding.
+    /// The least value of the Lagrangian over the box, up to rounding.
     fn bound(&self, state: &PrimalDual, r: &Residual) -> f64 {
         let program = self.program;
         let mut sum = -dot(&state.equality, &program.equal_to) - dot(&state.inequality, &program.limit);

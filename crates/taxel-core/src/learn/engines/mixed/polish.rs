@@ -1,7 +1,8 @@
-//! From near the optimum to rounding: one accurate solve with zeros, bounds and binding rows as equalities.
+//! Polishes a point near the optimum to rounding accuracy: one exact solve with zeros, bounds and binding rows as
+//! equalities.
 //!
-//! The guess comes from the interior point. Where signs come out wrong (a multiplier below 0, a weight across 0 or a
-//! bound, a row broken) the guess is mended and solved again.
+//! The guess of what binds comes from the interior point. If signs come out wrong (a multiplier below 0, a weight
+//! across 0 or a bound, a violated row), the guess is corrected and solved again.
 
 use faer::Mat;
 
@@ -13,17 +14,18 @@ use crate::vectors::dot;
 
 const MOST_GUESSES: usize = 12;
 const MOST_REFINEMENTS: usize = 12;
-/// What makes a singular guess solvable; refinement takes its effect out again, unless rows are nearer to parallel than
-/// this: then the next.
+/// Regularisation that makes a singular guess solvable. Refinement removes its effect, unless rows are more nearly
+/// parallel than this; then the second, smaller value is tried.
 const SOFT: [f64; 2] = [1e-11, 1e-15];
-/// What is off of the conditions of a guess in units of about 1 where that is solved.
+/// The residual of a guess's conditions, in units of about 1, at which they count as solved.
 const SOLVED: f64 = 1e-13;
 /// The share of the tolerance at which the gap is small enough.
 const ENOUGH: f64 = 0.01;
-/// Multipliers and slopes of the wrong sign count from here.
+/// The size above which multipliers and slopes of the wrong sign count as wrong.
 const WRONG: f64 = 1e-11;
 
-/// Solves for the guess, mends it, and so on; gives the best point that meets all rows and bounds, with its guess.
+/// Solves for the guess and corrects it repeatedly; returns the best point that satisfies all rows and bounds, with its
+/// guess.
 pub(super) fn polish(
     program: &Program,
     near: &Point,
@@ -49,11 +51,11 @@ pub(super) fn polish(
                 break;
             }
         }
-        let exchanged = polish.mend();
+        let exchanged = polish.exchange();
         if exchanged == 0 || exchanged > most {
             break;
         }
-        // Exchanges that do not get fewer lead nowhere.
+        // If the number of exchanges does not decrease, the search ends.
         most = 2 * exchanged;
     }
     best.map(|(_, point, guess)| (point, guess))
@@ -62,7 +64,7 @@ pub(super) fn polish(
 struct Polish<'a> {
     program: &'a Program,
     guess: Guess,
-    /// The sign of each weight that is not 0, for the slope of l1.
+    /// The sign of each nonzero weight, which is its slope in l1.
     sign: Vec<f64>,
     w: Vec<f64>,
     equality: Vec<f64>,
@@ -84,7 +86,7 @@ impl<'a> Polish<'a> {
         out
     }
 
-    /// Sets the weights that do not move to the places of the guess.
+    /// Sets the weights that the guess fixes to their values.
     fn snap(&mut self) {
         for (k, place) in self.guess.places.iter().enumerate() {
             match place {
@@ -105,7 +107,7 @@ impl<'a> Polish<'a> {
         self.program.pull(&self.w)
     }
 
-    /// The slope of all but l1.
+    /// The gradient of all terms except l1.
     fn gradient(&self) -> Vec<f64> {
         let mut gradient = self.program.slope(&self.w);
         gradient.iter_mut().zip(self.pull()).for_each(|(g, p)| *g += p);
@@ -129,7 +131,7 @@ impl<'a> Polish<'a> {
         }
     }
 
-    /// Newton steps on the conditions of the guess, until rounding stops them. None where nothing finite comes out.
+    /// Newton steps on the conditions of the guess, until rounding stops progress. `None` if the result is not finite.
     fn solve(&mut self) -> Option<()> {
         let program = self.program;
         let n = program.width();
@@ -190,7 +192,7 @@ impl<'a> Polish<'a> {
         least.is_finite().then_some(())
     }
 
-    /// Newton steps with these factors until rounding stops them; gives what is off at last.
+    /// Newton steps with these factors until rounding stops progress; returns the last residual.
     fn refine(&mut self, factors: &Lu, free: &[usize], binding: &[usize]) -> Option<f64> {
         let program = self.program;
         let (f, p) = (free.len(), program.equal_to.len());
@@ -220,7 +222,7 @@ impl<'a> Polish<'a> {
     }
 
     /// Exchanges rows and bounds with multipliers of the wrong sign; returns how many.
-    fn mend(&mut self) -> usize {
+    fn exchange(&mut self) -> usize {
         let program = self.program;
         let gradient = self.gradient();
         let mut changed = 0;

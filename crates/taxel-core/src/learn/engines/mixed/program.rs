@@ -1,4 +1,4 @@
-//! The program in its own units: terms, rows, bounds, and what they come to at any weights and multipliers.
+//! The program in its own units: terms, rows, bounds, and their values at any weights and multipliers.
 
 use super::dense::{add_sum, times};
 use crate::learn::engines::{ConeProgram, HardRows, Hinges};
@@ -6,7 +6,7 @@ use crate::learn::statement::{Bounds, Norm, relative_gap};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
-/// Rows and bounds count as met within this, in units of rows of length 1.
+/// The tolerance of rows and bounds, for rows of length 1.
 pub(super) const MET: f64 = 2e-14;
 
 /// The terms of the objective, weighted and normalised.
@@ -15,13 +15,13 @@ pub(crate) struct Terms<'a> {
     pub(crate) l1: f64,
     pub(crate) l2: f64,
     pub(crate) norm: Norm,
-    /// The factor of B, its rows one after the other, and what they should reach.
+    /// The factor of B, its rows (stored one after the other), and the values they should reach.
     pub(crate) lift: f64,
     pub(crate) behind: &'a [f64],
     pub(crate) wanted: &'a [f64],
 }
 
-/// Weights and multipliers; `pull` stands for the slope of `l2 |w|_2`, no longer than `l2`.
+/// Weights and multipliers; `pull` represents the gradient of `l2 |w|_2` and is no longer than `l2`.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Point {
     pub(crate) weights: Vec<f64>,
@@ -30,7 +30,7 @@ pub(crate) struct Point {
     pub(crate) pull: Vec<f64>,
 }
 
-/// Where a weight stands.
+/// Whether a weight is free, 0, or at a bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Place {
     Free,
@@ -39,21 +39,22 @@ pub(super) enum Place {
     Upper,
 }
 
-/// Where an interior point ended.
+/// The final state of an interior-point run.
 pub(super) struct Iterate {
     pub(super) point: Point,
-    /// What seems to bind.
+    /// The rows and bounds that appear to bind.
     pub(super) guess: Guess,
 }
 
-/// A guess of what binds.
+/// A guess of the binding rows and bounds.
 #[derive(Debug, Clone)]
 pub(super) struct Guess {
     pub(super) places: Vec<Place>,
     pub(super) binding: Vec<bool>,
 }
 
-/// The problem in units in which weights, rows and costs are about 1. All scales are powers of 2, so nothing is rounded.
+/// The problem in units in which weights, rows and costs are about 1. All scales are powers of 2, so scaling rounds
+/// nothing.
 pub(super) struct Program {
     pub(super) l1: f64,
     pub(super) l2: f64,
@@ -67,19 +68,19 @@ pub(super) struct Program {
     pub(super) limit: Vec<f64>,
     pub(super) lower: Vec<f64>,
     pub(super) upper: Vec<f64>,
-    /// What a weight, the objective and each inequality row were divided by.
+    /// The scales by which weights, the objective and each inequality row were divided.
     pub(super) weight: f64,
     pub(super) cost: f64,
     pub(super) of_below: Vec<f64>,
 }
 
-/// Retains the entries that `keep` marks, and all after its end.
+/// Retains the entries that `keep` marks, and all entries beyond its end.
 pub(super) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
     let mut keep = keep.iter();
     values.retain(|_| keep.next().copied().unwrap_or(true));
 }
 
-/// The power of 2 next to a positive number; 1 for any other.
+/// The power of 2 nearest to a positive number; 1 for any other number.
 pub(super) fn power_of_2(x: f64) -> f64 {
     if x > 0.0 && x.is_finite() { x.log2().round().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
 }
@@ -154,7 +155,7 @@ impl Program {
             + self.lift * dot(&missed, &missed)
     }
 
-    /// The slope of the smooth terms: B, and the square.
+    /// The gradient of the smooth terms: B, and a squared l2 term.
     pub(super) fn slope(&self, w: &[f64]) -> Vec<f64> {
         let mut slope = vec![0.0; w.len()];
         if self.lift > 0.0 {
@@ -168,7 +169,7 @@ impl Program {
         slope
     }
 
-    /// By how much the tangent of the smooth terms at `w` is below 0 at weights of 0.
+    /// The amount by which the tangent of the smooth terms at `w` is below 0 at weights of 0.
     pub(super) fn tangent(&self, w: &[f64]) -> f64 {
         let missed = self.missed(w);
         let lift: f64 = missed.iter().zip(&self.wanted).map(|(x, m)| x * (2.0 * m + x)).sum();
@@ -184,7 +185,7 @@ impl Program {
         if lower < 0.0 && upper > 0.0 { ends.min(0.0) } else { ends }
     }
 
-    /// The slope of `l2 |w|_2`.
+    /// The gradient of `l2 |w|_2`.
     pub(super) fn pull(&self, w: &[f64]) -> Vec<f64> {
         let length = dot(w, w).sqrt();
         if self.norm == Norm::Norm && self.l2 > 0.0 && length > 0.0 {
@@ -194,7 +195,7 @@ impl Program {
         }
     }
 
-    /// How far rows and bounds are missed at most.
+    /// The largest violation of a row or bound.
     pub(super) fn missing(&self, w: &[f64]) -> f64 {
         let equal = times(&self.equal, w);
         let equal = equal.iter().zip(&self.equal_to).map(|(u, e)| (u - e).abs());
@@ -216,7 +217,7 @@ impl Program {
         self.lift * dot(&self.wanted, &self.wanted)
     }
 
-    /// Solves the same program with Clarabel, as far as it goes.
+    /// Solves the same program with Clarabel, as far as Clarabel gets.
     pub(super) fn clarabel(&self, stop: Stop<'_>) -> Result<Point> {
         let n = self.width();
         let mut gram = vec![0.0; n * n];
@@ -251,7 +252,7 @@ impl Program {
         })
     }
 
-    /// What seems to bind at weights and multipliers of any solver.
+    /// The rows and bounds that appear to bind at the weights and multipliers of any solver.
     pub(super) fn guess(&self, point: &Point) -> Guess {
         const NEAR: f64 = 1e-7;
         let place = |(w, (l, u)): (&f64, (&f64, &f64))| match *w {
@@ -268,16 +269,16 @@ impl Program {
         }
     }
 
-    /// Relative distance between the objective and the bound of these multipliers.
+    /// The relative distance between the objective and the bound that these multipliers prove.
     pub(super) fn gap(&self, point: &Point) -> f64 {
         relative_gap(self.objective(&point.weights), self.bound(point))
     }
 
-    /// A bound below the least objective, whatever the multipliers (those of inequalities at least 0) and the point are.
+    /// A lower bound on the objective, valid for any multipliers (those of inequalities at least 0) and any point.
     ///
-    /// Every term is replaced by a tangent below it: the norm by a `pull` no longer than its factor, a square by its slope
-    /// at the weights; rows by their multipliers. What is left is linear and l1 over the box, and has its least value synapse by
-    /// synapse. What rounding can add to any of these sums is taken off.
+    /// Every term is replaced by a tangent below it: the norm by a `pull` no longer than its factor, a square by its
+    /// slope at the weights, rows by their multipliers. The remaining function, linear plus l1 over the box, is
+    /// minimised synapse by synapse. The largest rounding error of all these sums is subtracted.
     pub(super) fn bound(&self, point: &Point) -> f64 {
         let n = self.width();
         let w = &point.weights;
@@ -303,7 +304,7 @@ impl Program {
         add(&self.equal, &point.equality, &self.equal_to);
         add(&self.below, &inequality, &self.limit);
         if self.lift > 0.0 {
-            // x^2 >= 2 m x - m^2 for any m, with x = behind.w - wanted.
+            // x^2 >= 2 m x - m^2 for any m; here x = behind.w - wanted.
             let missed = self.missed(w);
             let factors: Vec<f64> = missed.iter().map(|m| 2.0 * self.lift * m).collect();
             let values: Vec<f64> = missed.iter().zip(&self.wanted).map(|(m, wanted)| wanted + 0.5 * m).collect();
@@ -332,7 +333,7 @@ impl Program {
             size += least.abs();
             rounding += sizes[k] * most;
         }
-        // Half an epsilon for each of so many additions and products, whatever their order.
+        // Half an epsilon for each addition and product, whatever their order.
         value - 0.5 * f64::EPSILON * (terms * rounding + (terms + n as f64) * size)
     }
 }

@@ -1,9 +1,10 @@
-//! B alone: proximal steps, each solved exactly by the dual active set.
+//! An objective of B alone: proximal steps, each solved exactly by the dual active set.
 //!
-//! B curves in as many directions as there are targets, so its least value is reached on a whole face of weights, where
-//! nothing tells an interior point or a polish what binds. `lift |B w - m|^2 + rho/2 |w - c|^2` has one minimum. With
-//! `u = w - c` and `y = sqrt(2 lift/rho) (B w - m)` it is the least `|u|^2 + |y|^2`, which is what the dual active set finds;
-//! c moves there, and as c comes to rest the multipliers become those of B alone (Rockafellar 1976, SIAM J. Control 14:877).
+//! B has curvature in only as many directions as there are targets, so its minimum is a whole face of weights, on which
+//! neither an interior point nor a polish can identify what binds. `lift |B w - m|^2 + rho/2 |w - c|^2` has a unique
+//! minimum. With `u = w - c` and `y = sqrt(2 lift/rho) (B w - m)` it is the least `|u|^2 + |y|^2`, a problem for the
+//! dual active set. The centre c then moves to that minimum; as c converges, the multipliers become those of B alone
+//! (Rockafellar 1976, SIAM J. Control 14:877).
 
 use super::best::Best;
 use super::program::{Point, Program, power_of_2};
@@ -12,13 +13,14 @@ use crate::vectors::dot;
 use crate::{Result, Stop};
 
 const MOST_STEPS: usize = 30;
-/// The curvature of the first steps, of that of B, and by how much it falls where a step gains little.
+/// The curvature of the first steps relative to that of B, the factor by which it falls after a small gain, and its
+/// least value.
 const CURVATURE: f64 = 1e-8;
 const SMALLER: f64 = 0.01;
 const LEAST_CURVATURE: f64 = 1e-16;
 
 impl Best<'_> {
-    /// Proximal steps from these weights until the gap is this small, or nothing moves any more.
+    /// Proximal steps from these weights until the gap is at most `tolerance`, or the weights no longer change.
     pub(super) fn proximal(&mut self, from: &[f64], tolerance: f64, stop: Stop<'_>) -> Result<()> {
         let (mut centre, mut curvature) = (from.to_vec(), CURVATURE);
         for _ in 0..MOST_STEPS {
@@ -41,7 +43,8 @@ impl Best<'_> {
 }
 
 impl Program {
-    /// The minimum of B with so much curvature (of its own) around a centre; none on a stop, or where rounding is in the way.
+    /// The minimum of B with this relative curvature around a centre; `None` on a stop, or if rounding prevents a
+    /// solution.
     fn step(&self, centre: &[f64], curvature: f64, stop: Stop<'_>) -> Result<Option<Point>> {
         let (n, targets) = (self.width(), self.wanted.len());
         let steepest = self.behind.chunks_exact(n).map(|row| dot(row, row)).fold(0.0, f64::max);

@@ -5,10 +5,10 @@ use crate::learn::statement::{Norm, relative_gap};
 use crate::vectors::dot;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
-/// Of the largest weight, about.
+/// The approximate size of the largest weight.
 const SIZE: f64 = 0.3;
 
-/// A problem of its own rows; `dense` keeps what [`Terms`] and [`HardRows`] borrow.
+/// A problem that owns its rows; `dense` keeps what [`Terms`] and [`HardRows`] borrow.
 #[derive(Clone, Default)]
 struct Problem {
     l1: f64,
@@ -26,7 +26,7 @@ struct Problem {
 }
 
 impl Problem {
-    /// Alpha rows of random patterns: targets to meet, silence before them.
+    /// Alpha-kernel rows of random patterns: targets to reach, and silence before them.
     fn drawn(n: usize, targets: usize, silent: usize, random: &mut StdRng) -> Self {
         let mut out = Self { lower: vec![-0.3; n], upper: vec![0.3; n], ..Self::default() };
         let patterns: Vec<Vec<f64>> =
@@ -93,7 +93,7 @@ impl Problem {
         relative_gap(self.objective(&found.weights), found.bound)
     }
 
-    /// Clarabel on the same rows, unscaled by us.
+    /// The objective by Clarabel on the same rows, which we do not scale.
     fn oracle(&self) -> f64 {
         let program = self.program();
         let point = program.clarabel(Stop::never()).unwrap();
@@ -295,7 +295,7 @@ fn rows_may_come_and_go_between_calls() {
     }
 }
 
-/// The last resort, which hardly any problem needs.
+/// Covers the last resort, which hardly any problem needs.
 #[test]
 fn from_what_clarabel_finds_the_same_objective_is_reached() {
     let mut random = StdRng::seed_from_u64(13);
@@ -355,7 +355,8 @@ fn a_request_to_stop_ends_with_what_there_is() {
     assert!(found.weights.iter().all(|w| w.abs() <= 0.3) && found.bound.is_finite());
 }
 
-/// 6.4.5, where an augmented Lagrangian failed: one target at 40 ms, rows behind it, B not divided, inputs kept.
+/// The problem of 6.4.5, on which an augmented Lagrangian failed: one target at 40 ms, silent rows after it, B
+/// not divided, inputs kept after a spike.
 #[test]
 fn lift_against_silence_behind_the_target_is_solved() {
     for kappa in [1.0, 1.04, 1.08, 1.16, 1.3] {

@@ -10,16 +10,16 @@ use crate::wire::v1::{STAMP_US, WORD_BYTES};
 const WORDS: usize = 16;
 const BYTES: usize = WORDS * WORD_BYTES;
 
-/// Half a block is eight words in 40 bytes; three loads at these places hold words 0 to 2, 3 to 5, and 6 and 7 whole.
+/// Half a block is eight words in 40 bytes; loads at these offsets hold words 0 to 2, 3 to 5, and 6 and 7 whole.
 const LOADS: [usize; 3] = [0, 15, 24];
 
-/// Where the two bytes of each 16-bit lane lie in the three loads; 0x80 makes a zero.
+/// For each 16-bit lane, the positions of its two bytes in each of the three loads; 0x80 selects zero.
 const fn fetch(bytes: [Option<u8>; 2]) -> [[u8; 16]; 3] {
     let mut shuffles = [[0x80; 16]; 3];
     let mut load = 0;
     while load < 3 {
         let places: [u8; 16] = indices(bytes, LOADS[load] as i32, 16, 0x80);
-        // Each word from one load only.
+        // The words that are read from this load; each word is read from one load only.
         let words = [[0, 3], [3, 6], [6, 8]][load];
         let mut k = 2 * words[0];
         while k < 2 * words[1] {
@@ -35,16 +35,16 @@ static LOW: [[u8; 16]; 3] = fetch([Some(2), Some(1)]);
 static PLACE: [[u8; 16]; 3] = fetch([Some(3), Some(4)]);
 static HEAD: [[u8; 16]; 3] = fetch([Some(0), None]);
 
-/// Bits of a byte mask that belong to the first bytes of 16-bit lanes.
+/// Mask of the low byte of each 16-bit lane, in a mask with one bit per byte.
 const FIRSTS: u32 = 0x5555_5555;
 
-/// The intensities of a block in which they alternate with changes.
+/// The intensities of a block whose words are change, intensity, change, intensity, and so on.
 const ALTERNATE: u32 = FIRSTS & 0xcccc_cccc;
 
-/// The paired intensities of a block that begins with one, and in which they alternate with changes.
+/// The paired intensities of a block whose words are intensity, change, intensity, change, and so on.
 const SPLIT_PAIRS: u32 = 0x5555;
 
-/// The 16-bit lanes of a block that were chosen, at the front of each half; how many each half has.
+/// Selected 16-bit lanes of a block, moved to the front of each half, and the number of lanes selected in each half.
 struct Chosen {
     early: usize,
     late: usize,
@@ -52,7 +52,7 @@ struct Chosen {
 }
 
 impl Chosen {
-    /// The lanes of a mask of 16 bits.
+    /// Selects the lanes of a 16-bit mask.
     #[inline]
     #[target_feature(enable = "avx2,popcnt")]
     fn new(lanes: u32) -> Self {
@@ -63,7 +63,7 @@ impl Chosen {
         Self { early: first, late: second, shuffle: _mm256_set_m128i(late, early) }
     }
 
-    /// Its lanes of a vector.
+    /// Moves the selected lanes of a vector to the front of each half.
     #[inline]
     #[target_feature(enable = "avx2")]
     fn of(&self, lanes: __m256i) -> [__m128i; 2] {
@@ -72,14 +72,14 @@ impl Chosen {
     }
 }
 
-/// The 16-bit lanes one up; the last lane of `before` comes first.
+/// Shifts the 16-bit lanes up by one; lane 0 becomes the last lane of `before`.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn one_up(before: __m256i, lanes: __m256i) -> __m256i {
     _mm256_alignr_epi8::<14>(lanes, _mm256_permute2x128_si256::<0x21>(before, lanes))
 }
 
-/// A bit for each 16-bit lane, all of which are 0 or all ones.
+/// Packs 16-bit lanes, each all zeros or all ones, into one bit per lane.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn mask(lanes: __m256i) -> u32 {
@@ -87,7 +87,7 @@ fn mask(lanes: __m256i) -> u32 {
     _mm_movemask_epi8(bytes) as u32
 }
 
-/// Whether lanes of 32 bits are two words of one taxel each.
+/// Whether each 32-bit lane holds two words of the same taxel.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn paired_lanes(place: __m256i) -> bool {
@@ -121,8 +121,8 @@ pub(super) unsafe fn blocks(
     let (zero, one) = (_mm256_setzero_si256(), _mm256_set1_epi16(1));
     let last_lane = _mm256_set1_epi16(i16::from_le_bytes([14, 15]));
 
-    // Of the word before a block: its taxel, and whether it is a change, whose intensity may come first in the block. The
-    // intensity of such a change is written with the next block, or behind the last.
+    // State from the word before a block: its taxel, and whether it is a change whose intensity may be the block's
+    // first word. That intensity is written with the next block, or after the last one.
     let (x, y) = if filling.open { filling.last_taxel() } else { (0, 0) };
     let mut place_before = _mm256_set1_epi16((x | y << 8) as i16);
     let mut open = u32::from(filling.open);
@@ -165,7 +165,7 @@ pub(super) unsafe fn blocks(
 
         let farthest;
         if intensities == 0 {
-            // Stamps ahead of the latest time that do not fall are each ahead of the one before.
+            // The stamps do not fall, so each is ahead of the latest time if it is ahead of the stamp before it.
             let before = one_up(zero, ahead);
             let rising = low_bits(_mm256_cmpeq_epi16(_mm256_max_epu16(ahead, before), ahead)) == u32::MAX;
             farthest = value(bytes, at + WORD_BYTES * (WORDS - 1)).wrapping_sub(base);
@@ -174,7 +174,7 @@ pub(super) unsafe fn blocks(
             }
             let p = _mm_packus_epi16(_mm256_castsi256_si128(polarity), _mm256_extracti128_si256::<1>(polarity));
             let (early, late) = (_mm256_castsi256_si128(ahead), _mm256_extracti128_si256::<1>(ahead));
-            // SAFETY: at least 16 words are left, so 16 rows fit after `first`; a row before it is `open`.
+            // SAFETY: at least 16 words are left, so 16 rows fit after `first`; a row precedes it if `open` is set.
             unsafe {
                 let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
                 _mm256_storeu_si256(t.cast(), time(early));
@@ -228,7 +228,7 @@ pub(super) unsafe fn blocks(
             let intensity = _mm256_srai_epi16::<15>(_mm256_slli_epi16::<10>(head));
             let change = _mm256_cmpeq_epi16(intensity, zero);
             let changes = mask(change);
-            // Stamps ahead of the latest time that do not fall are each the greatest so far.
+            // The stamps do not fall, so each that is ahead of the latest time is the greatest so far.
             let ahead = _mm256_and_si256(change, ahead);
             let mut greatest = _mm256_max_epu16(ahead, _mm256_bslli_epi128::<2>(ahead));
             greatest = _mm256_max_epu16(greatest, _mm256_bslli_epi128::<4>(greatest));
@@ -240,13 +240,14 @@ pub(super) unsafe fn blocks(
             if low_bits(rising) != u32::MAX || farthest > state.farthest() {
                 break;
             }
-            // An intensity is paired where the word before it is a change of the same taxel.
+            // An intensity is paired if the word before it is a change of the same taxel.
             let same = _mm256_cmpeq_epi16(place, one_up(place_before, place));
             let behind_change = one_up(_mm256_set1_epi16(-(open as i16)), change);
             let pair = _mm256_and_si256(_mm256_and_si256(intensity, behind_change), same);
             let pairs = mask(pair);
             if pairs == SPLIT_PAIRS {
-                // One word later they are whole pairs, which go faster: `blocks` goes on behind an odd number.
+                // From the next word on, the block consists of whole pairs, which a faster path decodes: `blocks` first
+                // decodes an odd number of words one by one.
                 break;
             }
             let found = pairs.count_ones();
@@ -257,7 +258,7 @@ pub(super) unsafe fn blocks(
             let ([t_early, t_late], [early, late]) = (rows.of(ahead), rows.of(place));
             let [p_early, p_late] = rows.of(polarity);
             let (columns, row_bits) = (_mm_set1_epi16(0x3f), |place| _mm_srli_epi16::<8>(place));
-            // SAFETY: at least 16 words are left, so 16 rows fit after `first`: 8 behind its up to 8 early ones.
+            // SAFETY: at least 16 words are left, so 16 rows fit after `first`: up to 8 for each half.
             unsafe {
                 let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
                 let x = filling.room.x.as_mut_ptr().add(first);
@@ -275,11 +276,11 @@ pub(super) unsafe fn blocks(
                 _mm_storel_epi64(p.add(rows.early).cast(), _mm_packus_epi16(p_late, p_late));
             }
             if filling.paired {
-                // The words behind changes, from the change before the block on: its intensity, or none.
+                // For each change, from the open one before the block on, the lane after it: its intensity, or none.
                 let behind = Chosen::new(changes << 1 | open);
                 let [ticks_early, ticks_late] = behind.of(_mm256_and_si256(values, pair));
                 let [there_early, there_late] = behind.of(_mm256_srli_epi16::<15>(pair));
-                // SAFETY: as above; an open change has a row before `first`.
+                // SAFETY: as above; if a change is open, a row precedes `first`.
                 unsafe {
                     let ticks = filling.room.ticks.as_mut_ptr().add(first - open as usize);
                     let present = filling.room.present.as_mut_ptr().add(first - open as usize);

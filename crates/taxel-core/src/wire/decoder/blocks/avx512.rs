@@ -9,12 +9,12 @@ use crate::wire::v1::{STAMP_US, WORD_BYTES};
 const WORDS: usize = 32;
 const BYTES: usize = WORDS * WORD_BYTES;
 
-/// A block lies in three registers: bytes 0 to 63, 64 to 127, and 96 to 159. A word's bytes are fetched from the first
-/// two at once, then from the third for the words that reach beyond 127.
+/// A block is loaded into three registers: bytes 0 to 63, 64 to 127, and 96 to 159. A word's bytes are fetched from the
+/// first two in one permutation, and from the third for the words that extend beyond byte 127.
 struct Fetch {
     front: [u8; 64],
     back: [u8; 64],
-    /// Which of the 64 bytes come from the front, and from the back.
+    /// Masks of the 64 bytes that are fetched from the front, and from the back.
     from_front: u64,
     from_back: u64,
 }
@@ -38,12 +38,12 @@ impl Fetch {
     }
 }
 
-/// Lanes of 16 bits: the value's low 14 bits in two sevens; row and column; the first byte.
+/// 16-bit lanes: the low 14 bits of the value as two groups of seven, row and column, and the first byte.
 static LOW: Fetch = Fetch::new([Some(2), Some(1)]);
 static PLACE: Fetch = Fetch::new([Some(3), Some(4)]);
 static HEAD: Fetch = Fetch::new([Some(0), None]);
 
-/// For each 16-bit lane the one below it, and the one above it.
+/// For each 16-bit lane, the index of the lane below it, and of the lane above it.
 static ONE_UP: [u8; 64] = shifted(-1);
 static ONE_DOWN: [u8; 64] = shifted(1);
 
@@ -71,7 +71,7 @@ pub(super) unsafe fn blocks(
     state: &mut Carried,
     filling: &mut Filling<'_>,
 ) -> usize {
-    // The index tables are read as whole registers.
+    // Each index table fills one register.
     // SAFETY: each is 64 bytes long.
     let table = |t: &[u8; 64]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
     let (low_front, low_back) = (table(&LOW.front), table(&LOW.back));
@@ -101,7 +101,7 @@ pub(super) unsafe fn blocks(
         let head = _mm512_maskz_permutex2var_epi8(HEAD.from_front, a, head_front, b);
         let head = _mm512_mask_permutexvar_epi8(head, HEAD.from_back, head_back, c);
 
-        // In place: top bits of first bytes only. No marker, and so no contradictory kind.
+        // Exactly the first bytes have their top bit set. No word is a marker, so none is contradictory either.
         let in_place = _mm512_test_epi16_mask(head, _mm512_set1_epi16(0x80)) == u32::MAX
             && _mm512_movepi8_mask(_mm512_or_si512(low, place)) == 0;
         let markers = _mm512_test_epi16_mask(head, _mm512_set1_epi16(0x08));
@@ -118,7 +118,7 @@ pub(super) unsafe fn blocks(
         let changes = !intensities;
         let count = changes.count_ones() as usize;
 
-        // Rows are the changes, in order.
+        // The rows are the block's changes, in order.
         let (stamps, xs, ys, ps);
         if intensities == 0 {
             (stamps, xs, ys, ps) = (values, x, y, polarity);
@@ -128,7 +128,7 @@ pub(super) unsafe fn blocks(
             ys = _mm512_maskz_compress_epi16(changes, y);
             ps = _pext_u32(polarity, changes);
         }
-        // Stamps ahead of the latest time that do not fall are each ahead of the one before.
+        // The stamps do not fall, so each is ahead of the latest time if it is ahead of the stamp before it.
         let base = state.latest as u16;
         let ahead = _mm512_sub_epi16(stamps, _mm512_set1_epi16(base as i16));
         let before = _mm512_maskz_permutexvar_epi16(u32::MAX << 1, one_up, ahead);
@@ -146,7 +146,7 @@ pub(super) unsafe fn blocks(
 
         let first = filling.rows;
         if intensities != 0 {
-            // An intensity is paired where the word before it is a change of the same taxel.
+            // An intensity is paired if the word before it is a change of the same taxel.
             let place_before = _mm512_permutexvar_epi16(one_up, place);
             let same = _mm512_cmpeq_epi16_mask(place, place_before) & !1;
             let mut paired = intensities & (changes << 1) & same;
@@ -186,7 +186,7 @@ pub(super) unsafe fn blocks(
             let ahead = _mm512_cvtepu16_epi64(ahead);
             _mm512_add_epi64(start, _mm512_mul_epu32(ahead, _mm512_set1_epi64(STAMP_US)))
         };
-        // SAFETY: as above. What lies beyond the block's changes is written again by later rows, or never read.
+        // SAFETY: as above. Entries beyond the block's changes are overwritten by later rows, or never read.
         unsafe {
             let t: *mut __m512i = filling.room.t.as_mut_ptr().add(first).cast();
             let x: *mut __m512i = filling.room.x.as_mut_ptr().add(first).cast();
@@ -199,7 +199,8 @@ pub(super) unsafe fn blocks(
                 time(_mm512_extracti32x4_epi32::<3>(ahead)),
             ];
             let ps = _mm256_maskz_set1_epi8(ps, 1);
-            // Whole lines only: 32 rows fill them, fewer are written over.
+            // Non-temporal stores pay off for whole cache lines only, which 32 rows fill; of fewer rows the rest is
+            // overwritten later.
             if streamed && count == WORDS && [t, x, y].iter().all(|to| to.is_aligned()) && p.is_aligned() {
                 for (k, times) in times.into_iter().enumerate() {
                     _mm512_stream_si512(t.add(k), times);
@@ -222,7 +223,7 @@ pub(super) unsafe fn blocks(
         at += BYTES;
     }
     if streamed {
-        // So that other threads see these rows as they see any.
+        // Orders the non-temporal stores before later stores, so that other threads see these rows as any others.
         _mm_sfence();
     }
     at

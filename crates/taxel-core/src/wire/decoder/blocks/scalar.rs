@@ -1,10 +1,10 @@
-//! Plain words one by one, on any machine.
+//! Decodes plain words one by one, on any machine.
 
 use super::carried::{Carried, value};
 use crate::wire::decoder::filling::Filling;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES};
 
-/// See [`super::blocks`]; at most `most` words. The first pair of a filling counts as not plain.
+/// See [`super::blocks`]; decodes at most `most` words. The first pair of a filling counts as not plain.
 pub(super) fn words(
     bytes: &[u8],
     columns: u16,
@@ -16,11 +16,11 @@ pub(super) fn words(
     let words = most.min(bytes.len() / WORD_BYTES);
     let (first, paired, mut open) = (filling.rows, filling.paired, filling.open);
     let mut last = if open { filling.last_taxel() } else { (0, 0) };
-    // Places of rows from here on: there are never more rows than words.
+    // The rows that can be written from here on: there are never more rows than words.
     let place = first..first + words;
     let (t, p) = (&mut filling.room.t[place.clone()], &mut filling.room.p[place.clone()]);
     let (x, y) = (&mut filling.room.x[place.clone()], &mut filling.room.y[place]);
-    // Intensities may belong to the row before.
+    // The first word may be the intensity of the row before.
     let back = usize::from(first > 0);
     let ticks = &mut filling.room.ticks[first - back..first + words];
     let present = &mut filling.room.present[first - back..first + words];

@@ -1,4 +1,4 @@
-//! What a datagram's body holds, by its kind.
+//! Decodes a datagram's body, by its kind.
 
 use super::Decoder;
 use super::words::{self, Body, Meaning};
@@ -10,7 +10,7 @@ use crate::wire::v2::{DIFFERENCES, Header, Kind, START, STOP, Status};
 const STATUS_BYTES: usize = 40;
 
 impl Decoder {
-    /// `number` is the datagram's, where it is of the latest session.
+    /// `number` is the datagram's sequence number if it belongs to the latest session.
     pub(super) fn body(&mut self, header: &Header, body: &[u8], base: i64, number: Option<i64>, out: &mut impl Table) {
         let Some(kind) = Kind::of(header.kind) else {
             self.counts.unknown_kind += 1;

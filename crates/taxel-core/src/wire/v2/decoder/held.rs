@@ -1,10 +1,10 @@
-//! What each taxel holds, and since when, as far as it is known.
+//! Each taxel's value, and the time since which it is valid, as far as they are known.
 
 use crate::Array;
-use crate::wire::v2::stride;
+use crate::wire::v2::{NEVER, stride};
 
-/// Laid out as the wire names places (position = line << stride | row, with the array's own stride), so that a line is
-/// written as it comes.
+/// Stored by position on the wire (line << stride | row, with the array's own stride), so that the entries of one line
+/// are contiguous.
 #[derive(Debug, Clone)]
 pub(super) struct Held {
     pub(super) columns: u16,
@@ -12,18 +12,15 @@ pub(super) struct Held {
     /// Bits that name a row.
     pub(super) stride: u8,
     pub(super) values: Vec<u16>,
-    /// us; [`NEVER`] where nothing is known.
+    /// Time of each value, us; [`NEVER`] if the value is unknown.
     pub(super) since: Vec<i64>,
-    /// No entry of `since` is later.
+    /// Upper bound of the entries of `since`.
     pub(super) newest: i64,
-    /// What a taxel holds of which nothing was received: 0 where the session was received from its start.
+    /// Value of a taxel without any event so far: 0 if the session was received from its start.
     pub(super) unheard: Option<u16>,
 }
 
-/// Before any time.
-pub(super) const NEVER: i64 = i64::MIN;
-
-/// Of what is known from elsewhere: before anything that is received.
+/// Time of a value that is known from elsewhere: earlier than anything received.
 const BEFORE: i64 = NEVER + 1;
 
 impl Held {
@@ -41,13 +38,13 @@ impl Held {
         }
     }
 
-    /// The same array, of whose taxels nothing is known.
+    /// The same array, with all values unknown.
     pub(super) fn blank(&self) -> Self {
         let places = self.values.len();
         Self { values: vec![0; places], since: vec![NEVER; places], newest: NEVER, unheard: None, ..*self }
     }
 
-    /// Says what taxels hold, by index, none where that is not known.
+    /// Sets the taxels' values, by index, none if a value is unknown.
     pub(super) fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
         let (rows, columns) = (self.rows, self.columns);
         let places = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
@@ -58,7 +55,7 @@ impl Held {
         }
     }
 
-    /// Where a taxel's entries lie.
+    /// Position of a taxel's entries.
     #[inline(always)]
     pub(super) fn place(&self, x: u16, y: u16) -> usize {
         usize::from(x) << self.stride | usize::from(y)
@@ -76,14 +73,14 @@ impl Held {
         self.newest = self.newest.max(t);
     }
 
-    /// What was held holds no more; `unheard` as the field.
+    /// Discards all values; `unheard` becomes the field of that name.
     pub(super) fn forget(&mut self, unheard: Option<u16>) {
         self.since.fill(NEVER);
         self.newest = NEVER;
         self.unheard = unheard;
     }
 
-    /// By taxel index.
+    /// The values by taxel index.
     pub(super) fn by_index(&self) -> Vec<Option<u16>> {
         (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| self.get(self.place(x, y)))).collect()
     }

@@ -1,8 +1,8 @@
-//! Plain datagrams of a few words, as a scene's are: one, or many in one go, with AVX2.
+//! Decodes plain datagrams of a few words, as scenes produce, one or many in a row, with AVX2.
 //!
-//! Plain is a datagram ahead in the latest session, with changes as they are (no differences, no time of their own), no
-//! earlier than what is held and all on the array. Anything else ends the run, and the decoder takes it by itself, which alone
-//! defines what a datagram means. So both ways give the same rows, held values and counts.
+//! A datagram is plain if it is ahead in the latest session and has changes only (no differences, no word of time),
+//! none earlier than the stored values and all on the array. Any other datagram ends the run, and the decoder decodes
+//! it alone; only the decoder defines a datagram's meaning. So both ways return the same rows, values and counts.
 
 use super::held::Held;
 use super::session::Session;
@@ -13,17 +13,17 @@ use crate::wire::v2::checksum::{EVEN, even};
 use crate::wire::v2::counts::Counts;
 use crate::wire::v2::{HEADER_BYTES, Header, Kind, TRAILER_BYTES};
 
-/// Bytes of the longest datagram of a run: all but the checksum in one register.
+/// Longest datagram of a run, bytes: all but the checksum fits the buffer of [`EVEN`] bytes.
 const LONGEST: usize = EVEN + 4;
 
-/// Rows that a datagram's stores may touch: a whole eight for each that is begun.
+/// Most rows that the stores for a datagram may touch: eight for each group of eight words, whole or not.
 const ROWS: usize = ((LONGEST - HEADER_BYTES - TRAILER_BYTES) / 2).next_multiple_of(EIGHT);
 
-/// What the decoder knows, as a run goes on with it.
+/// The state of a decoder during a run.
 pub(super) struct Run<'a> {
-    /// What its datagrams have in common, as [`Header::common`] has it of plain ones.
+    /// The part that is equal for all datagrams of the run: [`Header::common`] of plain changes.
     common: u64,
-    /// The latest one.
+    /// The latest session.
     session: &'a mut Session,
     held: &'a mut Held,
     latest: &'a mut i64,
@@ -31,14 +31,14 @@ pub(super) struct Run<'a> {
     pub(super) taken: Taken,
 }
 
-/// Whether a datagram's length is that of one of a run.
+/// Whether a datagram of this length can belong to a run.
 #[inline(always)]
 fn short(datagram: &[u8]) -> bool {
     (HEADER_BYTES + TRAILER_BYTES..=LONGEST).contains(&datagram.len())
 }
 
 impl<'a> Run<'a> {
-    /// A run that may begin with a datagram, and how many bits of value its words have; none where it surely does not.
+    /// A run that may begin with a datagram, and the number of value bits of its words; none if no run can begin there.
     #[inline]
     pub(super) fn new(
         datagram: &[u8],
@@ -53,7 +53,7 @@ impl<'a> Run<'a> {
             return None;
         }
         let value = kind.layout()?.value;
-        // Positions, and sums that are too large, must be distinct in 16 bits.
+        // Positions and saturated sums must be distinct in 16 bits.
         if held.values.len() >= usize::from(FULL) {
             return None;
         }
@@ -61,12 +61,12 @@ impl<'a> Run<'a> {
         Some((Self { common, session, held, latest, counts, taken: Taken::default() }, value))
     }
 
-    /// Takes datagrams of words with so many bits of value into `room`, from a row on, as far as they are plain; gives how many rows they
-    /// are.
+    /// Decodes datagrams whose words have `VALUE` bits of value into `room`, from a row on, while they are plain;
+    /// returns the number of rows.
     ///
     /// # Safety
     ///
-    /// The machine must have the features below, and `VALUE` be that which [`Self::new`] gave.
+    /// The machine must have the features below, and `VALUE` must be the number that [`Self::new`] returned.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt,sse4.2")]
     pub(super) unsafe fn take<'d, const VALUE: u32>(
@@ -91,11 +91,12 @@ impl<'a> Run<'a> {
                 && body.len().is_multiple_of(if VALUE == 16 { 4 } else { 2 })
                 && room.len() - row >= ROWS;
             let (summed, sum) = datagram.split_at(datagram.len() - 4);
-            // SAFETY: 20 to 64 bytes, as `short` has seen to.
+            // SAFETY: `short` has checked that there are 20 to 64 bytes.
             if !plain || unsafe { even(summed) }.to_le_bytes() != sum {
                 break;
             }
-            // SAFETY: the machine has the features, `new` has seen to the array, and so many rows fit behind `row`, as was seen above.
+            // SAFETY: the machine has the features, `new` has checked the array, and the loop above has checked that
+            // these rows fit after `row`.
             let Some(rows) = (unsafe { self.words::<VALUE>(datagram, start as u16, t, room, row, paired) }) else {
                 break;
             };
@@ -113,12 +114,13 @@ impl<'a> Run<'a> {
         row - first
     }
 
-    /// Takes a datagram's whole words, which begin at a position and are of one time; gives how many rows they are. None where one
-    /// is not plain: of those before it, eight by eight, some may be held by then, as the decoder will hold them again.
+    /// Decodes a datagram's whole words, which begin at a position and share one time; returns the number of rows. None
+    /// if a word is not plain: values of words before it may be stored already, and the decoder then stores the same
+    /// values again.
     ///
     /// # Safety
     ///
-    /// As [`Self::take`]'s; [`ROWS`] must fit behind `first`.
+    /// As for [`Self::take`]; [`ROWS`] rows must fit after `first`.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt,sse4.2")]
     unsafe fn words<const VALUE: u32>(
@@ -134,8 +136,8 @@ impl<'a> Run<'a> {
         let (mut row, mut at, end) = (first, HEADER_BYTES, datagram.len() - TRAILER_BYTES);
         while at < end {
             let count = ((end - at) / bytes).min(EIGHT);
-            // SAFETY: so many words lie there, behind the header; with the caller's promises the events lie on the array, and so in
-            // `held`, and 8 rows fit behind those so far.
+            // SAFETY: this many words follow the header; as the caller guarantees, the events are on the array, and so
+            // in `held`, and 8 rows fit after those so far.
             unsafe {
                 let eight = Eight::read::<VALUE>(datagram, at, count, passed, self.held)?;
                 eight.write::<VALUE>(t, room, row, paired);

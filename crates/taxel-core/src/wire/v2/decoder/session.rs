@@ -1,20 +1,20 @@
-//! Which numbers of a board's session have come.
+//! Tracks which sequence numbers of a board's session have arrived.
 
 use crate::wire::v2::Header;
 
-/// How far behind the highest sequence number a datagram may come and still be distinguished from a repeated one.
+/// How far a datagram may be behind the highest sequence number and still be distinguished from a repeated one.
 pub(super) const WINDOW: usize = 65_536;
 
-/// What is known of the datagrams between two resets.
+/// The state of one session: the datagrams between two resets.
 #[derive(Debug, Clone)]
 pub(super) struct Session {
     pub(super) number: u16,
     lowest: i64,
     pub(super) highest: i64,
     received: u64,
-    /// By number modulo the window: whether it came.
+    /// A bit for each number modulo the window: whether its datagram has arrived.
     seen: Vec<u64>,
-    /// What is added to the board's times.
+    /// Added to the board's times, us.
     pub(super) offset: i64,
     /// The latest base time.
     pub(super) latest: u64,
@@ -38,7 +38,7 @@ impl Session {
         self.highest + i64::from(sequence.wrapping_sub(self.highest as u32) as i32)
     }
 
-    /// Whether a datagram is the one that comes next.
+    /// Whether a datagram is the next one in the sequence.
     #[inline]
     pub(super) fn is_next(&self, header: &Header) -> bool {
         self.number == header.session && header.sequence == (self.highest as u32).wrapping_add(1)
@@ -49,7 +49,7 @@ impl Session {
         (self.highest - self.lowest + 1) as u64 - self.received
     }
 
-    /// Notes a number; none where it is too old, else whether it is new.
+    /// Records a number; none if it is too old, otherwise whether it is new.
     #[inline(always)]
     pub(super) fn note(&mut self, number: i64) -> Option<bool> {
         if (1..=64).contains(&(number - self.highest)) {
@@ -59,14 +59,15 @@ impl Session {
         self.note_out_of_turn(number)
     }
 
-    /// Notes a number at most 64 ahead, as nearly all are: what came a window ago in the places of those between is forgotten.
-    /// Without a branch, as no processor predicts in a scene which datagram comes behind a gap.
+    /// Records a number at most 64 ahead, the usual case, and clears the bits of the numbers between, which still
+    /// describe numbers one window earlier. Branch-free, because a processor cannot predict after which datagrams
+    /// numbers are missing.
     #[inline(always)]
     fn note_ahead(&mut self, number: i64) {
         let (word, bit) = place(number);
         let between = (number - self.highest - 1) as u32;
         let here = between.min(bit.trailing_zeros());
-        // Those just below the number's bit, and at the top of the word before.
+        // Masks of the bits just below the number's bit, and at the top of the word before.
         let below = bit - (bit >> here);
         let before = (u64::MAX << 1) << (63 - (between - here));
         self.seen[(word + WINDOW / 64 - 1) % (WINDOW / 64)] &= !before;
@@ -91,7 +92,7 @@ impl Session {
         Some(new)
     }
 
-    /// From `first` to `last`, at most a window of them, none has come; by words, as many may be missing.
+    /// Clears the bits from `first` to `last`, at most a window of them, a word at a time because many may be missing.
     fn clear(&mut self, mut first: i64, last: i64) {
         while first <= last {
             let (word, bit) = place(first);

@@ -1,14 +1,14 @@
-//! Datagrams that were decoded in one go; none on a machine without the instructions for it.
+//! Totals of the datagrams decoded in one run; zero on a machine without the instructions for it.
 
-/// How many there were, and the time and promise of the last.
+/// Number of datagrams, and the time and promise of the last one.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::wire::v2) struct Taken {
-    /// How many.
+    /// Number of datagrams.
     pub(in crate::wire::v2) datagrams: usize,
-    /// Their bytes, without the lengths that stand before them in a stream.
+    /// Number of their bytes, without the lengths that precede them in a stream.
     pub(in crate::wire::v2) bytes: usize,
-    /// When the last one began, us.
+    /// Base time of the last datagram, us.
     pub(super) base: i64,
-    /// What it promises, us.
+    /// Span of the last datagram, us.
     pub(super) span: u16,
 }

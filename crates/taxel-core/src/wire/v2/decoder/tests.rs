@@ -1,4 +1,4 @@
-//! Datagrams of version 2 to events.
+//! Tests of the decoder of version 2.
 
 use super::*;
 use crate::board::Board;
@@ -20,11 +20,12 @@ fn changes_as_they_are_go_the_short_way_where_the_machine_has_it() {
     for (kind, body, flags, taken) in [
         (Kind::Small, vec![], 0, short),
         (Kind::Small, vec![5, 0x80, 7, 0x03], FRAME_SYNC, short),
-        // Advances, and more words than eight.
+        // Advances, and more than eight words.
         (Kind::Small, [1, 0x7f, 5, 0x83].repeat(6), 0, short),
         (Kind::Changes, vec![5, 0x80], 0, short),
         (Kind::Large, vec![5, 1, 0, 0x80], 0, short),
-        // A time, differences, what the board dropped, states, a part of a word, a place beyond the array, a long one.
+        // Datagrams that are not plain: a word of time, differences, dropped events, states, part of a word, a position
+        // outside the array, too long.
         (Kind::Small, vec![0, 0xff, 9, 0, 5, 0x83], 0, 0),
         (Kind::Small, vec![5, 0x80], DIFFERENCES, 0),
         (Kind::Small, vec![5, 0x80], DROPPED, 0),

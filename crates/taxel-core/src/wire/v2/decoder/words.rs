@@ -1,8 +1,8 @@
-//! Words of a body to rows: one by one on any machine, in blocks where it has the instructions.
+//! Decodes a body's words to rows: one by one on any machine, in blocks if it has the instructions.
 //!
-//! The blocks take what is plain (on the array, no earlier than anything that is held, values as they are) and stop at
-//! anything else, which [`single::words`] takes: it alone defines what a word means, so every set of instructions gives
-//! the same rows, held values and counts.
+//! The blocks decode plain words (on the array, no earlier than any stored value, values and not differences) and stop
+//! at any other word, which [`single::words`] decodes. Only that function defines a word's meaning, so all instruction
+//! sets return the same rows, values and counts.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -22,30 +22,30 @@ use crate::vectors::Instructions;
 use crate::wire::columns::Room;
 use crate::wire::v2::counts::Counts;
 
-/// Rows beyond those that words give that a block may write over.
+/// Rows after those of the words that a block may overwrite.
 const MARGIN: usize = 32;
 
-/// Words that are taken one by one before blocks are tried again.
+/// Number of words decoded one by one before blocks are tried again.
 const STRETCH: usize = 32;
-/// As [`STRETCH`], of AVX2, whose blocks are shorter.
+/// As [`STRETCH`], for AVX2, whose blocks are shorter.
 const SHORT_STRETCH: usize = 8;
 
-/// Bytes of the shortest word.
+/// Size of the shortest word, bytes.
 const WORD_BYTES: usize = 2;
 
-/// How many rows a stream of so many bytes may need, whatever it holds.
+/// Most rows that a stream of this many bytes can need.
 #[must_use]
 pub fn stream_rows(bytes: usize) -> usize {
     most_rows(bytes / WORD_BYTES)
 }
 
-/// How much room so many words need, rows.
+/// Room that this many words need, rows.
 pub(super) fn most_rows(words: usize) -> usize {
     words + MARGIN
 }
 
-/// Decodes a body, from its `rows` on; with `paired` each row gets an intensity, or the mark that it has none. `room` has
-/// [`most_rows`] or more from there on.
+/// Decodes a body, from row `rows` on; with `paired` the intensity columns are written for each row. `room` has at
+/// least [`most_rows`] rows from there on.
 #[inline]
 pub(super) fn decode(
     body: &mut Body<'_>,
@@ -77,7 +77,7 @@ pub(super) fn decode(
     counts.malformed += u64::from(body.cut || body.at < body.bytes.len());
 }
 
-/// Takes plain words, as far as they go, where the machine has the instructions.
+/// Decodes plain words up to the first that is not, if the machine has the instructions.
 #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
 fn blocks(body: &mut Body<'_>, set: Instructions, held: &mut Held, room: &mut Room<'_>, paired: bool) {
     #[cfg(target_arch = "x86_64")]
@@ -86,9 +86,9 @@ fn blocks(body: &mut Body<'_>, set: Instructions, held: &mut Held, room: &mut Ro
         && body.stride == held.stride
         && held.values.len() < usize::from(FULL)
     {
-        // SAFETY: the machine has this set, as `Decoder::instructions` and `best` see to. `decode` has asserted that the room
-        // holds, behind the rows so far, a row for each word and 32 more, and no word gives more than one row. The last two
-        // conditions are the block's own.
+        // SAFETY: `Decoder::instructions` and `best` select a set only if the machine has it. `decode` has asserted
+        // that the room after the rows so far holds a row for each word and 32 more, and no word gives more than one
+        // row. The block itself checks the last two conditions.
         unsafe {
             match (set, body.layout.value) {
                 (Instructions::Avx512Bytes, 0) => avx512::blocks::<0>(body, held, room, paired),

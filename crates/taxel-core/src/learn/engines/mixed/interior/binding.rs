@@ -1,4 +1,4 @@
-//! What seems to bind where an interior point ended.
+//! The rows and bounds that appear to bind at an interior point.
 
 use super::super::program::{Guess, Iterate, Place, Point};
 use super::{Interior, PrimalDual};
@@ -9,7 +9,8 @@ impl Interior<'_> {
         let program = self.program;
         let weights = self.weights(&state.x);
         let n = program.width();
-        // What binds has a multiplier larger for its kind than its distance; costs are about 1.
+        // A constraint counts as binding if its multiplier, relative to the typical multiplier,
+        // exceeds its relative distance; the costs are scaled to about 1.
         let typical = |v: &[f64]| dot(v, v) / v.iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let (far, force) = (typical(&state.x).clamp(1e-3, 1.0), typical(&state.low).max(1.0));
         let (room, press) = (typical(&state.slack).clamp(1e-3, 1.0), typical(&state.inequality).max(1.0));

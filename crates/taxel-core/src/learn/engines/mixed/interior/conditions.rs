@@ -1,4 +1,4 @@
-//! The conditions of optimality: by how much each is missed, and what the complementarity products shall become.
+//! The optimality conditions: their residuals, and the targets of the complementarity products.
 
 use super::super::dense::{add_sum, times};
 use super::Interior;
@@ -87,7 +87,7 @@ impl Interior<'_> {
         out
     }
 
-    /// Gondzio's corrector: products that a longer step would bring far from `mu` are pulled back.
+    /// Gondzio's corrector: products that a longer step would move far from `mu` are pulled back.
     pub(super) fn correct(&self, state: &PrimalDual, step: &Step, reach: f64, mu: f64, aim: &Complement) -> Complement {
         let pull = |product: f64| {
             if product < 0.1 * mu {

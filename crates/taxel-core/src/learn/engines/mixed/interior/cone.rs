@@ -2,7 +2,7 @@
 
 use crate::vectors::dot;
 
-/// Nesterov-Todd scaling of the norm's cone.
+/// The Nesterov-Todd scaling of the norm's cone.
 pub(super) struct Scaling {
     pub(super) eta: f64,
     pub(super) w0: f64,

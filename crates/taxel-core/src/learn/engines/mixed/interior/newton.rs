@@ -1,4 +1,4 @@
-//! The Newton matrix of an iteration, factored, and the directions that it gives.
+//! The Newton matrix of an iteration, its factors, and the directions that follow from them.
 
 use faer::Mat;
 
@@ -9,13 +9,13 @@ use super::variables::{Complement, PrimalDual, Residual, Room, Step};
 use crate::learn::statement::Norm;
 use crate::vectors::dot;
 
-/// A linear system is solved to this, relatively, in so many refinements at most.
+/// The relative accuracy of a linear system, and the largest number of refinements to reach it.
 const REFINED: f64 = 1e-10;
 const MOST_REFINEMENTS: usize = 3;
-/// Curvature of a weight that cannot move.
+/// The curvature of a weight that cannot move.
 const FIXED: f64 = 1e30;
 
-/// A factored Newton matrix with what it needs to solve for a direction.
+/// A factored Newton matrix with everything needed to solve for a direction.
 pub(super) struct Newton<'a> {
     pub(super) inner: &'a Interior<'a>,
     pub(super) state: &'a PrimalDual,
@@ -23,7 +23,7 @@ pub(super) struct Newton<'a> {
     pub(super) of_part: Vec<f64>,
     pub(super) ratio: Vec<f64>,
     pub(super) scaling: Option<Scaling>,
-    /// The factor of the equality rows in the matrix.
+    /// The factor with which the equality rows are added to the matrix.
     pub(super) weight: f64,
     pub(super) factor: Cholesky,
     pub(super) schur: Option<Cholesky>,
@@ -52,7 +52,8 @@ impl Interior<'_> {
             let root = ratio.sqrt();
             row.iter_mut().for_each(|v| *v *= root);
         }
-        // Equality rows change nothing here, but near a vertex the rest alone is singular up to rounding.
+        // Equality rows do not change the direction, but near a vertex the matrix without them is
+        // singular up to rounding.
         let weight = ratio.iter().fold(1.0_f64, |m, r| m.max(*r)).min(1e12);
         scaled.extend(self.program.equal.iter().map(|v| v * weight.sqrt()));
         add_gram(scaled, n, 1.0, &mut matrix);
@@ -79,7 +80,7 @@ impl Interior<'_> {
 }
 
 impl Newton<'_> {
-    /// The matrix of the reduced system times a vector.
+    /// The product of the reduced system's matrix and a vector.
     fn times(&self, v: &[f64]) -> Vec<f64> {
         let program = self.inner.program;
         let mut out: Vec<f64> = v.iter().zip(&self.diagonal).map(|(v, d)| v * d).collect();
@@ -133,7 +134,7 @@ impl Newton<'_> {
             (0..self.ratio.len()).map(|i| self.ratio[i] * r.inequality[i] + aim.rows[i] / state.slack[i]).collect();
         let minus: Vec<f64> = rows.iter().map(|v| -v).collect();
         add_sum(&program.below, &minus, &mut right);
-        // The cone: dual step = h - M (length, w), its first line giving the length.
+        // The cone: dual step = h - M (length, w); its first row determines the step of the length.
         let mut cone = None;
         if let (Some(s), Some(c)) = (&self.scaling, &aim.cone) {
             let h = s.unscale((c.0, &c.1));
@@ -162,7 +163,7 @@ impl Newton<'_> {
             w.iter_mut().zip(&cw).for_each(|(a, b)| *a += b);
             du.iter_mut().zip(&cu).for_each(|(a, b)| *a += b);
         }
-        // What the parts share of each weight's step.
+        // The contributions of the parts to each weight's step.
         let mut of_w = vec![0.0; n];
         for (j, p) in inner.parts.iter().enumerate() {
             of_w[p.synapse] += p.sign * of_x[j] / self.of_part[j];

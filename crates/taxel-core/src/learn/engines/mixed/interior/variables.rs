@@ -1,4 +1,4 @@
-//! The variables of the interior point, a direction in them, and what the conditions of optimality lack.
+//! The variables of the interior-point method, directions in them, and the residuals of the optimality conditions.
 
 use faer::Mat;
 
@@ -12,7 +12,8 @@ pub(super) struct Part {
     pub(super) cost: f64,
 }
 
-/// The variables: parts `x` with the multipliers of their two ends, rows' slacks and multipliers, the cone of the norm.
+/// The variables: parts `x` with the multipliers of their two bounds, the rows' slacks and multipliers, the norm's
+/// cone.
 #[derive(Debug, Clone)]
 pub struct PrimalDual {
     pub(super) x: Vec<f64>,
@@ -22,7 +23,7 @@ pub struct PrimalDual {
     pub(super) slack: Vec<f64>,
     pub(super) inequality: Vec<f64>,
     pub(super) length: f64,
-    /// The cone's multiplier: its first entry, then the rest (minus the pull).
+    /// The cone's multiplier: its first entry, then the others (minus the pull).
     pub(super) dual: (f64, Vec<f64>),
 }
 
@@ -70,12 +71,12 @@ pub(super) struct Residual {
     pub(super) length: f64,
 }
 
-/// Targets of the complementarity products, less what they are.
+/// The targets of the complementarity products minus the products.
 pub(super) struct Complement {
     pub(super) low: Vec<f64>,
     pub(super) high: Vec<f64>,
     pub(super) rows: Vec<f64>,
-    /// Already divided by the scaled point.
+    /// The entry of the cone, already divided by the scaled point.
     pub(super) cone: Option<(f64, Vec<f64>)>,
 }
 

@@ -1,4 +1,4 @@
-//! Blocks of up to 32 words with AVX-512 (F, BW, VL, VBMI2) and BMI2; the last one of a body is shorter.
+//! Decodes blocks of up to 32 words with AVX-512 (F, BW, VL, VBMI2) and BMI2; a body's last block may be shorter.
 
 use std::arch::x86_64::*;
 
@@ -9,7 +9,7 @@ use crate::wire::v2::decoder::held::Held;
 
 const WORDS: usize = 32;
 
-/// For each 16-bit lane the last lane of the 128 bits before it, and the 16th lane.
+/// For each 16-bit lane, the last lane of the 128 bits before it, and lane 16.
 static LAST_BEFORE: [u16; WORDS] = lanes(false);
 static SIXTEENTH: [u16; WORDS] = lanes(true);
 
@@ -23,10 +23,10 @@ const fn lanes(sixteenth: bool) -> [u16; WORDS] {
     out
 }
 
-/// Each lane's number.
+/// The index of each lane.
 static LANE: [u16; WORDS] = every(1, 0);
 
-/// Where the words of 32 bits have their low and their high halves.
+/// Lanes of the low and of the high halves of 32-bit words.
 static LOW_HALVES: [u16; WORDS] = every(2, 0);
 static HIGH_HALVES: [u16; WORDS] = every(2, 1);
 
@@ -40,11 +40,11 @@ const fn every(step: u16, first: u16) -> [u16; WORDS] {
     out
 }
 
-/// A block's lanes in memory.
+/// Lanes of a block, stored in memory.
 #[repr(align(64))]
 struct Lanes([u16; WORDS]);
 
-/// What every block needs, in registers.
+/// Constants of every block, in registers.
 #[derive(Clone, Copy)]
 struct Constants {
     last_before: __m512i,
@@ -58,21 +58,21 @@ struct Constants {
     rows: __m512i,
 }
 
-/// The words of a block, a lane each.
+/// The words of a block, one per lane.
 #[derive(Clone, Copy)]
 struct Words {
     polarity: u32,
     skip: __m512i,
     value: __m512i,
-    /// Advances and times.
+    /// Mask of the control words: advances and times.
     controls: u32,
 }
 
-/// The events of a block, the first ones in the first lanes.
+/// The events of a block, moved to the first lanes.
 #[derive(Clone, Copy)]
 struct Found {
     n: usize,
-    /// The lanes of `n`.
+    /// Mask of the first `n` lanes.
     given: u32,
     position: __m512i,
     x: __m512i,
@@ -100,11 +100,11 @@ impl Constants {
         }
     }
 
-    /// The words that begin at a place, as many as `lanes` has.
+    /// Loads the words at an address, as many as `lanes` has bits.
     ///
     /// # Safety
     ///
-    /// That many words, of 4 bytes each where `VALUE` is 16 and of 2 else, must lie there.
+    /// That many words must be readable there, of 4 bytes each if `VALUE` is 16, otherwise of 2.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
     unsafe fn words<const VALUE: u32>(&self, block: *const u8, lanes: u32) -> Words {
@@ -130,15 +130,15 @@ impl Constants {
         Words { polarity, skip, value, controls }
     }
 
-    /// The steps of the position, added up within the `taken` lanes, of which some are `advances`; a sum that is too large stays
-    /// too large. With `few` there are no more than 8 lanes.
+    /// Prefix sums of the position's steps over the `taken` lanes, some of which are `advances`; sums saturate. With
+    /// `few` there are at most 8 lanes.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
     fn sums<const VALUE: u32>(&self, words: &Words, taken: u32, advances: u32, few: bool) -> __m512i {
         let Words { skip, value, .. } = *words;
         let one = _mm512_set1_epi16(1);
         let mut steps = _mm512_maskz_add_epi16(taken, skip, one);
-        // Of small words without a branch: in a scene no processor predicts which block has one.
+        // Branch-free for small words: a processor cannot predict which block of a scene has an advance.
         if VALUE == 8 || advances != 0 {
             let advance = if VALUE == 8 {
                 _mm512_slli_epi16::<6>(_mm512_add_epi16(value, one))
@@ -161,7 +161,7 @@ impl Constants {
         steps
     }
 
-    /// The events among words, whose positions, counted from 1, are given; none where one lies outside the array.
+    /// The events among the words, whose positions count from 1; none if an event is outside the array.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
     fn found(&self, words: &Words, events: u32, from_1: __m512i) -> Option<Found> {
@@ -175,7 +175,7 @@ impl Constants {
         (outside & given == 0).then_some(Found { n, given, position, x, y, ticks, p })
     }
 
-    /// Notes what the taxels of events, one or more, hold from `t` on.
+    /// Stores the taxels' new values, of one or more events at time `t`.
     ///
     /// # Safety
     ///
@@ -184,13 +184,14 @@ impl Constants {
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
     unsafe fn hold(&self, found: &Found, t: i64, held: &mut Held) {
         held.newest = t;
-        // Lanes without an event repeat the last one, so that the loop has one of two lengths: a processor guesses these.
+        // Lanes without an event repeat the last one, so that the loop has one of two lengths, which a processor can
+        // predict.
         let repeated = _mm512_min_epu16(_mm512_set1_epi16(found.n as i16 - 1), self.lane);
         let places = _mm512_permutexvar_epi16(repeated, found.position);
         let values = _mm512_permutexvar_epi16(repeated, found.ticks);
         if found.n > EIGHT {
             let (mut at, mut ticks) = (Lanes([0; WORDS]), Lanes([0; WORDS]));
-            // SAFETY: both are 64 bytes long, and begin where a line of the cache does; the places are those of events.
+            // SAFETY: both arrays are 64 bytes long and aligned to cache lines; the positions are those of events.
             unsafe {
                 _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
                 _mm512_store_si512(ticks.0.as_mut_ptr().cast(), values);
@@ -198,18 +199,18 @@ impl Constants {
             }
             return;
         }
-        // SAFETY: the places are those of events.
+        // SAFETY: the positions are those of events.
         unsafe { hold_eight(_mm512_castsi512_si128(places), _mm512_castsi512_si128(values), t, held) }
     }
 }
 
 /// # Safety
 ///
-/// The places must be in `held`.
+/// The positions must be in `held`.
 #[inline(never)]
 unsafe fn hold_many(places: &Lanes, values: &Lanes, t: i64, held: &mut Held) {
     for (&place, &value) in places.0.iter().zip(&values.0) {
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees this.
         unsafe {
             *held.values.get_unchecked_mut(usize::from(place)) = value;
             *held.since.get_unchecked_mut(usize::from(place)) = t;
@@ -217,17 +218,17 @@ unsafe fn hold_many(places: &Lanes, values: &Lanes, t: i64, held: &mut Held) {
     }
 }
 
-/// Notes what neighbours hold from `t` on, which lie in `held` as they came.
+/// Stores new values, valid from `t` on, of taxels whose positions are consecutive in `held`.
 ///
 /// # Safety
 ///
-/// The places from `begin` on, as many as `given` has lanes, must be in `held`.
+/// The positions from `begin` on, as many as `given` has lanes, must be in `held`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
 unsafe fn hold_neighbours(begin: usize, given: u32, ticks: __m512i, t: i64, held: &mut Held) {
     held.newest = t;
     let times = _mm512_set1_epi64(t);
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller guarantees this.
     unsafe {
         _mm512_mask_storeu_epi16(held.values.as_mut_ptr().add(begin).cast(), given, ticks);
         let since = held.since.as_mut_ptr().add(begin);
@@ -239,16 +240,16 @@ unsafe fn hold_neighbours(begin: usize, given: u32, ticks: __m512i, t: i64, held
 }
 
 impl Found {
-    /// Writes the events from a row on.
+    /// Writes the events, from row `first` on.
     ///
     /// # Safety
     ///
-    /// 32 rows must fit behind `first`: what lies beyond the events is written again by later rows, or never read.
+    /// 32 rows must fit after `first`: entries beyond the events are overwritten by later rows, or never read.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
     unsafe fn write<const VALUE: u32>(&self, t: i64, room: &mut Room<'_>, first: usize, paired: bool) {
         let times = _mm512_set1_epi64(t);
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller guarantees this.
         unsafe {
             let to = room.t.as_mut_ptr().add(first).cast::<i64>();
             _mm512_storeu_si512(to.cast(), times);
@@ -270,12 +271,12 @@ impl Found {
     }
 }
 
-/// Takes plain words of so many bits of value.
+/// Decodes plain words with `VALUE` bits of value.
 ///
 /// # Safety
 ///
-/// The machine must have the features below; each column of `room` must have 32 entries more than the rows so far and the
-/// words that are left; `body.stride` must be that of `held`, which has no more than 65 536 places.
+/// The machine must have the features below; each column of `room` must have 32 entries more than the rows so far and
+/// the remaining words together; `body.stride` must be that of `held`, which must have at most 65 536 positions.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
 pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut Held, room: &mut Room<'_>, paired: bool) {
     let bytes = if VALUE == 16 { 4 } else { 2 };
@@ -286,7 +287,7 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
         }
         let count = ((body.bytes.len() - body.at) / bytes).min(WORDS);
         let lanes = u32::MAX >> (WORDS - count);
-        // SAFETY: `count` words lie in the body from there on.
+        // SAFETY: the body has `count` words from there on.
         let words = unsafe { constants.words::<VALUE>(body.bytes.as_ptr().add(body.at), lanes) };
         let times = words.controls & words.polarity;
         if times & 1 != 0 {
@@ -297,24 +298,24 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
             body.at = after + bytes;
             continue;
         }
-        // Takes the words up to the next word of time, after which the position begins anew. The condition spares the usual case,
-        // which has no word of time, the wait for the bit operations.
+        // Restricts the block to the words up to the next word of time, after which positions restart. In the usual
+        // case there is no word of time, and the condition avoids waiting for the bit operations.
         let taken = if times == 0 { lanes } else { lanes & (times & times.wrapping_neg()).wrapping_sub(1) };
         let advances = words.controls & taken;
         let steps = constants.sums::<VALUE>(&words, taken, advances, count <= 8);
         let from_1 = _mm512_adds_epu16(steps, _mm512_set1_epi16((body.position + 1) as i16));
-        // No step is below 0, and lanes that are not taken add none: the last one has the sum.
+        // Steps are never negative, and other lanes add 0, so the last lane has the total.
         let end = if count > 8 { _mm512_extracti32x4_epi32::<3>(from_1) } else { _mm512_castsi512_si128(from_1) };
         let last = (_mm_extract_epi16::<7>(end) & 0xffff) as u16;
         if last == FULL {
             return;
         }
         let Some(found) = constants.found(&words, taken & !words.controls, from_1) else { return };
-        // SAFETY: the caller's promise: 32 rows fit behind the rows so far.
+        // SAFETY: the caller guarantees that 32 rows fit after the rows so far.
         unsafe { found.write::<VALUE>(body.t, room, body.rows, paired) };
         if VALUE > 0 && found.n > 0 {
             let begin = (_mm_cvtsi128_si32(_mm512_castsi512_si128(found.position)) & 0xffff) as usize;
-            // SAFETY: the events lie on the array, and so in `held`.
+            // SAFETY: the events are on the array, and so in `held`.
             unsafe {
                 if found.n > EIGHT && advances == 0 && usize::from(last) == begin + found.n {
                     hold_neighbours(begin, found.given, found.ticks, body.t, held);

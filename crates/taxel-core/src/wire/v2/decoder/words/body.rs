@@ -1,59 +1,59 @@
-//! A datagram's body as it is read, which is what its loops carry.
+//! A datagram's body while it is decoded: the state of the decoding loops.
 
 use crate::wire::v2::{Header, LATEST_OFFSET, Layout, before};
 
-/// What a body's words mean.
+/// The meaning of a body's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Meaning {
-    /// Changes, with the value held where the kind has one.
+    /// Changes, with the taxel's new value if the kind has values.
     Changes,
-    /// Changes by a value.
+    /// Changes whose value is a difference.
     Differences,
     /// Values that the board repeats.
     States,
-    /// Those of a session before the latest: its reset is newer.
+    /// States of an earlier session: the taxels were reset since.
     StaleStates,
 }
 
-/// A body and how far it was read.
+/// A body, and the position of the decoder in it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Body<'a> {
     pub(crate) layout: Layout,
     pub(crate) meaning: Meaning,
     /// Bits of a position that name its row.
     pub(crate) stride: u8,
-    /// us.
+    /// Base time, us.
     pub(crate) base: i64,
     pub(crate) bytes: &'a [u8],
-    /// Read so far, bytes; never more than there are.
+    /// Number of bytes read; at most the length of `bytes`.
     pub(super) at: usize,
     /// The time of the next event, us.
     pub(super) t: i64,
-    /// That of the last word.
+    /// Position of the last word.
     pub(super) position: i64,
-    /// Whether an offset was missing, or later than any that a writer sends.
+    /// Whether an offset was missing, or later than any valid one.
     pub(super) cut: bool,
     /// The latest time of a row, us; `i64::MIN` before the first.
     pub(crate) latest: i64,
-    /// The row that is written next.
+    /// Index of the next row.
     pub(crate) rows: usize,
 }
 
 impl<'a> Body<'a> {
-    /// A header's body whose times count from `base`, us, and of which nothing was read yet.
+    /// The body of a header, with nothing read yet; times count from `base`, us.
     pub(crate) fn new(layout: Layout, meaning: Meaning, header: &Header, base: i64, bytes: &'a [u8]) -> Self {
         let (at, rows, stride, position) = (0, 0, header.stride, before(header.line, header.stride));
         Self { layout, meaning, stride, base, bytes, at, t: base, position, cut: false, latest: i64::MIN, rows }
     }
 
-    /// Whole words that are left.
+    /// Number of whole words left.
     #[inline(always)]
     pub(crate) fn left(&self) -> usize {
-        // Of 2 or 4 bytes each: no division.
+        // A shift instead of a division: words have 2 or 4 bytes.
         (self.bytes.len() - self.at) >> self.layout.bytes.trailing_zeros()
     }
 
-    /// The offset that stands at a place, us; none where the body ends before it, or where it is later than a writer sends.
+    /// The offset at a place, us; none if the body ends before it, or if it is later than any valid offset.
     #[inline(always)]
     pub(super) fn offset<const BYTES: usize>(&self, at: usize) -> Option<u32> {
         let offset = (self.bytes.len() - at >= BYTES).then(|| word::<BYTES>(self.bytes, at))?;

@@ -1,4 +1,4 @@
-//! Up to eight words at once, in registers of 128 bits, with AVX2: most datagrams of a scene have no more.
+//! Decodes up to eight words at once, in 128-bit registers, with AVX2: most datagrams of a scene have no more.
 
 use std::arch::x86_64::*;
 
@@ -7,17 +7,18 @@ use crate::wire::columns::Room;
 use crate::wire::v2::HEADER_BYTES;
 use crate::wire::v2::decoder::held::Held;
 
-/// Words.
+/// Number of words.
 pub(crate) const EIGHT: usize = 8;
 
-/// Bytes of a register, which the header before a body has too.
+/// Size of a register, bytes; the header before a body is at least as long.
 const REGISTER: usize = 16;
 const _: () = assert!(HEADER_BYTES >= REGISTER);
 
-/// Positions are counted from 1 in 16 bits, and sums stop here: what comes to it is left to the one by one.
+/// Positions count from 1 in 16 bits, and sums saturate at this value; words that reach it are decoded one by one.
 pub(crate) const FULL: u16 = u16::MAX;
 
-/// From place `k` on: the first `16 - k` of a register's bytes moved `k` places to the front (`pshufb`), zeros behind them.
+/// Indices for `pshufb`: those from place `k` on move the first `16 - k` bytes of a register to the front, with zeros
+/// after them.
 static TO_START: [u8; 2 * REGISTER] = {
     let mut out = [0x80; 2 * REGISTER];
     let mut k = 0;
@@ -28,7 +29,7 @@ static TO_START: [u8; 2 * REGISTER] = {
     out
 };
 
-/// From place `8 - k` on: `k` lanes of ones, and zeros behind them.
+/// Masks: from place `8 - k` on, `k` lanes of ones, then zeros.
 static FIRST_LANES: [u32; 2 * EIGHT] = {
     let mut out = [0; 2 * EIGHT];
     let mut k = 0;
@@ -39,11 +40,11 @@ static FIRST_LANES: [u32; 2 * EIGHT] = {
     out
 };
 
-/// The events among up to eight plain words, the first ones in the first lanes.
+/// The events among up to eight plain words, moved to the first lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct Eight {
     pub(crate) n: usize,
-    /// Positions up to here were passed: those of the next words count from it.
+    /// Position after the last word, from which the positions of the next words count.
     pub(crate) passed: u16,
     position: __m128i,
     x: __m128i,
@@ -53,13 +54,14 @@ pub(crate) struct Eight {
 }
 
 impl Eight {
-    /// Reads the words that end a number of bytes into a datagram, `count` of them but at most the first eight, behind so many
-    /// positions; none where one is of time, or an event lies outside the array.
+    /// Reads the first eight, or `count` if that is less, of the words that end a datagram; `passed` is the position
+    /// before them. None if a word is of time, or if an event is outside the array.
     ///
     /// # Safety
     ///
-    /// The machine must have the features below. So many words, of 4 bytes each where `VALUE` is 16 and of 2 else, must lie at
-    /// `at`, with a header's bytes before them. The array must have fewer than 65 535 positions, at which sums stop.
+    /// The machine must have the features below. `count` words, of 4 bytes each if `VALUE` is 16, otherwise of 2, must
+    /// be readable at `at`, with a header's bytes before them. The array must have fewer than 65 535 positions, the
+    /// value at which sums saturate.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
     pub(crate) unsafe fn read<const VALUE: u32>(
@@ -70,9 +72,9 @@ impl Eight {
         held: &Held,
     ) -> Option<Self> {
         let count = count.min(EIGHT);
-        // SAFETY: of words of 4 bytes only the lanes of those words are read, by a mask of eight of 16 entries from 0 to 8 on. Of
-        // words of 2 bytes, the 16 bytes that end with the last word are read, of which the header has those before the first;
-        // the shuffle has 16 bytes from place 0 to 16 on.
+        // SAFETY: of words of 4 bytes only the lanes of those words are read, by a mask of eight of 16 entries from 0
+        // to 8 on. Of words of 2 bytes, the 16 bytes up to the last word's end are read; bytes before the first word
+        // belong to the header. The shuffle's table has 16 bytes from each place 0 to 16 on.
         unsafe {
             let words = datagram.as_ptr().add(at);
             let lanes = _mm_cmpgt_epi16(_mm_set1_epi16(count as i16), _mm_setr_epi16(0, 1, 2, 3, 4, 5, 6, 7));
@@ -86,16 +88,16 @@ impl Eight {
         }
     }
 
-    /// As [`Self::read`], of eight words wherever they lie.
+    /// As [`Self::read`], for eight words at any address.
     ///
     /// # Safety
     ///
-    /// As [`Self::read`]'s; eight words must lie at `words`.
+    /// As for [`Self::read`]; eight words must be readable at `words`.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
     pub(super) unsafe fn whole<const VALUE: u32>(words: *const u8, passed: u16, held: &Held) -> Option<Self> {
         let lanes = _mm_set1_epi16(-1);
-        // SAFETY: eight words of 4 or 2 bytes.
+        // SAFETY: eight words of 4 or 2 bytes are readable, as the caller guarantees.
         unsafe {
             if VALUE == 16 {
                 return Self::of_large(_mm256_loadu_si256(words.cast()), lanes, passed, held);
@@ -104,7 +106,7 @@ impl Eight {
         }
     }
 
-    /// Of words of 4 bytes, in the first `lanes`; zeros in the others.
+    /// Decodes words of 4 bytes in the first `lanes`; the other lanes are zero.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
     fn of_large(words: __m256i, lanes: __m128i, passed: u16, held: &Held) -> Option<Self> {
@@ -113,7 +115,8 @@ impl Eight {
         Self::of::<16>(halves(_mm256_srli_epi32::<16>(words)), halves(value), lanes, passed, held)
     }
 
-    /// Of the words' halves with polarity and skip, and of values where those have none; zeros outside `lanes`.
+    /// Decodes the words' halves with polarity and skip, and the values if the halves have none; lanes outside `lanes`
+    /// are zero.
     #[inline]
     #[target_feature(enable = "avx2,bmi1,popcnt")]
     fn of<const VALUE: u32>(head: __m128i, value: __m128i, lanes: __m128i, passed: u16, held: &Held) -> Option<Self> {
@@ -129,21 +132,21 @@ impl Eight {
         if _mm_testz_si128(advances, _mm_and_si128(head, _mm_set1_epi16(i16::MIN))) == 0 {
             return None;
         }
-        // Without a branch: in a scene no processor predicts which datagram has an advance.
+        // Branch-free: a processor cannot predict which datagram of a scene has an advance.
         let advance = if VALUE == 8 {
             _mm_slli_epi16::<6>(_mm_add_epi16(value, one))
         } else {
             let small = _mm_cmpeq_epi16(_mm_subs_epu16(value, _mm_set1_epi16(2)), zero);
             _mm_blendv_epi8(_mm_set1_epi16(-1), _mm_slli_epi16::<14>(_mm_add_epi16(value, one)), small)
         };
-        // A sum that is too large stays too large: it is the position of none of these arrays.
+        // Sums saturate, and no position of the arrays allowed here equals the saturated value.
         let steps = _mm_blendv_epi8(_mm_add_epi16(skip, one), advance, advances);
         let mut sums = _mm_and_si128(steps, lanes);
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<2>(sums));
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<4>(sums));
         sums = _mm_adds_epu16(sums, _mm_bslli_si128::<8>(sums));
         sums = _mm_adds_epu16(sums, _mm_set1_epi16(passed as i16));
-        // No step is below 0, and lanes without a word add none: the last one has the sum.
+        // Steps are never negative, and lanes without a word add 0, so the last lane has the total.
         let passed = _mm_extract_epi16::<7>(sums) as u16;
         let events = _mm_movemask_epi8(_mm_packs_epi16(_mm_andnot_si128(advances, lanes), zero)) as usize;
         // SAFETY: the mask has eight bits, and each entry of the table 16 bytes.
@@ -153,24 +156,24 @@ impl Eight {
         let p = _mm_shuffle_epi8(_mm_srli_epi16::<15>(head), front);
         let x = _mm_srl_epi16(position, _mm_cvtsi32_si128(i32::from(held.stride)));
         let y = _mm_and_si128(position, _mm_set1_epi16(((1_u32 << held.stride) - 1) as i16));
-        // Lanes without an event repeat the last one, and are at 0 where there is none.
+        // Lanes without an event repeat the last event, or are 0 if there is none.
         let reaches = |at, end: u16| _mm_cmpeq_epi16(_mm_max_epu16(at, _mm_set1_epi16(end as i16)), at);
         let outside = _mm_or_si128(reaches(x, held.columns), reaches(y, held.rows));
         let n = events.count_ones() as usize;
         (_mm_testz_si128(outside, outside) == 1).then_some(Self { n, passed, position, x, y, ticks, p })
     }
 
-    /// Writes the events from a row on.
+    /// Writes the events, from row `first` on.
     ///
     /// # Safety
     ///
-    /// The machine must have the features below. 8 rows must fit behind `first`, with intensities where they are `paired`: what lies
-    /// beyond the events is written again by later rows, or never read.
+    /// The machine must have the features below. 8 rows must fit after `first`, with intensities if `paired` is set;
+    /// entries beyond the events are overwritten by later rows, or never read.
     #[inline]
     #[target_feature(enable = "avx2")]
     pub(crate) unsafe fn write<const VALUE: u32>(&self, t: i64, room: &mut Room<'_>, first: usize, paired: bool) {
         let times = _mm256_set1_epi64x(t);
-        // SAFETY: the caller's promise; a bool is a byte of 0 or 1.
+        // SAFETY: the caller guarantees this; a bool is a byte of 0 or 1.
         unsafe {
             let to = room.t.as_mut_ptr().add(first);
             _mm256_storeu_si256(to.cast(), times);
@@ -186,36 +189,37 @@ impl Eight {
         }
     }
 
-    /// Notes what the taxels of the events, one or more, hold from `t` on.
+    /// Stores the taxels' new values, of one or more events at time `t`.
     ///
     /// # Safety
     ///
-    /// The machine must have the features below; `held` must be the one that was read with.
+    /// The machine must have the features below; `held` must be the one passed to [`Self::read`].
     #[inline]
     #[target_feature(enable = "avx2")]
     pub(crate) unsafe fn hold(&self, t: i64, held: &mut Held) {
         held.newest = t;
-        // Lanes without an event repeat the last one, so that no branch depends on how many there are: no processor predicts that.
-        // SAFETY: they are the places of events on the array.
+        // Lanes without an event repeat the last one, so that no branch depends on the number of events, which no
+        // processor can predict.
+        // SAFETY: the positions are those of events on the array.
         unsafe { hold_eight(self.position, self.ticks, t, held) }
     }
 
-    /// As [`Self::hold`], of events among which there may be eight neighbours, whose entries lie side by side.
+    /// As [`Self::hold`], with a faster path for eight events at consecutive positions.
     ///
     /// # Safety
     ///
-    /// As [`Self::hold`]'s.
+    /// As for [`Self::hold`].
     #[inline]
     #[target_feature(enable = "avx2")]
     pub(crate) unsafe fn hold_neighbours(&self, t: i64, held: &mut Held) {
         let begin = usize::from(_mm_cvtsi128_si32(self.position) as u16);
         if self.n < EIGHT || usize::from(_mm_extract_epi16::<7>(self.position) as u16) - begin >= EIGHT {
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller guarantees this.
             return unsafe { self.hold(t, held) };
         }
         held.newest = t;
         let times = _mm256_set1_epi64x(t);
-        // SAFETY: eight events, whose positions rise, lie on the array from `begin` on, and so in `held`.
+        // SAFETY: eight events with consecutive positions are on the array from `begin` on, and so in `held`.
         unsafe {
             _mm_storeu_si128(held.values.as_mut_ptr().add(begin).cast(), self.ticks);
             let since = held.since.as_mut_ptr().add(begin);
@@ -225,7 +229,7 @@ impl Eight {
     }
 }
 
-/// Notes what taxels hold from `t` on.
+/// Stores taxels' new values, valid from `t` on.
 ///
 /// # Safety
 ///
@@ -233,12 +237,12 @@ impl Eight {
 #[inline]
 #[target_feature(enable = "sse4.1")]
 pub(super) unsafe fn hold_eight(places: __m128i, values: __m128i, t: i64, held: &mut Held) {
-    // Not by way of memory, for which the loads would wait.
+    // Extracts the lanes from registers: loads from memory would wait for the store.
     let halves = |lanes| [_mm_cvtsi128_si64(lanes) as u64, _mm_extract_epi64::<1>(lanes) as u64];
     for (places, values) in halves(places).into_iter().zip(halves(values)) {
         for shift in [0, 16, 32, 48] {
             let place = usize::from((places >> shift) as u16);
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller guarantees this.
             unsafe {
                 *held.values.get_unchecked_mut(place) = (values >> shift) as u16;
                 *held.since.get_unchecked_mut(place) = t;

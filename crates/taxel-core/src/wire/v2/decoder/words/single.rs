@@ -1,11 +1,11 @@
-//! Words one by one, on any machine: what each of them means.
+//! Decodes words one by one, on any machine; defines the meaning of each word.
 
 use super::body::{Body, Meaning, word};
 use crate::wire::columns::Room;
 use crate::wire::v2::counts::Counts;
 use crate::wire::v2::decoder::held::Held;
 
-/// Takes words of so many bytes, bits of skip and bits of value; `most` at most. `room` must have as many rows left.
+/// Decodes at most `most` words of `BYTES` bytes with this layout. `room` must have as many rows left.
 #[inline(always)]
 pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
     body: &mut Body<'_>,

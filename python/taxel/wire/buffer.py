@@ -1,4 +1,4 @@
-"""Bytes as a caller gives them."""
+"""Bytes of any object with a contiguous buffer."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from taxel._base.arguments import shown
 from taxel._core import ProblemError
 
-__all__ = ["given_bytes"]
+__all__ = ["buffer_bytes"]
 
 
-def given_bytes(data: object) -> NDArray[np.uint8]:
+def buffer_bytes(data: object) -> NDArray[np.uint8]:
     """Return the bytes of anything with a contiguous buffer, without a copy."""
     if isinstance(data, np.ndarray) and data.dtype != np.uint8:
         raise ProblemError(f"data is an array of {data.dtype}: must be bytes or uint8")

@@ -1,4 +1,4 @@
-//! One sender's datagrams to events, whichever version of the wire it sends.
+//! Decodes one sender's datagrams to events, whichever version of the wire it sends.
 
 use crate::wire::decoder::{Counts, Decoder};
 use crate::wire::silence::silence;
@@ -6,17 +6,18 @@ use crate::wire::v1::{FIRST, WORD_BYTES};
 use crate::wire::v2::{self, Header, Outcome};
 use crate::{Array, Events};
 
-/// For so long nothing but whole words of version 1 must come before a sender of version 2 counts as changed, us.
+/// For how long only whole words of version 1 must arrive before a sender of version 2 counts as changed to version 1,
+/// us.
 const CHANGED_AFTER_US: i64 = 1_000_000;
 
 /// What a datagram reports besides its events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DatagramInfo {
-    /// The version of the sender after it.
+    /// The sender's version after this datagram.
     pub version: u8,
-    /// Whether it changed the version.
+    /// Whether this datagram changed the version.
     pub changed: bool,
-    /// Whether the board was reset before it.
+    /// Whether the board was reset before this datagram.
     pub reset: bool,
     /// No later datagram has an event before this time, us (version 2).
     pub until: Option<i64>,
@@ -28,27 +29,27 @@ pub struct DatagramInfo {
 
 /// Decodes the datagrams of one sender (address and port).
 ///
-/// A sender uses version 1 until its first intact datagram of version 2. From then on datagrams of version 1 are refused and counted, until
-/// [`Self::expect`], or a second of nothing but whole words of version 1, says that the board changed. Time goes on over a
-/// change by the host's clock.
+/// A sender uses version 1 until its first intact datagram of version 2. From then on, datagrams of version 1 are
+/// refused and counted, until [`Self::expect`] is called, or until only whole words of version 1 have arrived for a
+/// second. After a change of version, time continues by the host's clock.
 #[derive(Debug, Clone)]
-pub struct Receiver {
+pub struct SenderDecoder {
     array: Array,
     version: u8,
     one: Decoder,
     two: v2::Decoder,
-    /// What is added to times of version 1, once known after a change.
+    /// Added to times of version 1; known once the first event after a change was received.
     offset: Option<i64>,
-    /// The latest time, and when it arrived.
+    /// The latest time, and the host's clock when it was received.
     latest: Option<(i64, Option<i64>)>,
-    /// Since when nothing but whole words of version 1 has come.
+    /// Since when only whole words of version 1 have arrived.
     whole_since: Option<i64>,
     refused: u64,
     changes: u64,
 }
 
-impl Receiver {
-    /// A receiver of a sender that uses `version` at first; `one` decodes what is of version 1, and has the array.
+impl SenderDecoder {
+    /// A decoder of a sender that uses `version` at first; `one` decodes what is of version 1, and has the array.
     #[must_use]
     pub fn new(one: Decoder, version: u8) -> Self {
         let array = one.array().clone();
@@ -62,7 +63,7 @@ impl Receiver {
         self.version
     }
 
-    /// Says what the taxels hold, by index: as [`Decoder::begin_with`] and [`v2::Decoder::begin_with`].
+    /// Sets each taxel's current value, by index, as [`Decoder::begin_with`] and [`v2::Decoder::begin_with`] do.
     pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>> + Clone) {
         self.one.begin_with(held.clone());
         self.two.begin_with(held);
@@ -80,32 +81,32 @@ impl Receiver {
         &self.two
     }
 
-    /// What was counted of version 1.
+    /// The counts of version 1.
     #[must_use]
     pub fn counts(&self) -> &Counts {
         self.one.counts()
     }
 
-    /// Bytes of version 1 that were refused because the sender uses version 2.
+    /// Number of bytes of version 1 that were refused because the sender uses version 2.
     #[must_use]
     pub fn refused(&self) -> u64 {
         self.refused
     }
 
-    /// How often the sender changed its version.
+    /// Number of times that the sender changed its version.
     #[must_use]
     pub fn changes(&self) -> u64 {
         self.changes
     }
 
-    /// Notes that the host has set the board to this version.
+    /// Notes that the host has set the board to this version of the wire.
     pub fn expect(&mut self, version: u8, out: &mut Events) {
         if version != self.version {
             self.change(version, out);
         }
     }
 
-    /// Takes a datagram; appends its events.
+    /// Decodes a datagram; appends its events.
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> DatagramInfo {
         let (before, rows) = (self.version, out.len());
         let mut info = DatagramInfo::default();
@@ -140,14 +141,14 @@ impl Receiver {
         info
     }
 
-    /// Ends the stream: gives what waits.
+    /// Ends the stream: appends the events that still waited.
     pub fn finish_into(&mut self, out: &mut Events) {
         let (rows, markers) = (out.len(), out.markers.len());
         self.one.finish_into(out);
         self.carry(rows, markers, None, out);
     }
 
-    /// Whether whole words of version 1, and nothing else, have come for long enough.
+    /// Whether only whole words of version 1 have arrived for long enough.
     fn changed_back(&mut self, datagram: &[u8], arrived: Option<i64>) -> bool {
         let whole = !datagram.is_empty()
             && datagram.len().is_multiple_of(WORD_BYTES)
@@ -171,7 +172,7 @@ impl Receiver {
         }
     }
 
-    /// Moves times of version 1 behind what was received before the change.
+    /// Shifts times of version 1 so that they follow what was received before the change.
     fn carry(&mut self, rows: usize, markers: usize, arrived: Option<i64>, out: &mut Events) {
         let first = out.t.get(rows).copied().or_else(|| out.markers.get(markers).map(|m| m.t));
         let Some(first) = first else { return };
@@ -220,11 +221,11 @@ mod tests {
 
     #[test]
     fn arrivals_out_of_all_reason_carry_no_clock_away() {
-        let mut receiver = Receiver::new(Decoder::new(Array::thesis()), 2);
+        let mut decoder = SenderDecoder::new(Decoder::new(Array::thesis()), 2);
         let mut events = Events::empty(Array::thesis());
         let mut before = 0;
         for (session, arrived) in [0, i64::MAX, i64::MIN, i64::MAX, 0, i64::MAX].into_iter().enumerate() {
-            // Nothing but a promise, of a board that was reset each time.
+            // Only a promise, from a board that was reset each time.
             let header = Header {
                 kind: 0,
                 board: 1,
@@ -238,7 +239,7 @@ mod tests {
             };
             let mut datagram = vec![];
             header.write(&[], &mut datagram);
-            let until = receiver.push(&datagram, Some(arrived), &mut events).until.unwrap();
+            let until = decoder.push(&datagram, Some(arrived), &mut events).until.unwrap();
             assert!((before..=before + 400 * 86_400_000_000).contains(&until), "{until} us after {before} us");
             before = until;
         }
@@ -248,20 +249,20 @@ mod tests {
     fn a_sender_that_changes_its_version_is_heard_and_time_goes_on() {
         let array = Array::thesis();
         let mut board = Board::new(Registers::default(), &array).unwrap();
-        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let mut decoder = SenderDecoder::new(Decoder::new(array.clone()), 1);
         let mut events = Events::empty(array);
         let (mut now, mut changes) = (5_000_000, vec![]);
         for version in [1, 2, 1] {
             speak(&mut board, version);
             for _ in 0..6000 {
                 play(&mut board, 1, |datagram| {
-                    let info = receiver.push(datagram, Some(now), &mut events);
+                    let info = decoder.push(datagram, Some(now), &mut events);
                     if info.changed {
                         changes.push((info.version, now));
                     }
                 });
                 now += 192;
-                // Keep the test's memory small: the last event shows where time is.
+                // Keeps the test's memory small; the last event is kept because it shows the current time.
                 if events.len() > 20_000 {
                     let last = events.len() - 1;
                     for column in [&mut events.x, &mut events.y] {
@@ -277,7 +278,7 @@ mod tests {
         assert_eq!(changes.iter().map(|c| c.0).collect::<Vec<_>>(), [2, 1]);
         let begun = 5_000_000 + 12_000 * 192;
         assert!((1_000_000..1_001_000).contains(&(changes[1].1 - begun)), "a second later: {}", changes[1].1 - begun);
-        assert!(receiver.refused() > 0);
+        assert!(decoder.refused() > 0);
         let (t, expected) = (*events.t.last().unwrap(), 18_000 * 192);
         assert!((t - expected).abs() < 2000, "{t} for {expected}");
     }
@@ -286,30 +287,30 @@ mod tests {
     fn what_the_host_asked_for_is_believed_at_once() {
         let array = Array::thesis();
         let mut board = Board::new(Registers { wire_version: 2, ..Registers::default() }, &array).unwrap();
-        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let mut decoder = SenderDecoder::new(Decoder::new(array.clone()), 1);
         let mut events = Events::empty(array);
         play(&mut board, 3, |datagram| {
-            receiver.push(datagram, Some(0), &mut events);
+            decoder.push(datagram, Some(0), &mut events);
         });
-        assert_eq!((receiver.version(), receiver.changes()), (2, 1));
+        assert_eq!((decoder.version(), decoder.changes()), (2, 1));
         speak(&mut board, 1);
-        receiver.expect(1, &mut events);
+        decoder.expect(1, &mut events);
         let before = events.len();
         play(&mut board, 2, |datagram| {
-            receiver.push(datagram, Some(400), &mut events);
+            decoder.push(datagram, Some(400), &mut events);
         });
-        assert_eq!((receiver.version(), receiver.refused()), (1, 0));
+        assert_eq!((decoder.version(), decoder.refused()), (1, 0));
         assert_eq!(events.len(), before + 2 * 4096);
     }
 
     #[test]
     fn a_damaged_datagram_changes_no_version() {
         let array = Array::thesis();
-        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let mut decoder = SenderDecoder::new(Decoder::new(array.clone()), 1);
         let mut events = Events::empty(array);
         let mut damaged = vec![v2::MAGIC, 0x21];
         damaged.resize(40, 7);
-        receiver.push(&damaged, Some(0), &mut events);
-        assert_eq!((receiver.version(), receiver.counts().skipped), (1, 40));
+        decoder.push(&damaged, Some(0), &mut events);
+        assert_eq!((decoder.version(), decoder.counts().skipped), (1, 40));
     }
 }

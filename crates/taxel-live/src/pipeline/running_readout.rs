@@ -1,4 +1,4 @@
-//! Encodes events and reads them out: in the thread that decodes, or in one behind it.
+//! Encodes events and runs the readout: in the decoding thread, or in a separate one.
 
 use taxel_core::Events;
 use taxel_core::detect::{Detection, FrameTime, Readout, ReadoutStream};
@@ -7,23 +7,23 @@ use taxel_core::encode::{Tare, Zeroing};
 use super::ahead::Ahead;
 use super::options::LiveOptions;
 use super::output::DetectionOutput;
-use super::readout_queue::{Quiet, Taken};
+use super::readout_queue::{BatchEnd, Quiet};
 use super::rest::Rest;
 use super::shared::Shared;
 
-/// What reads the events out.
-pub enum Listener {
+/// What is to read the events out.
+pub enum ReadoutSetup {
     /// Nothing: datagrams are received and recorded only.
     None,
     /// A readout.
     Reading(Box<ReadoutStream>),
-    /// A readout that first takes a tare: from the first event on for so long (us of the board's clock), or until the
+    /// A readout that first measures a tare: from the first event on for so long (us of the board's clock), or until the
     /// board marks a start.
     Taring(i64, Box<Readout>),
 }
 
-impl Listener {
-    /// The listener of a readout, where there is one: it takes a fresh tare of `tare_us` where that is given, else it reads at
+impl ReadoutSetup {
+    /// The setup of a readout, where there is one: it measures a fresh tare of `tare_us` where that is given, else it reads at
     /// once, with `tare` where its encoder needs one.
     ///
     /// # Errors
@@ -43,9 +43,9 @@ impl Listener {
     }
 }
 
-pub(super) struct Reader {
+pub(super) struct RunningReadout {
     mode: Mode,
-    /// Detections that no thread has taken for output yet.
+    /// Detections that do not wait for output yet.
     pub(super) found: Vec<Detection>,
     events: Events,
     zeroings: Vec<Zeroing>,
@@ -55,30 +55,30 @@ pub(super) struct Reader {
 enum Mode {
     Reading(Ahead),
     Taring(Box<Rest>),
-    /// Between the two, and after an error.
+    /// State during a change between the two, and after an error.
     Idle,
 }
 
-impl Reader {
-    pub(super) fn new(listener: Listener, options: &LiveOptions) -> Self {
+impl RunningReadout {
+    pub(super) fn new(readout: ReadoutSetup, options: &LiveOptions) -> Self {
         let events = Events::empty(options.array.clone());
-        let mode = match listener {
-            Listener::None => Mode::Idle,
-            Listener::Reading(stream) => Mode::Reading(Ahead::new(stream)),
-            Listener::Taring(stretch_us, readout) => {
+        let mode = match readout {
+            ReadoutSetup::None => Mode::Idle,
+            ReadoutSetup::Reading(stream) => Mode::Reading(Ahead::new(stream)),
+            ReadoutSetup::Taring(stretch_us, readout) => {
                 Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array)))
             }
         };
         Self { mode, found: vec![], events, zeroings: vec![], frames: options.frames() }
     }
 
-    /// Publishes whether it takes a tare, and the rest that it reads with, before the first events.
+    /// Publishes whether it measures a tare, and the rest that it reads with, before the first events.
     pub(super) fn begin(&self, shared: &Shared) {
         shared.published().counters.taring = matches!(self.mode, Mode::Taring(_));
         self.publish_rest(shared);
     }
 
-    /// In a thread of its own: reads out what is handed over until the last of it, and hands its detections to the output.
+    /// Runs in a separate thread: processes the queue until its end, and passes detections to the output.
     pub(super) fn run(mut self, shared: &Shared, output: &DetectionOutput) {
         let mut last = false;
         loop {
@@ -89,57 +89,57 @@ impl Reader {
             if last {
                 break;
             }
-            let taken = shared.readout_queue.take(&mut self.events, &mut self.zeroings);
-            self.process(shared, taken);
-            last = taken.last;
+            let end = shared.readout_queue.pop(&mut self.events, &mut self.zeroings);
+            self.process(shared, end);
+            last = end.last;
         }
     }
 
-    /// In the thread that decodes: reads its events out, and leaves it the memory of the last ones.
-    pub(super) fn take(&mut self, shared: &Shared, events: &mut Events, taken: Taken) {
+    /// In the thread that decodes: reads its events out, and leaves the memory of the last ones there.
+    pub(super) fn push(&mut self, shared: &Shared, events: &mut Events, end: BatchEnd) {
         std::mem::swap(&mut self.events, events);
-        self.process(shared, taken);
+        self.process(shared, end);
         self.events.clear();
     }
 
-    /// Nothing arrived, but time has.
-    pub(super) fn wait(&mut self, shared: &Shared, taken: Taken) {
+    /// Advances time without events.
+    pub(super) fn advance(&mut self, shared: &Shared, end: BatchEnd) {
         self.events.clear();
-        self.process(shared, taken);
+        self.process(shared, end);
     }
 
-    /// Takes zeroings, each of which has its own time.
+    /// Adds zeroings, each of which has its own time.
     pub(super) fn zero(&mut self, zeroings: &[Zeroing]) {
         self.zeroings.extend_from_slice(zeroings);
     }
 
-    fn process(&mut self, shared: &Shared, taken: Taken) {
-        if let Err(error) = self.try_process(shared, taken) {
+    fn process(&mut self, shared: &Shared, end: BatchEnd) {
+        if let Err(error) = self.try_process(shared, end) {
             shared.fail(error);
             self.mode = Mode::Idle;
         }
     }
 
-    fn try_process(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
+    fn try_process(&mut self, shared: &Shared, end: BatchEnd) -> crate::Result<()> {
         match &mut self.mode {
             Mode::Reading(readout) => {
                 self.zeroings.drain(..).try_for_each(|zeroing| readout.zero(&zeroing))?;
                 readout.push(self.events.view(), &mut self.found)?;
-                match taken.quiet {
+                match end.quiet {
                     Some(Quiet::Promised(t)) => readout.advance(t, &mut self.found)?,
-                    Some(Quiet::Believed(t)) if taken.last => readout.advance(t, &mut self.found)?,
+                    Some(Quiet::Believed(t)) if end.last => readout.advance(t, &mut self.found)?,
                     Some(Quiet::Believed(t)) => readout.quiet(t, &mut self.found)?,
                     None => {}
                 }
             }
             Mode::Taring(rest) => {
-                if let Some((stop, inside)) = rest.push(&self.events, taken.quiet.map(Quiet::until))? {
+                if let Some((stop, inside)) = rest.push(&self.events, end.quiet.map(Quiet::until))? {
                     self.begin_reading(shared, stop, inside)?;
                 }
             }
             Mode::Idle => self.zeroings.clear(),
         }
-        if !self.events.is_empty() || taken.last {
+        if !self.events.is_empty() || end.last {
             let counters = &mut shared.published().counters;
             counters.read_out += self.events.len() as u64;
             if let Mode::Reading(readout) = &self.mode {
@@ -149,7 +149,7 @@ impl Reader {
         Ok(())
     }
 
-    /// The rest is over: reads from the first event after it on.
+    /// Ends the tare: runs the readout from the first event after it on.
     fn begin_reading(&mut self, shared: &Shared, stop: i64, inside: usize) -> crate::Result<()> {
         let Mode::Taring(rest) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
         let (tare, stream) = rest.finish(stop, self.frames)?;
@@ -163,7 +163,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Publishes the rest that the readout reads with, where it needs any.
+    /// Publishes the readout's current rest, if its encoder uses a tare.
     fn publish_rest(&self, shared: &Shared) {
         if let Mode::Reading(readout) = &self.mode {
             let rest = readout.rest();

@@ -1,4 +1,4 @@
-"""What the thesis says of gait events (6.5.1 to 6.5.3), and what was found; all rows as tables."""
+"""Statements of the thesis on gait events (6.5.1 to 6.5.3) beside our results; all rows as tables."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from taxel_studies.study import Parameters, Statement, Summary, Table
 
 __all__ = ["STAND", "STANDS_FOR", "stand_for", "statements", "tables"]
 
-#: What each source stands for: 6.5.2 has one person's footfalls, 6.5.3 recordings cut by time.
+#: The experiments that sources stand for: 6.5.2 has one person's footfalls, 6.5.3 recordings cut by time.
 STANDS_FOR = {
     "plate": ("own footfalls", "6.5.2"),
     "gaitpdb": ("people left out", "6.5.3"),
@@ -20,7 +20,7 @@ STANDS_FOR = {
 }
 #: Thesis 6.5.2, ms: neuron less reference, mean and standard deviation.
 PUBLISHED = {"contact": (-2.0, 6.7), "foot_off": (-8.0, 17.0)}
-#: Found counts for nothing where so many detections, by events, are false.
+#: A share found is not judged where more false detections than this come for each event.
 FALSE_SHARE = 0.05
 STAND = {"chosen": "chosen inside the folds", "printed": "Table 6.2 as printed"}
 
@@ -48,7 +48,7 @@ def stand_for(summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 def statements(p: Parameters, summary: Summary) -> list[Statement]:
     """Judge what 6.5.1 to 6.5.3 say, with chosen parameters and with those printed."""
     del p
-    found = [
+    judged = [
         Statement(
             "The insole has 92 taxels and makes 184 input neurons: each signal and its inverse.",
             "92, 184",
@@ -68,7 +68,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
             error = row["error_ms"]
             ours = f"{error['mean']:+.1f} ± {error['sd']:.1f} ms, " if error else ""
             clean = row["missed"] == 0 and row["false"] == 0
-            found.append(
+            judged.append(
                 Statement(
                     f"One neuron finds {event} on a force plate, none missed, none false.",
                     f"{mean:+.1f} ± {sd:.1f} ms",
@@ -78,7 +78,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 )
             )
             continue
-        found += [
+        judged += [
             Statement(
                 f"On walking recordings it finds more than 95 % of {event}.",
                 "over 95 %",
@@ -94,7 +94,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
                 why,
             ),
         ]
-    return found
+    return judged
 
 
 #: How a table of figures is headed; "false a minute" only where there are minutes of walking.
@@ -120,11 +120,11 @@ _FLATTERED = (
 def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List the goals, every row by event, people and worst feet where they were asked for, the full search."""
     del p
-    found = [Table("What was run", ("", ""), _about(summary)), *_goals(summary)]
+    listed = [Table("What was run", ("", ""), _about(summary)), *_goals(summary)]
     for source in summary["sources"]:
         for protocol in source["protocols"]:
-            found += _of_protocol(source, protocol)
-    return [*found, *_full_search(summary)]
+            listed += _of_protocol(source, protocol)
+    return [*listed, *_full_search(summary)]
 
 
 def _about(summary: Summary) -> list[list[str]]:
@@ -183,7 +183,7 @@ def _of_protocol(source: Mapping[str, Any], protocol: Mapping[str, Any]) -> Iter
 
 
 def _opened(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the rows to be shown by person: what was chosen inside; else the notes' recipe."""
+    """Return the rows to be shown by person: parameters chosen inside; else the notes' recipe."""
     names = {row["row"] for row in rows}
     return [row for row in rows if row["row"] == ("chosen" if "chosen" in names else "notes")]
 

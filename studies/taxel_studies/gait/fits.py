@@ -50,8 +50,8 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``tested``: by group and unit what was found (of SKIM so ``by_threshold``); ``fit``: what the learner says of
-        itself, or the rule's numbers; of a neuron also its ``point``, and what that came to ``inside`` the folds.
+        ``tested``: by group and unit the detections (of SKIM these ``by_threshold``); ``fit``: the attributes of the
+        learner, or the rule's numbers; of a neuron also its ``point``, and the result of that ``inside`` the folds.
     """
     source = params["source"]
     folder = data / SOURCES[source].folder
@@ -110,7 +110,7 @@ def _training(
 
 
 def _rows(pieces: list[Piece], source: str) -> list[Piece]:
-    """Return what is tested in one go: footfalls of a person in one row, recordings as they are."""
+    """Return the rows that are tested: footfalls of a person joined to one row, recordings as they are."""
     if SOURCES[source].by_minute:
         return pieces
     units = dict.fromkeys(p.unit for p in pieces)
@@ -176,7 +176,7 @@ def _finite(value: float) -> float | None:
 
 
 def _patterns(params: Mapping[str, Any], training: list[Piece], seed: int) -> list[Piece]:
-    """Return what is learnt from: footfalls in one row, in random order; recordings as they are."""
+    """Return the training rows: footfalls in one row, in random order; recordings as they are."""
     event, patterns = params["event"], training
     if not SOURCES[params["source"]].by_minute:
         rng = np.random.default_rng([seed, 2])
@@ -264,9 +264,9 @@ def _rule(
     for numbers in rules.grid(rule, data.levels, channels, largest):
         times = [rules.detection_times(rule, numbers, p, event, **options) for p in learned]
         offset = _offset(times, learned, event)
-        found = [_scored(t, p, event, offset) for t, p in zip(times, learned, strict=True)]
-        wrong = sum(f["events"] - len(f["errors"]) + f["false"] for f in found)
-        errors = np.concatenate([np.empty(0), *(f["errors"] for f in found)])
+        scored = [_scored(t, p, event, offset) for t, p in zip(times, learned, strict=True)]
+        wrong = sum(f["events"] - len(f["errors"]) + f["false"] for f in scored)
+        errors = np.concatenate([np.empty(0), *(f["errors"] for f in scored)])
         quality = (float(wrong), float(np.sqrt(np.mean(errors**2))) if len(errors) else np.inf)
         if best is None or quality < best[0]:
             best = (quality, numbers, offset)

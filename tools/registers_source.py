@@ -1,0 +1,30 @@
+"""Read registers.toml, for what is made from it: tables of Rust, JavaScript and the docs, and the RTL's package."""
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from pathlib import Path
+from typing import Any
+
+#: The operators of its arithmetic, which all languages write alike.
+OPERATOR = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
+
+Table = dict[str, Any]
+
+
+def read(path: Path) -> Table:
+    """Return the source with every value filled in."""
+    source = tomllib.loads(path.read_text())
+    for field in source["field"]:
+        field.setdefault("offset", 0)
+        field.setdefault("least", field["offset"])
+        field.setdefault("greatest", 2 ** field["bits"] - 1 + field["offset"])
+    for rule in source["rule"]:
+        rule.setdefault("warns", False)
+    return source
+
+
+def parsed(text: str) -> ast.expr:
+    """Read one expression."""
+    return ast.parse(text, mode="eval").body
