@@ -95,7 +95,7 @@ class Theirs:
 
 
 def furthest_off(body: Callable[[float], NDArray[np.float64]], engine: Ours | Theirs) -> float:
-    """Return the largest error of an engine's pressure, from nothing, against ours at 1e-8; a share of the largest."""
+    """Return the largest error of an engine's pressure, from nothing, against ours at 1e-8; share of the largest."""
     exact = Ours(body, tolerance=1e-8).press(DEPTH_MM, anew=True)
     return float(np.abs(engine.press(DEPTH_MM, anew=True) - exact).max() / exact.max())
 
