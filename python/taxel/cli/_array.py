@@ -22,7 +22,7 @@ FileArrayOption = Annotated[
         "--array",
         metavar="ROWSxCOLUMNS[xMM]",
         help="Rows, columns and pitch of the sensor, as 24x20x5, for files without them (events as .csv, .lsa). "
-        "Default: 64x64x2.67, or a larger array where events lie outside it.",
+        "Default: 64x64x2.67, or a larger array if events lie outside it.",
     ),
 ]
 

@@ -74,7 +74,7 @@ FromOption = Annotated[str | None, live_option("remote", "--from", metavar="ADDR
 CongestionOption = Annotated[
     str | None,
     typer.Option(
-        help="With --from, where this computer is too slow: block (the bridge waits) or drop (datagrams are lost and "
+        help="With --from, if this computer is too slow: block (the bridge waits) or drop (datagrams are lost and "
         "counted). Default: block with --record or --readout, else drop."
     ),
 ]

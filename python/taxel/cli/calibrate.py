@@ -64,7 +64,7 @@ def calibrate(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The new file. Default: beside the recording.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Calibrate readings (ticks, counts) to N or kPa by a known load, a table or the fabric's law.

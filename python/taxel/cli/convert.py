@@ -29,7 +29,7 @@ def convert(
         str | None, typer.Option("--source", metavar="NAME", help="The source to convert, of a recording with several.")
     ] = None,
     compression: Annotated[str, typer.Option(help="Compression of a .mcap: none, lz4 or zstd.")] = "none",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Convert a recording to another format, and report what the target cannot hold.

@@ -45,7 +45,7 @@ def cut(
     source: Annotated[
         str | None, typer.Option("--source", metavar="NAME", help="The source to cut, of a recording with several.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Cut a recording by time, by region or by label.

@@ -50,7 +50,7 @@ def detect(
     report: Annotated[
         Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Detect events in a recording, or in each of a folder, by a trained readout.

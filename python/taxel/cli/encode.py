@@ -25,7 +25,7 @@ def encode(
     encoder: Annotated[str, typer.Option(help=f"One of {', '.join(encoder_names())}.")],
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Encode a recording as spike trains.

@@ -41,7 +41,7 @@ def info(
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the files that are written where they exist.")
+        bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

@@ -37,7 +37,7 @@ def information(
         ),
     ] = None,
     window_ms: Annotated[
-        float | None, typer.Option(help="How long after contact events count, ms; needed where trials have no stop_us.")
+        float | None, typer.Option(help="How long after contact events count, ms; needed if trials have no stop_us.")
     ] = None,
     windows_ms: Annotated[
         str | None, typer.Option("--windows", help="Further windows: times after contact, ms, as 10,20,50.")
@@ -57,7 +57,7 @@ def information(
     shuffles: Annotated[int, typer.Option(help="How often labels are shuffled, for the test against zero.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the random phases, folds, taxels and bootstrap.")] = 0,
     report: Annotated[Path, typer.Option(help="The page with pictures, an .html.")] = Path("information.html"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Estimate how many bits labelled touches hold, by sampling period, time, number of taxels and data rate.

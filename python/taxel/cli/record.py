@@ -82,7 +82,7 @@ def record(
     during countdowns too, so each trial begins with the values of all taxels; with --countdown 0 nothing is lost
     between two trials. An empty trial is not saved, and its number is used again; with --trials, three empty trials in
     a row end the command with exit code 3. While it records, a key on the terminal, or a line on any other standard
-    input, writes a note with that label and the board's time into the .mcap (add < /dev/null where the input is not for
+    input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the input is not for
     taxel). --source records other boards, and lines of numbers, into the same .mcap, each with its own clock. Exit code
     3: nothing was received, or something was lost after it had arrived; 2: the board has more taxels than --array.
 

@@ -38,7 +38,7 @@ def simulate(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of taxels and noise. Default: the scene's.")] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the files that are written where they exist.")
+        bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:

@@ -58,13 +58,13 @@ def train(
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
     ),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout if it exists.")] = False,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     folds: Annotated[
         int | None,
         typer.Option(
             min=2,
-            help="Cross-validate in this many folds: of recordings, or of blocks of time where there is one recording.",
+            help="Cross-validate in this many folds: of recordings, or of blocks of time of a single recording.",
         ),
     ] = None,
     search: Annotated[

@@ -51,7 +51,7 @@ class ViewerKind:
 
     def open(self, host: str, port: int) -> ExternalViewer:
         """Connect to a viewer, or open the port that viewers connect to."""
-        # The modules of extras are imported only where they are used.
+        # The modules of extras are imported only when they are used.
         kind: Any = getattr(importlib.import_module(self.module), self.name)
         viewer: ExternalViewer = kind(host, port) if self.has_host else kind(port)
         return viewer

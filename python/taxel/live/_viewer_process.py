@@ -63,7 +63,7 @@ class BoundedQueue:
                 return
 
     def take_all(self, timeout: float) -> list[tuple[Subject, Item]]:
-        """Return all items, which stay in hand until `done`; none where none arrives within `timeout` s."""
+        """Return all items, which stay in hand until `done`; an empty list if none arrives within `timeout` s."""
         with self._changed:
             self._changed.wait_for(lambda: self._items, timeout)
             items = list(self._items)

@@ -35,7 +35,7 @@ class Bridge:
     """Publish what a board sends to this computer: unchanged datagrams, low-rate pictures, detections.
 
     A context manager. Recorders on other computers receive every datagram: the bridge buffers up to 64 MiB for a slow
-    one, and disconnects it after 1.5 s without progress. Viewers lose datagrams where they are too slow. Neither slows
+    one, and disconnects it after 1.5 s without progress. Viewers that are too slow lose datagrams. Neither slows
     the `Live` of this computer. The data are neither encrypted nor protected: every computer that reaches `listen` can
     receive them.
 
@@ -48,7 +48,7 @@ class Bridge:
     listen : str or sequence of str
         HOST:PORT of this computer to listen on.
     connect : str or sequence of str
-        HOST:PORT of a Zenoh router, where there is one.
+        HOST:PORT of a Zenoh router, if there is one.
     clock_ahead_s : float, s
         For tests: offset of the clock of all published times.
     clock_drift_ppm : float, parts per million (share)
@@ -116,7 +116,7 @@ class Bridge:
         return {what: dict(zip(("sent", "dropped", "heard"), row, strict=True)) for what, row in counts.items()}
 
     def stop(self) -> None:
-        """Publish what waits, and end; stop the `Live` first where everything is to be published.
+        """Publish what waits, and end; stop the `Live` first if everything must be published.
 
         Raises
         ------

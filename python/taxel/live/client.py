@@ -340,7 +340,7 @@ class PanelClient:
             yield subject, self._later.popleft()
 
     def _final_curves(self, *, over: bool) -> Iterator[tuple[Subject, Item]]:
-        """Yield the new curves that no late event can change any more; all of them where the source is over."""
+        """Yield the new curves that no late event can change any more; all of them when the source has ended."""
         if self._columns is None or self._subject is None:
             return
         ends, curves = self._columns

@@ -329,7 +329,7 @@ class Live:
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
         """Use the values that taxels hold now as their rest from now on: for taxels that drift.
 
-        The readout's encoder reads them above that rest, where it uses a tare; the recording contains the zeroing, with
+        The readout's encoder reads them above that rest, if it uses a tare; the recording contains the zeroing, with
         the rests before and after, and `taxel.detect.run` applies it. Only done on request: done automatically, it
         would use a standing load as the rest.
 
@@ -403,7 +403,7 @@ class Live:
         return None if ended is None else summary_of(ended)
 
     def record_again(self) -> bool:
-        """Restart the recording, where no source has sent anything yet; return whether that was so."""
+        """Restart the recording, if no source has sent anything yet; return whether that was so."""
         return self._core.record_again()
 
     def end_recording(self) -> Summary:

@@ -67,7 +67,7 @@ class LiveOptions:
         "(serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.",
     )
     compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.")
-    overwrite: bool = option(False, "Replace the file where it exists.")
+    overwrite: bool = option(False, "Replace the file if it exists.")
     guard_frames: float = option(
         _DEFAULT.guard_frames,
         "How far, in frames, a readout stays behind the host's clock while no events arrive.",
@@ -124,7 +124,7 @@ class LiveOptions:
         return [(text("name of a source", name), text(f"source {name}", what)) for name, what in self.sources.items()]
 
     def recording(self) -> tuple[str, str, bool] | None:
-        """Return path, compression and whether to overwrite, where something is recorded."""
+        """Return path, compression and whether to overwrite; None if nothing is recorded."""
         if self.record is None:
             return None
         path = os.fspath(checked_path("record", self.record))

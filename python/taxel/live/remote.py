@@ -49,7 +49,7 @@ class Address(NamedTuple):
         The computer whose bridge listens, or a Zenoh router.
     port : int
     name : str or None
-        The board; None where only one is published there.
+        The board; None if only one is published there.
     """
 
     host: str
@@ -240,7 +240,7 @@ class Remote:
                 feed.compare(*trip)
 
     def _clocks(self, feed: _core.Feed) -> None:
-        # A round trip takes up to a second where the other computer is gone: parcels must not wait for it.
+        # A round trip takes up to a second if the other computer is gone: parcels must not wait for it.
         with contextlib.suppress(ConnectionError):
             while not (feed.is_over() or self._ending.wait(_COMPARE_S)):
                 self._compare(feed, 1)

@@ -23,9 +23,9 @@ class Summary:
     verdict : str
         One line: that nothing was lost after arrival, what was lost where, or that nothing arrived.
     path : Path or None
-        The recording; None where nothing arrived: then a new file is removed, and an earlier one stays.
+        The recording; None if nothing arrived: then a new file is removed, and an earlier one stays.
     tare : Tare or None
-        The fresh tare, where one was completed.
+        The fresh tare, if it was completed.
 
     Examples
     --------
