@@ -1,4 +1,4 @@
-"""A kernel's benchmark once more with AVX2 alone, which is what most laboratory computers have."""
+"""A kernel's benchmark repeated with AVX2 alone, the widest instructions of most laboratory computers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 from taxel import _core
 
-#: Runs the benchmark of a name and prints its result as JSON.
+#: Program that runs a benchmark by its name and prints the result as JSON.
 _ALONE = """
 import importlib, json, sys
 sys.path.insert(0, sys.argv[1])
@@ -22,9 +22,9 @@ print(json.dumps(importlib.import_module(sys.argv[2]).run(quick=sys.argv[3] == "
 
 
 def beside_avx2(run: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, Any]]:
-    """Add to a benchmark's result what a process of its own measures with the dispatch capped at AVX2.
+    """Add to a benchmark's result the measurements of a process whose dispatch is capped at AVX2.
 
-    The capped process measures the peers again too: its ratios are of one run. A machine without wider instructions
+    The capped process measures the peers too, so that its ratios are of one run. A machine without wider instructions
     measures once.
     """
 
@@ -44,7 +44,7 @@ def beside_avx2(run: Callable[..., dict[str, Any]]) -> Callable[..., dict[str, A
         capped = json.loads(done.stdout.splitlines()[-1])
         result["avx2"] = {part: capped[part] for part in ("results", "stable") if part in capped}
         best = result["ratios"]
-        # What does not depend on the instructions (bytes an event) is the same in both, and stands once.
+        # Results that do not depend on the instructions (bytes an event) are equal in both, and are listed once.
         result["ratios"] = best | {f"AVX2: {key}": v for key, v in capped["ratios"].items() if v != best.get(key)}
         return result
 

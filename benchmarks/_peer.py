@@ -1,8 +1,8 @@
-"""A peer in a process of its own, stopped where it takes too long; what needs minutes is kept.
+"""A peer in a process of its own, stopped at a limit of CPU time; times of minutes are saved.
 
 A peer has a minute of CPU. One that needs more is stopped, unless ``taxel bench --peers`` (`PATIENT`) waits for it:
-then its time is kept in ``results/peers.json`` with the date, the processor's model, and a digest of the benchmark's
-code with the peer's version. It counts on that model alone, until one of them changes.
+then its time is saved in ``results/peers.json`` with the date, the processor's model, and a digest of the benchmark's
+code with the peer's version. It is valid on that model alone, until one of them changes.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from _rounds import processor, version
 
 from taxel.report import Sources, write_whole
 
-#: Set where peers that need minutes are waited for.
+#: Environment variable: set if the benchmarks wait for peers that need minutes.
 PATIENT = "TAXEL_BENCH_PEERS"
-#: CPU seconds of a peer that is not waited for, and of one in a quick run; what took longer than the first is kept.
+#: Limits of a peer's CPU time without waiting, and in a quick run, s; longer times than the first are saved.
 LONG_S, QUICK_S = 60, 3
 KEPT = Path(__file__).parent / "results" / "peers.json"
 
@@ -49,20 +49,20 @@ def ask(script: str, *arguments: object, packages: str, limit: int, quick: bool)
     Parameters
     ----------
     script : str
-        A benchmark that is a program of its own where it is given arguments.
+        A benchmark, which runs one peer when it is started with arguments.
     *arguments : object
-        As text.
+        Its arguments, passed as text.
     packages : str
-        The peer's, with spaces between them: their versions belong to what is kept.
+        The peer's packages, with spaces between them; a saved time is valid for their versions.
     limit : int
-        Seconds of CPU after which it is stopped, where it is waited for.
+        CPU time after which the peer is stopped if the benchmark waits for it, s.
     quick : bool
-        Whether this is no measurement: nothing is read from what was kept, nor written.
+        Whether this is only a test: saved times are neither read nor written.
 
     Returns
     -------
     dict
-        With ``kept``, of when and where it is, where it was not measured in this run.
+        With ``kept``, date and processor, if it was not measured in this run.
     """
     name = " ".join([Path(script).stem, *map(str, arguments)])
     key = {"cpu": processor(), "digest": _digest(script, packages)}
@@ -79,7 +79,7 @@ def ask(script: str, *arguments: object, packages: str, limit: int, quick: bool)
 
 
 def kept_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Return which peers' times were not measured in this run, by case and peer, and of when and where they are."""
+    """Return date and processor of the times that were not measured in this run, by case and peer."""
     return {
         f"{case}, {name}": found["kept"]
         for case, all_of in cases.items()

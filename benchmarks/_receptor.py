@@ -1,4 +1,4 @@
-"""What the benchmarks of SA-1, SA-2 and FA-2 share: 64 x 64 taxels, and the obvious NumPy beside them."""
+"""The common part of the benchmarks of SA-1, SA-2 and FA-2: 64 x 64 taxels, and a straightforward NumPy version."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def low_pass(tau: float, period: float) -> Callable[[Any, Any, Any], Any]:
 
 
 def filter_of(encoder: SA1 | SA2 | FA2, x: Any) -> Callable[[Any], Any]:
-    """Return what takes the next picture and gives the potential."""
+    """Return a function from the next picture to the potential."""
     period, state = encoder.period_ms, {"x": x}
     if isinstance(encoder, FA2):
         corner, membrane = low_pass(encoder.corner_ms, period), low_pass(encoder.membrane_ms, period)
@@ -72,7 +72,7 @@ def numpy_afferents(encoder: SA1 | SA2 | FA2, frames: Frames) -> list[Any]:
 
 
 def benchmark(about: str | None, name: str, encoder: SA1 | SA2 | FA2, *, quick: bool) -> dict[str, Any]:
-    """Measure one of them on ticks with noise and on the board's events; return times, factors and ratios."""
+    """Measure a receptor on ticks with noise and on the board's events; return times, factors and ratios."""
     seconds = 0.25 if quick else 1.0
     ticks, _, _, events = scene(seconds)
     ours = {f"{name}, noisy frames": lambda: encoder.encode(ticks), f"{name}, events": lambda: encoder.encode(events)}

@@ -1,4 +1,4 @@
-"""How every benchmark measures: peers in one run, rounds interleaved, CPU time of the thread that works."""
+"""Measuring: peers in one run, rounds interleaved, CPU time of the working thread."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-#: Middle half of the rounds wider than this share of the median: not stable enough to claim a ratio by.
+#: A ratio is not stable if the interquartile range of the rounds is larger than this share of the median.
 WIDEST = 0.15
 
 
@@ -31,9 +31,9 @@ def measure(
     runs : by name, called without arguments
     rounds : int
     work : float
-        What one call does, in the unit of the rate: events, spikes ...
+        Amount of work of one call, in the unit of the rate: events, spikes ...
     clock : int
-        CPU time of this thread; of the process (``CLOCK_PROCESS_CPUTIME_ID``) where peers have threads of their own.
+        CPU time of this thread; of the process (``CLOCK_PROCESS_CPUTIME_ID``) if peers have threads of their own.
     """
     seconds: dict[str, list[float]] = {name: [] for name in runs}
     walls: dict[str, list[float]] = {name: [] for name in runs}
@@ -73,7 +73,7 @@ def thread_seconds() -> dict[str, float]:
 
 
 def stamp(*packages: str) -> dict[str, Any]:
-    """Return machine, versions and commit; `taxel bench` writes a result only where that is all that ran."""
+    """Return machine, versions and commit; `taxel bench` writes a result of a clean commit only."""
     versions = {"python": platform.python_version()}
     versions |= {package: version(package) for package in ("taxel", "numpy", *packages)}
     ran = subprocess.run(

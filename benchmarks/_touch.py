@@ -1,7 +1,7 @@
-"""What the benchmarks of encoders share: scenes, and how an encoder is held against the obvious NumPy.
+"""The common part of the benchmarks of encoders: scenes, and the comparison with a straightforward NumPy version.
 
-One core. Frames: 64 x 64 taxels at 5208 Hz (192 us), every taxel with half a tick of noise, a press that comes and
-goes; in ticks, and as pressure with fractions. Events: what a board with noise floor 3 sends of that scene.
+One core. Frames: 64 x 64 taxels at 5208 Hz (192 us), every taxel with half a tick of noise, a press and its
+release; in ticks, and as pressure with fractions. Events: those that a board with noise floor 3 sends of that scene.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def scene(seconds: float) -> Scene:
 
 
 def board_events(frames: Frames) -> Events:
-    """Return what a board with the floor sends: the first picture, then changes against the last sent value."""
+    """Return the events of a board with the floor: the first picture, then changes against the last sent value."""
     spikes = ChangeEvents(noise_floor=FLOOR).encode(frames)
     times, taxels = spikes.to_numpy()
     k = np.rint(times * 1000 / PERIOD_US).astype(int)
@@ -79,8 +79,8 @@ def compare(
 ) -> dict[str, Any]:
     """Measure an encoder beside NumPy; return seconds, real-time factors and ratios.
 
-    `about` is the benchmark's own words, `goals` times real time on one core by name. Of ours there may be `more`
-    spikes, where the encoder holds the last sample for its latency.
+    `about` describes the benchmark; `goals`, by name, are in times real time on one core. Our encoder may have `more`
+    spikes, as it holds the last sample for its latency.
     """
     for name, baseline in numpy.items():
         mine, theirs = len(ours[name]().times), len(baseline())

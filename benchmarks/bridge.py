@@ -1,8 +1,8 @@
-"""What a bridge over Zenoh carries: rates, losses and latency from one pipeline to another's, on loopback.
+"""A bridge over Zenoh: rates, losses and latency from one pipeline to another, on loopback.
 
-Three processes: a sender, the computer that it sends to (with its bridge), and the one that listens. They share this
-machine and its clock, so a datagram's latency is what it is: from the kernel's stamp there to the end of decoding here.
-It contains the 5 ms for which datagrams gather. The clock is tried with the other one set off by 3.7 s and 50 ppm.
+Three processes: a sender, the computer that it sends to (with its bridge), and the receiving one. They share this
+machine and its clock, so a datagram's latency is exact: from the kernel's stamp there to the end of decoding here.
+It contains the 5 ms for which datagrams gather. The clock comparison is tested with an offset of 3.7 s and 50 ppm.
 
 Peer: none: nothing else carries these datagrams. Unit: ms from the kernel's stamp to the end of decoding; datagrams
 lost. Goal: nothing lost on the way to a recorder, a killed process noticed within 2 s.
@@ -30,7 +30,7 @@ import taxel
 from taxel import ProblemError
 from taxel.live import Live, Remote
 
-#: Frames a second, and datagrams a frame, of so many bytes.
+#: Frames a second, datagrams a frame, and bytes a datagram.
 STREAMS = {
     "a drop: 5208 datagrams/s of 64 bytes": (192.0, 1, 64),
     "a foot: 5208 datagrams/s of 640 bytes": (192.0, 1, 640),
@@ -54,7 +54,7 @@ def free_port() -> int:
 
 
 class Other:
-    """The computer that the sender sends to, as a process: it bridges."""
+    """The process of the computer that the sender sends to, with its bridge."""
 
     def __init__(self, *more: str) -> None:
         self.port, self.place = free_port(), f"127.0.0.1:{free_port()}"
@@ -62,7 +62,7 @@ class Other:
         self._process = subprocess.Popen([*command, "--listen", self.place, *more], stdout=subprocess.PIPE, text=True)
 
     def end(self) -> dict[str, Any]:
-        """End it well; return what it counted."""
+        """End the process regularly; return its counts."""
         self._process.send_signal(signal.SIGINT)
         counted: dict[str, Any] = json.loads(self._process.communicate(timeout=60)[0])["counters"]
         return counted
@@ -121,7 +121,7 @@ def stream(period_us: float, each: int, size: int, seconds: float, congestion: s
 
 
 def clocks(seconds: float) -> dict[str, Any]:
-    """Record arrivals there by the true clock, and here of one that was set off; return by how much they differ."""
+    """Record arrivals there by the true clock, and here with the offset clock; return their differences."""
     with tempfile.TemporaryDirectory() as folder:
         near, far = Path(folder) / "near.mcap", Path(folder) / "far.mcap"
         skew = ["--clock-ahead", str(AHEAD_S), "--clock-drift", str(DRIFT_PPM), "--record", str(near)]
@@ -154,7 +154,7 @@ def clocks(seconds: float) -> dict[str, Any]:
 
 
 def killed() -> dict[str, float]:
-    """Kill a bridge and begin it anew; return after how long that is noticed, and data arrives again, s."""
+    """Kill a bridge and restart it; return the times until that is noticed and until data arrive again, s."""
     with Other() as other:
         place = ["--listen", other.place]
         with Remote(f"zenoh:{other.place}", timeout=60.0) as remote, Live(remote=remote) as live:
@@ -164,7 +164,7 @@ def killed() -> dict[str, float]:
             wait_for(lambda: not live.counters["bridged"]["heard"])
             noticed = time.monotonic() - begun
             with Other(*place) as again:
-                # It takes a while to begin: its own address answers when it has.
+                # Starting takes a while: the process has started when its address accepts connections.
                 Remote(f"zenoh:{again.place}", timeout=60.0).stop()
                 begun = time.monotonic()
                 wait_for(lambda: live.counters["bridged"]["heard"])

@@ -1,11 +1,11 @@
-"""What receiving costs, what is lost, and how long arrival to decoded takes, beside faery's UDP receiver.
+"""CPU time and losses of receiving, and latency from arrival to decoded, beside faery's UDP receiver.
 
 Sender and receiver share this machine, over loopback, the sender a process of its own. Ours sends as the board does:
-each 192 us what a frame saw, in datagrams of at most 280 words, which the kernel cuts out of one train (UDP_SEGMENT).
-faery's receiver gets its own format ("t64_x16_y16_on8", 111 events a datagram), paced alike.
+each 192 us the events of a frame, in datagrams of at most 280 words, which the kernel cuts out of one train
+(UDP_SEGMENT). faery's receiver gets its own format ("t64_x16_y16_on8", 111 events a datagram), paced alike.
 
 Latency: ours from the kernel's stamp to the end of decoding, a datagram each; faery's from its sender's clock before
-the send to the packet in the reader's hands (it has no other stamp), which adds the sending.
+the send to the packet's delivery (it has no other stamp), which adds the sending.
 
 Peer: faery's UDP receiver. Unit: us from arrival to decoded; cores; datagrams lost. Goal: 21.3 million events/s without
 a loss in .15 core (receiving alone .05), p50 below 50 us, p99 below 1 ms.
@@ -89,7 +89,7 @@ os._exit(0)
 
 
 def datagrams(rate: float, frames: int) -> tuple[list[bytes], int]:
-    """Return the datagrams of `frames` frames at `rate` changes a second, and how many a frame has."""
+    """Return the datagrams of `frames` frames at `rate` changes a second, and their number a frame."""
     changes = max(1, round(rate * FRAME_US / 1e6))
     taxel = np.arange(changes * frames) % 4096
     t = np.repeat(np.arange(frames) * 192 // 100 * 100, changes)
@@ -104,9 +104,9 @@ def datagrams(rate: float, frames: int) -> tuple[list[bytes], int]:
 
 
 def ours(rate: float, seconds: float, scratch: Path, *, segment: bool = True, record: bool = False) -> dict[str, Any]:
-    """Receive and decode what a sender of `rate` changes a second sends.
+    """Receive and decode the datagrams of a sender of `rate` changes a second.
 
-    One thread receives and decodes; where it also records, another one receives.
+    One thread receives and decodes; while it records, another one receives.
     """
     cut, each = datagrams(rate, 4 if rate > 1e6 else 64)
     payload = scratch / f"{rate:.0f}.pickle"
@@ -147,7 +147,7 @@ def ours(rate: float, seconds: float, scratch: Path, *, segment: bool = True, re
 
 
 def faery(rate: float, seconds: float, port: int) -> dict[str, Any]:
-    """Receive with faery what a sender of `rate` events a second sends in its format."""
+    """Receive with faery the datagrams of a sender of `rate` events a second, in faery's format."""
     receiver = subprocess.Popen([sys.executable, "-c", FAERY_RECEIVE, str(port)], stdout=subprocess.PIPE, text=True)
     assert receiver.stdout is not None
     receiver.stdout.readline()
@@ -222,7 +222,7 @@ def run(*, quick: bool) -> dict[str, Any]:
 
 
 def _spread(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return median and quartiles over the rounds of each latency, us, and of what arrived."""
+    """Return median and quartiles over the rounds of each latency, us, and of the share that arrived."""
     rows = [row for row in rows if "latency" in row]
     if not rows:
         return {"failed": "no round came to its end"}

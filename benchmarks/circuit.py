@@ -17,14 +17,14 @@ from taxel.simulate.circuit import Fabric, VirtualGround
 
 
 def pressed(size):
-    """Return conductances under a ball, uS: a footprint of some 12 mm, the rest at rest."""
+    """Return conductances under a ball, uS: a footprint of some 12 mm; all other taxels are at rest."""
     y, x = np.mgrid[:size, :size]
     away = np.hypot(x - 0.4 * size, y - 0.55 * size) / (0.15 * size)
     return Fabric().conductance(0.3 * np.clip(1 - away**2, 0, None) ** 1.5)
 
 
 def ends(lines):
-    """Return source, its conductance and that of a switch: V, S, S."""
+    """Return the source's voltage, its conductance and that of a switch: V, S, S."""
     feedback = 1e-3 / lines.feedback_kohm
     return lines.v_trans * lines.gain / (1 + lines.gain), (1 + lines.gain) * feedback, 1 / lines.switch_ohm
 
@@ -74,7 +74,7 @@ def run(*, quick):
         "without wires": float(np.abs(plain.volts(g) - dense(plain, g)).max()),
         "with wires": float(np.abs(wired.volts(g) - sparse(wired, g)).max()),
     }
-    # One thread for all: BLAS' own would wait for each other longer than they work.
+    # One thread for all: at this size BLAS' own threads wait for each other longer than they compute.
     with threadpool_limits(1):
         results = measure(
             {

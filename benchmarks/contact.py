@@ -1,9 +1,9 @@
 """A frame of a ball's footprint on a bonded layer against ContactMechanics, and scenes against the board's clock.
 
 Both solve the same layer of 64 x 64 taxels, called from Python. *A frame of a footprint*: a ball goes up and down at
-100 mm/s, a frame at 5208 Hz; ours begins where the last two frames led, as in a scene. ContactMechanics (PyPI, 530 MB
-with what it needs; left out where it is not installed) solves each anew, as it does by default, and, apart,
-begun from the last frame's forces. *From nothing* is the deepest frame alone; *the whole array* is a sole, from
+100 mm/s, a frame at 5208 Hz; ours starts from an extrapolation of the last two frames, as in a scene. ContactMechanics
+(PyPI, 530 MB with its dependencies; left out if it is not installed) solves each from nothing, as by default, and,
+listed apart, from the last frame's forces. *From nothing* is the deepest frame alone; *the whole array* is a sole, from
 nothing. Each has its own tolerances: `furthest off` is the worst pressure off ours to 1e-8, as a share of the largest.
 The base stress, which ContactMechanics does not know, is in our time. Scenes are played whole, board and decoding too:
 how many times faster than the board's clock, one thread. A foot's is with the layer solved every fourth frame, as
@@ -36,21 +36,21 @@ FRAMES = 40
 
 
 def ball(depth_mm: float) -> NDArray[np.float64]:
-    """Return how far a ball has sunk at each taxel."""
+    """Return the depth of a ball at each taxel, mm."""
     y, x = (np.mgrid[:64, :64] - 31.5) * PITCH_MM
     sunk: NDArray[np.float64] = depth_mm - (x**2 + y**2) / (2 * RADIUS_MM)
     return sunk
 
 
 def sole(depth_mm: float) -> NDArray[np.float64]:
-    """Return how far a sole has sunk at each taxel; so far off the edges that a periodic layer is the same."""
+    """Return the depth of a sole at each taxel, mm; so far from the edges that a periodic layer gives the same."""
     y, x = np.mgrid[:64, :64] - 31.5
     sunk: NDArray[np.float64] = depth_mm - DEPTH_MM * (np.abs(x / 13) ** 6 + np.abs(y / 25) ** 6)
     return sunk
 
 
 def depths() -> NDArray[np.float64]:
-    """Return depths by frame, up from the deepest and down again at 100 mm/s: a round ends where it began."""
+    """Return depths by frame, up from the deepest and down again at 100 mm/s, so that a round ends as it began."""
     up = np.arange(FRAMES // 2)
     found: NDArray[np.float64] = DEPTH_MM - 0.1 * FRAME_US / 1e3 * np.r_[up + 1, up[::-1]]
     return found
@@ -64,14 +64,14 @@ class Ours:
         self._sunk = {depth: sunk_mm(depth) for depth in {*depths(), DEPTH_MM}}
 
     def press(self, depth_mm: float, *, anew: bool) -> NDArray[np.float64]:
-        """Return the pressure at a depth, kPa; begun where the last two led where it is not `anew`."""
+        """Return the pressure at a depth, kPa; started from the last two solutions unless `anew`."""
         if anew:
             self._layer.forget()
         return self._layer.press(self._sunk[depth_mm]).pressure_kpa
 
 
 class Theirs:
-    """The same by ContactMechanics."""
+    """A body on the layer, solved by ContactMechanics."""
 
     def __init__(self, sunk_mm: Callable[[float], NDArray[np.float64]]) -> None:
         from ContactMechanics import PeriodicFFTElasticHalfSpace  # noqa: PLC0415  a peer need not be there
@@ -84,24 +84,24 @@ class Theirs:
         self._forces: Any = None
 
     def press(self, depth_mm: float, *, anew: bool) -> NDArray[np.float64]:
-        """Return the pressure at a depth, kPa; begun from the last one's forces where it is not `anew`."""
+        """Return the pressure at a depth, kPa; started from the last solution's forces unless `anew`."""
         found = self._system.minimize_proxy(offset=depth_mm, initial_forces=None if anew else self._forces)
         if not found.success:
             raise ArithmeticError(f"ContactMechanics did not converge at {depth_mm} mm: {found.message}")
-        # It gives the forces on the body, and takes those on the layer.
+        # It returns the forces on the body, and starts from forces on the layer.
         self._forces = -np.array(self._system.force)
         pressure: NDArray[np.float64] = -1e3 * self._forces / PITCH_MM**2
         return pressure
 
 
 def furthest_off(body: Callable[[float], NDArray[np.float64]], engine: Ours | Theirs) -> float:
-    """Return an engine's worst pressure, from nothing, off ours to 1e-8, as a share of the largest."""
+    """Return the largest error of an engine's pressure, from nothing, against ours at 1e-8; share of the largest."""
     exact = Ours(body, tolerance=1e-8).press(DEPTH_MM, anew=True)
     return float(np.abs(engine.press(DEPTH_MM, anew=True) - exact).max() / exact.max())
 
 
 def played(scenes: dict[str, Scene], rounds: int) -> dict[str, Any]:
-    """Return seconds by scene, and as `rate` how many times faster than the board's clock it is played."""
+    """Return seconds by scene; `rate` is the speed in times the board's clock."""
     results: dict[str, Any] = {}
     for name, scene in scenes.items():
         acts: list[Silence | Scene] = [Silence(100.0), scene]

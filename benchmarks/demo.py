@@ -1,4 +1,4 @@
-"""How many touches the main job finds over 100 scenes without the clock, and how soon.
+"""Touches that the demo finds in 100 scenes without the clock, and their latency.
 
 Peer: the plain rule, two loaded taxels. Unit: touches found; ms from the touch to `known`. Goal: first impacts within
 1 ms of the contact and 1.5 ms of the lift, as `taxel demo` states.

@@ -2,8 +2,8 @@
 
 The spatial van Rossum distance is an inner product, so one table of states a tau serves every sigma. Patterns of 256
 taxels, rises and falls apart, with as many spikes as the drops of the study `drops` have. Beside it
-`taxel.metrics.pairwise`, which knows of no samples, on half of the patterns at one tau and sigma: equal distances,
-and how much dearer a pair is. CPU time of the process: both use all cores.
+`taxel.metrics.pairwise`, which does not use the samples' grid, on half of the patterns at one tau and sigma: the
+distances are equal, and the cost of a pair is compared. CPU time of the process: both use all cores.
 
 Peer: `taxel.metrics.pairwise`. Unit: CPU seconds; for all distances, minutes. Goal: a pair cheaper than the peer's,
 equal to rounding.
@@ -26,7 +26,7 @@ PITCH_MM = 2.67
 
 
 def patterns(count, seed):
-    """Return so many patterns with as many spikes as a drop has."""
+    """Return patterns with as many spikes as a drop has."""
     share = SPIKES / (SAMPLES * 2 * REGION**2)
     return (np.random.default_rng(seed).random((count, SAMPLES, 2, REGION**2), np.float32) < share).astype(np.uint8)
 
@@ -41,7 +41,7 @@ def trains(spikes):
 
 
 def all_of_them(count, taus):
-    """Work out the distances of so many patterns at every tau and sigma, once."""
+    """Compute the distances of all patterns at every tau and sigma, once."""
     spikes = patterns(count, 1)
     kernels = [smoothed(REGION, PITCH_MM, sigma) for sigma in SIGMAS_MM]
     wall, cpu = time.perf_counter(), time.process_time()
@@ -62,7 +62,7 @@ def all_of_them(count, taus):
 
 
 def beside_metrics(count):
-    """Compare a few patterns' distances, and what a pair costs."""
+    """Compare the distances of a few patterns, and the cost of a pair."""
     spikes = patterns(count, 2)
     as_trains, kernel, array = trains(spikes), smoothed(REGION, PITCH_MM, 2.0), Array(REGION, REGION, pitch_mm=PITCH_MM)
     distances = {}
@@ -83,7 +83,7 @@ def beside_metrics(count):
 
 
 def run(*, quick, share=1.0):
-    """Measure; quick: few patterns. `share`: of the taus, where the machine is too busy."""
+    """Measure; quick: few patterns. `share`: of the taus, for a busy machine."""
     taus = TAUS_MS[:: max(1, round(1 / share))]
     whole = all_of_them(90, TAUS_MS[:2]) if quick else all_of_them(1800, taus)
     peer = beside_metrics(20 if quick else 900)

@@ -19,7 +19,7 @@ LEVELS = 20
 
 
 def numpy_moments(frames: Frames, tare: Tare) -> list[Any]:
-    """Return (t, level, reached or left) of area, total, peak and the way of the centre."""
+    """Return (t, level, reached or left) of area, total, peak and the displacement of the centre."""
     spaced = [np.geomspace(*RANGES[name], LEVELS) for name in ("area", "total", "peak", "displacement_mm")]
     which = np.repeat([0, 1, 2, 3, 3, 4, 4], LEVELS)
     levels = np.concatenate([*spaced, -spaced[3], spaced[3], -spaced[3]])

@@ -1,8 +1,8 @@
 """How many times faster than real time a skin of 4096 afferents of all four types is, beside the obvious NumPy.
 
-64 x 64 taxels of 2.67 mm at 5208 Hz bear 4096 afferents in the fingertip's mixture (70 : 140 : 6 : 25), thinner than a
-fingertip has them. On the board's events, and on frames whose every taxel changes all the time. The NumPy version
-weighs the fields alone: a dense product a frame.
+64 x 64 taxels of 2.67 mm at 5208 Hz have 4096 afferents in the fingertip's mixture (70 : 140 : 6 : 25), less dense than
+a fingertip's. On the board's events, and on frames whose every taxel changes all the time. The NumPy version
+computes the receptive fields alone: a dense product a frame.
 
 Peer: NumPy's dense product of the fields. Unit: times real time, on one core. Goal: 20.
 """
@@ -19,7 +19,7 @@ from _touch import compare, scene
 from taxel.encode import Skin
 
 AFFERENTS = 4096
-#: A cm^2 of the thesis' array: all densities scaled so that 4096 afferents stand on it.
+#: Densities a cm^2 of the thesis' array, scaled so that it has 4096 afferents.
 SHARE = AFFERENTS / (241 * (64 * 0.267) ** 2)
 
 

@@ -1,6 +1,6 @@
 """How many times faster than real time pairs of Izhikevich neurons are, beside the obvious NumPy.
 
-92 channels at 500 Hz, 184 neurons, steps of 0.1 ms, all of which the baseline takes as one vector.
+92 channels at 500 Hz, 184 neurons, steps of 0.1 ms; the baseline steps all neurons as one vector.
 
 Peer: the obvious NumPy. Unit: times real time, on one core. Goal: 100.
 """
@@ -39,7 +39,7 @@ def numpy_izhikevich(frames: Frames) -> list[Any]:
 
 
 def gait(seconds: float, rng: np.random.Generator) -> Frames:
-    """Return 92 channels at 500 Hz that go on and off as the sensors of an insole do."""
+    """Return 92 channels at 500 Hz that are loaded and unloaded as the sensors of an insole are."""
     t = np.arange(round(seconds * 500), dtype=np.int64) * 2000
     begin, length = rng.uniform(0, 0.3, 92), rng.uniform(0.1, 0.5, 92)
     within = t[:, None] / 1e6 % 1.1
@@ -54,5 +54,5 @@ def run(*, quick: bool) -> dict[str, Any]:
     steps = gait(seconds, np.random.default_rng(5208))
     ours = {name: lambda: ThresholdIzhikevich([0.5]).encode(steps)}
     numpy = {name: lambda: numpy_izhikevich(steps)}
-    # Encoders hold the last sample for their latency, the baseline ends with it.
+    # Encoders hold the last sample for their latency; the baseline ends at that sample.
     return compare(__doc__, seconds, ours, numpy, quick=quick, goals={name: 100}, more=92)

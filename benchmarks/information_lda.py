@@ -1,10 +1,10 @@
 """Linear discriminants of ten folds: against scikit-learn's (`svd`), and at the size of figure 5.5.
 
 15 000 trials of 1000 ternary features, 300 classes: our ten folds, beside scikit-learn's ``svd`` of one fold (it trains
-each anew, so ten cost ten times that). Once of spikes drawn one by one, whose scatter has its full rank, and once of
-rasters as an array gives them, in which features determine each other exactly. Predictions of that fold are compared,
-trial by trial. Then 150 000 x 5000, ten folds, once, with the time and the largest memory. CPU time of the process:
-both use all cores.
+each fold from nothing, so ten cost ten times that). Once of spikes drawn independently, whose scatter has full rank,
+and once of rasters as of an array, in which features determine each other exactly. Predictions of that fold are
+compared, trial by trial. Then 150 000 x 5000, ten folds, once, with the time and the largest memory. CPU time of the
+process: both use all cores.
 
 Peer: scikit-learn's `svd`. Unit: CPU seconds of ten folds. Goal: not slower than the peer, and the same predictions.
 """
@@ -46,7 +46,7 @@ def touches(trials, features, classes, seed):
     """Return FA-1's spikes of touches, sampled every 2 ms, and the labels.
 
     A class is a place, width, depth and rise of pressure; a trial begins within a sample, up to a tenth more or less
-    deep. What presses is symmetric about the second column, so the first and the third are equal.
+    deep. The pressure is symmetric about the second column, so the first and the third are equal.
     """
     random = np.random.default_rng(seed)
     labels, samples = np.arange(trials) % classes, features // (ROWS * COLUMNS)
@@ -66,7 +66,7 @@ def touches(trials, features, classes, seed):
 
 
 def against_scikit_learn(table, absent, quick):
-    """Compare ten folds of ours with one of scikit-learn's, where that is there, of tables that a function makes."""
+    """Compare ten folds of ours with one of scikit-learn's, if it is installed, on tables that a function makes."""
     trials, features, classes = (3000, 200, 60) if quick else (15_000, 1000, 300)
     x, y = table(trials, features, classes, 1)
     fold = folds(y, count=FOLDS, seed=1)
@@ -84,7 +84,7 @@ def against_scikit_learn(table, absent, quick):
         predicted["theirs"] = discriminant.predict(values[test])
 
     with warnings.catch_warnings():
-        # Ours warns of the number of directions that it weighs, which is part of the result as `rank`.
+        # Ours warns of the number of directions that it uses; the result lists that number as `rank`.
         warnings.simplefilter("ignore", UserWarning)
         results = measure(
             {"taxel, ten folds": ours, **({} if absent else dict.fromkeys(PEERS, theirs))},
@@ -125,7 +125,7 @@ def full_size(share, features=5000):
 
 
 def run(*, quick, share=1.0):
-    """Measure; quick: small tables, one round. `share`: of the trials of figure 5.5, where the machine is too busy."""
+    """Measure; quick: small tables, one round. `share`: of the trials of figure 5.5, for a busy machine."""
     large = full_size(0.02, 500) if quick else full_size(share)
     absent = missing(PEERS)
     peers = {

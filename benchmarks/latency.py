@@ -1,19 +1,19 @@
-"""How long after the last byte of what shows a touch a detection is called back: at rest and on a loaded machine.
+"""Latency of a detection's callback after the last byte of the frame that shows the touch, at rest and under load.
 
 A patch of 5 x 5 taxels is touched at random moments and places, for 4 ms each, 80 times a second. A frame sees it in
 the lines that are scanned after its moment; contact area crosses 10 taxels, and one neuron detects that at once.
-Beside it nothing moves, or a tenth of the taxels, or all of them: they fall and rise in every frame below what counts
-as loaded. The frames' datagrams are made beforehand, and a process of its own sends each frame when the board would,
-at its end.
+The other taxels are constant, or a tenth or all of them fall and rise in every frame, below the level that counts as
+loaded. The frames' datagrams are made beforehand, and a process of its own sends each frame at its end, as the
+board does.
 
-Callback is what `Live(say=...)` calls, in Python, from the thread that made the detection. Times by the host's clock:
+The callback is the function of `Live(say=...)`, in Python, in the thread of the readout. Times by the host's clock:
 
-- from the last byte: from just before the last datagrams of the frame that crosses were given to the system;
-- from due: from when that frame ends by the board's clock, so that the sender's lateness counts too;
+- from the last byte: from just before the last datagrams of the frame that crosses were passed to the system;
+- from due: from the end of that frame by the board's clock, so that the sender's lateness counts too;
 - from the first event's stamp: of the touch;
 - from the touch: from the simulated moment.
 
-Loaded: a busy process for each processor. Version 1 promises nothing, so that silence is guessed.
+Loaded: a busy process for each processor. Version 1 has no promises, so that silence is estimated.
 
 Peer: wire version 1. Unit: us, medians and 99th percentiles. Goal: at rest p50 from the last byte 60 us at 5.2 kHz, 150
 us on 128 x 128, 300 us with a tenth moving, 1 ms with all.
@@ -44,7 +44,7 @@ from taxel.wire import Registers
 SEED, REST, FALLEN, TOUCHED = 20_261_121, 100, 60, 140
 SIDE, LEVEL, TOUCH_US, EACH_US = 5, 10, 4_000.0, 12_500.0
 
-#: The sender: a train where datagrams are equally long, each frame at its time.
+#: The sender: each frame at its time, equally long datagrams as one train.
 SEND = """
 import ctypes, pickle, socket, struct, sys, time
 port, path, period_us, out = int(sys.argv[1]), sys.argv[2], float(sys.argv[3]), sys.argv[4]
@@ -81,7 +81,7 @@ BUSY = "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    sum
 
 @dataclass(frozen=True)
 class Way:
-    """Say what is sent, and the goal for the median from the last byte, us."""
+    """Hold a case: the load, and the goal for the median from the last byte, us."""
 
     name: str
     side: int
@@ -89,11 +89,11 @@ class Way:
     moving: float = 0.0
     goal: float | None = None
     share: float = 1.0
-    """Of the seconds, where there is very much to send."""
+    """The share of the seconds that is measured, if there is very much to send."""
 
 
 def preset(side: int, times: str | None, version: int) -> Registers:
-    """Return a preset of this many taxels a side, with a channel of the converter for each step where it is large."""
+    """Return a preset of this many taxels a side, with a converter channel for each step if it is large."""
     array = Array(side, side)
     if times is None:
         return Registers(array=array, wire_version=version)
@@ -120,7 +120,7 @@ WAYS = (
 
 @dataclass(frozen=True)
 class Touches:
-    """Hold what is simulated: when each touch begins, its first event's stamp (us), and the frame that crosses."""
+    """Hold the simulated touches: their beginning, their first event's stamp (us), and the frame that crosses."""
 
     begin: NDArray[np.float64]
     stamp: NDArray[np.float64]
@@ -166,7 +166,7 @@ def readout(array: Array) -> tuple[Readout, Tare]:
 
 
 def measured(way: Way, seconds: float, scratch: Path) -> dict[str, Any]:
-    """Send what is simulated, and return the delay of each detection."""
+    """Send the simulated frames, and return the delay of each detection."""
     frames, touches = simulated(way, seconds * way.share)
     array = Array(way.side, way.side)
     judge, tare = readout(array)
@@ -187,7 +187,7 @@ def measured(way: Way, seconds: float, scratch: Path) -> dict[str, Any]:
     began, sent = pickle.loads(log.read_bytes())
     frame_us, sent_ns = way.registers.frame_us, np.array(sent)
     due_ns = began + (np.arange(len(sent)) * frame_us * 1000).astype(np.int64)
-    # The board's time 0 is a frame before the first frame's datagrams leave.
+    # The board's time 0 is one frame before the first frame's datagrams are sent.
     zero_ns = began - frame_us * 1000
     late: dict[str, list[float]] = {"last byte": [], "due": [], "first event's stamp": [], "touch": []}
     found = set()
@@ -222,7 +222,7 @@ def measured(way: Way, seconds: float, scratch: Path) -> dict[str, Any]:
 
 
 def quantiles(values: list[float]) -> dict[str, float]:
-    """Return median, 99 %, 99.9 % and maximum, and how many lie below 0, as two clocks or a guess may give."""
+    """Return median, 99 %, 99.9 % and maximum, and the number below 0, which two clocks or an estimate can cause."""
     if not values:
         return {"count": 0}
     p50, p99, p999, most = np.percentile(values, [50, 99, 99.9, 100]).tolist()
@@ -264,13 +264,13 @@ def run(*, quick: bool) -> dict[str, Any]:
         "results": rows,
         "ratios": {"version 1's p50 over version 2's, 64 x 64": p50(first, "last byte") / p50(second, "last byte")},
         "goals": goals,
-        # Others on the machine decide the tails, and with as many as processors the medians too.
+        # Other processes determine the tails, and if they are as many as the processors, the medians too.
         "stable": bool(load < 0.5 * (os.cpu_count() or 1)),
     }
 
 
 def end(crowd: list[subprocess.Popen[bytes]]) -> None:
-    """End the busy processes that were begun."""
+    """End the busy processes that were started."""
     for one in crowd:
         one.kill()
     for one in crowd:

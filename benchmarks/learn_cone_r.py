@@ -1,4 +1,4 @@
-"""ConeR against CVXPY with Clarabel, and Clarabel handed every row itself: the same objective, and how long it takes.
+"""ConeR against CVXPY with Clarabel, and Clarabel with every row: the same objective, and the CPU time.
 
 Drawn insoles of 92 taxels, one ON and one OFF spike a taxel and footfall, Table 6.2; then one long walk of a million
 rows, ours alone. CPU time of the process: the cone solver has a thread of its own.
@@ -20,12 +20,12 @@ from taxel.learn import ConeR
 
 WEIGHTS = 184
 
-#: What each peer needs.
+#: The modules that each peer needs.
 PEERS = {"Clarabel, every row": "clarabel", "CVXPY with Clarabel": "cvxpy clarabel"}
 
 
 def walk(footfalls, trains, seed=0):
-    """Draw a walk: pressure goes from heel to toe; contact is the first taxels' load."""
+    """Draw a walk: pressure moves from heel to toe; contact is the load of the first taxels."""
     random = np.random.default_rng(seed)
     half = trains // 2
     place = np.linspace(0, 1, half)
@@ -44,7 +44,7 @@ def walk(footfalls, trains, seed=0):
 
 
 def whole(cone, pattern, targets):
-    """State 6.14 with every row; return a function that solves it and keeps the least objective."""
+    """State 6.14 with every row; return a function that solves it and stores the least objective."""
     neuron, n = cone.neuron, len(pattern)
     tau = neuron.tau
 

@@ -1,8 +1,8 @@
-"""ConeX against general solvers on the memory task (6.4.4, C = 3): Clarabel, HiGHS, PIQP; and how its cost grows.
+"""ConeX against general solvers on the memory task (6.4.4, C = 3): Clarabel, HiGHS, PIQP; and the growth of its cost.
 
-Shortest weights on the grid, one thread. Each peer is handed the whole problem (HiGHS also only the rows that are
-broken, from our sweep, with its warm dual simplex) in a process of its own, and stopped after a minute of CPU; 15
-with ``taxel bench --peers``, which keeps the times that need more than one. HiGHS decides feasibility alone, which is
+Shortest weights on the grid, one thread. Each peer gets the whole problem (HiGHS also only the rows that are
+violated, from our sweep, with its warm dual simplex) in a process of its own, and is stopped after a minute of CPU; 15
+with ``taxel bench --peers``, which saves the times above one. HiGHS decides feasibility alone, which is
 easier. CPU time of the process, the statement of the rows not counted; for ConeX it is the whole `fit`.
 
 Peer: Clarabel, CVXPY, HiGHS and PIQP. Unit: CPU seconds a fit. Goal: not slower than the fastest of them.
@@ -27,7 +27,7 @@ TAU, THETA_0, THETA_PLUS, REFRACTORY, BOUND, END = 15.0, 0.3, 0.2, 3.0, 0.3, 200
 CASES = [(100, 24), (400, 99), (1000, 300), (400, 141), (1000, 360)]
 QUICK = [(100, 24), (400, 99), (400, 141)]
 LIMIT_S = 900
-#: What each peer needs.
+#: The modules that each peer needs.
 PEERS = {
     "Clarabel": "clarabel",
     "CVXPY + Clarabel": "cvxpy clarabel",
@@ -45,7 +45,7 @@ def draw(n, p, seed=0):
 
 
 def trains(spikes, targets):
-    """Turn them into what ConeX takes."""
+    """Return trains and targets as ConeX takes them."""
     patterns = [SpikeTrains.from_lists([[s] for s in row], stop=float(END)) for row in spikes]
     return patterns, [[t] for t in targets]
 
@@ -62,7 +62,7 @@ def threshold(t, target):
 
 
 def silent(target):
-    """Whole ms at which the neuron shall be silent (6.9b)."""
+    """Whole ms at which the neuron must be silent (6.9b)."""
     points = np.arange(END + 1.0)
     return points[(points < target) | (points > target + REFRACTORY)]
 
@@ -82,7 +82,7 @@ def state(n, p):
 
 
 def by_clarabel(n, p):
-    """Solve it with Clarabel, handed the matrices."""
+    """Solve it with Clarabel, from the matrices."""
     import clarabel  # noqa: PLC0415  a peer need not be there
 
     equal, values, unequal, limits = state(n, p)
@@ -151,7 +151,7 @@ def _said(solver):
 
 
 def by_highs_on_demand(n, p):
-    """Decide it with HiGHS from the targets alone, adding the peak of each stretch in which silence is broken."""
+    """Decide it with HiGHS from the targets alone, adding the peak of each stretch above the limit of silence."""
     import highspy  # noqa: PLC0415  a peer need not be there
 
     spikes, targets = draw(n, p)
@@ -250,7 +250,7 @@ def against(n, p, rounds, peers, *, quick):
             found["objective, relative difference"] = found["objective"] / out["ConeX"]["objective"] - 1
         out[name] = found
         print(f"{n}/{p} {name}: {found}", file=sys.stderr)
-    # A peer that gives up has no verdict to compare.
+    # A peer that was stopped has no verdict to compare.
     verdicts = {found.get("verdict") for found in out.values()} & {"solved", "infeasible"}
     return out | {"verdicts equal": len(verdicts) == 1}
 

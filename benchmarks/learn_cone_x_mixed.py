@@ -1,8 +1,8 @@
-"""ConeX with l1, norm and B in the objective against CVXPY + Clarabel handed every row (6.4.4, C = 3, on the grid).
+"""ConeX with l1, norm and B in the objective against CVXPY + Clarabel with every row (6.4.4, C = 3, on the grid).
 
 Three sizes, four mixes of terms, one thread. The peer runs in a process of its own and is stopped after a minute of
-CPU (15 with ``taxel bench --peers``, which keeps a time that needs more than one); its time is that of `solve`, the
-rows having been stated; ours is the whole `fit`.
+CPU (15 with ``taxel bench --peers``, which saves a time above one); its time is that of `solve`, without
+stating the rows; ours is the whole `fit`.
 
 Peer: CVXPY with Clarabel. Unit: CPU seconds a fit. Goal: not slower than the peer.
 """
@@ -24,7 +24,7 @@ TAU, THETA_0, THETA_PLUS, REFRACTORY, BOUND, END = 15.0, 0.3, 0.2, 3.0, 0.3, 200
 KAPPA, DELTA_T = 1.2, 1.5
 SIZES = [(100, 18), (400, 99), (1000, 300)]
 MIXES = [(1, 0, 0), (2, 2, 200), (1, 4, 0), (0, 2, 100)]
-#: At N = 1000 the peer is asked for this mix alone: it takes a quarter of an hour or more for each.
+#: At N = 1000 the peer solves this mix alone: each takes it a quarter of an hour or more.
 ASKED = (2, 2, 200)
 LIMIT_S = 900
 PEERS = {"CVXPY + Clarabel": "cvxpy clarabel"}
@@ -70,7 +70,7 @@ def peer(trains, patterns, lambdas):
 
 
 def case(trains, patterns, lambdas, rounds, *, asked, quick):
-    """One size and mix: ConeX, then the peer once, where it is asked."""
+    """Measure one size and mix: ConeX, then the peer once, if it is `asked`."""
     spikes, targets = draw(trains, patterns)
     examples = [SpikeTrains.from_lists([[s] for s in one], stop=END) for one in spikes], [[t] for t in targets]
     cone = ConeX(neuron=Neuron(time="grid"), horizon=END, lambdas=lambdas, kappa=KAPPA)

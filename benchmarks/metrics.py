@@ -1,4 +1,4 @@
-"""Distances between spike trains against elephant's matrices and PySpike's: how long a pair takes, and a large matrix.
+"""Distances between spike trains against elephant's matrices and PySpike's: the cost of a pair, and of a large matrix.
 
 Trains of 1 s, Victor-Purpura at 50/s, van Rossum at 20 ms. Elephant and PySpike are called for a whole matrix of trains
 (``victor_purpura_distance``, ``van_rossum_distance``, ``isi_distance_matrix``, ``spike_distance_matrix``), as are we
@@ -24,7 +24,7 @@ from taxel.metrics._metric import listed, stated
 Q, TAU = 0.05, 20.0
 MATRIX, TAXELS, SPIKES = 1800, 256, 100
 
-#: What each peer needs.
+#: The modules that each peer needs.
 PEERS = {"elephant": "elephant neo quantities", "PySpike": "pyspike"}
 
 
@@ -73,13 +73,13 @@ CALLS = {"elephant": by_elephant, "PySpike": by_pyspike}
 
 
 def against_peers(spikes, absent, *, quick):
-    """Measure a pair of so many spikes a train, ours and the peers'."""
+    """Measure ours and the peers on pairs of trains with this number of spikes."""
     random = np.random.default_rng(spikes)
     count = 10 if quick else 60
     lists = trains(random, count, spikes)
     ours = SpikeTrains.from_lists(lists, 0.0, 1000.0)
     pairs = count * (count - 1) / 2
-    # The fast ones are called often enough to be measured.
+    # Fast functions are called several times in a round, so that the time can be measured.
     often = 5 if quick else 50
     repeated = {
         "taxel victor_purpura": lambda: pairwise("victor_purpura", ours, q=Q, threads=1),

@@ -1,7 +1,7 @@
-"""OnlineConeR against a fit from nothing to the same window of 200 footfalls, at each of the last of a stream.
+"""OnlineConeR against a fit from nothing to the same window of 200 footfalls, at the last footfalls of a stream.
 
-The stream: footfalls of the plate's people (TAXEL_DATA, or ../shared/data beside the checkout), as an insole feels
-them, by the recipes of the trials for contact and foot-off; drawn footfalls where there are no recordings. CPU time.
+The stream: footfalls of the plate's people (TAXEL_DATA, or ../shared/data beside the checkout), as an insole measures
+them, by the recipes of the trials for contact and foot-off; without recordings drawn footfalls. CPU time.
 
 Peer: `ConeR` on the same window, from nothing. Unit: CPU seconds a footfall. Goal: cheaper than the fit from nothing,
 with the same objective.
@@ -54,14 +54,14 @@ def drawn():
 
 
 def cpu(call):
-    """Return what a call gives and its CPU time."""
+    """Return the result of a call and its CPU time."""
     begun = time.process_time()
     value = call()
     return value, time.process_time() - begun
 
 
 def compared(parameters, footfalls, steps):
-    """Stream the footfalls; over the last steps, a fit from nothing beside each."""
+    """Stream the footfalls; at each of the last steps, fit from nothing too."""
     parameters = {**parameters, "tolerance": 5e-7}
     online = OnlineConeR(window=WINDOW, **parameters)
     rows = []

@@ -1,7 +1,7 @@
-"""What the live panel costs and holds: pictures a second beside 99 others, the server's thread, seeking in a recording.
+"""The live panel: pictures a second beside 99 other clients, CPU of the server's thread, seeking in a recording.
 
-Sender and clients share this machine, over loopback, the sender a process of its own. The good client reads all that it
-is sent and gives a credit for each picture; of the others every second one asks for pictures and never reads. CPU is of
+Sender and clients share this machine, over loopback, the sender a process of its own. The fast client reads all
+messages and sends a credit for each picture; half of the others request pictures and never read. CPU is of
 the thread `taxel-panel` alone. Times of a seek are from the request to the picture with its 5 s of raster.
 
 Peer: a hundred clients of its own, as nothing else speaks its protocol. Unit: pictures/s; cores; ms of a seek. Goal: 50
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
 
 SIDES, CHANGES_PER_S, OTHERS = (64,), 1e5, 99
-#: What the clients of the panel need.
+#: The modules that the clients of the panel need.
 PEERS = {"all of it": "websockets"}
 
 #: Bytes of a datagram: 19 changes and their values, 192 us of them.
@@ -58,7 +58,7 @@ def events(side: int, count: int, seconds: float) -> taxel.Events:
 
 
 def connected(panel: Panel) -> ClientConnection:
-    """Connect a client; it has asked for two pictures."""
+    """Connect a client that has requested two pictures."""
     from websockets.sync.client import connect  # noqa: PLC0415  an extra
 
     host = "{}:{}".format(*panel.address)
@@ -74,7 +74,7 @@ def connected(panel: Panel) -> ClientConnection:
 
 
 def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str, Any]:
-    """Count pictures of a good client while events come."""
+    """Count the pictures of a fast client while events arrive."""
     words = taxel.wire.encode(events(side, round(CHANGES_PER_S), 1.0))
     cut = [words[k : k + EACH] for k in range(0, len(words), EACH)]
     payload = scratch / f"{side}.pickle"
@@ -107,7 +107,7 @@ def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str
 
 
 def seeking(count: int, seeks: int, scratch: Path) -> dict[str, Any]:
-    """Seek in a recording of so many changes."""
+    """Seek in a recording of this number of changes."""
     path = scratch / "seek.mcap"
     taxel.convert(events(64, count, count / CHANGES_PER_S), path)
     size, random = path.stat().st_size, np.random.default_rng(1)

@@ -1,8 +1,8 @@
-"""What opening, listing, cutting and converting a large .mcap cost, in time and memory, beside decoding its datagrams.
+"""Time and memory of opening, listing, cutting and converting a large .mcap, beside decoding its datagrams.
 
 Datagrams of 280 words (1400 bytes), change and intensity alternating. Each step runs in a process of its own; its peak
-memory and CPU time are its result, the memory less that of one that only imports taxel. "listed" asks for notes,
-registers, losses and all else that stands beside the events, and reads no datagram.
+memory and CPU time are its result, the memory less that of a process that only imports taxel. "listed" reads notes,
+registers, losses and everything else besides the events, and no datagram.
 
 Peer: decoding the same datagrams. Unit: CPU seconds and MB of memory. Goal: opening, listing and cutting read no
 datagram, so that they are a small part of either.
@@ -24,7 +24,7 @@ from recording_write import BYTES, HEADER, datagrams
 
 from taxel import _core
 
-#: What each process runs, with the file's path as `path` and a folder as `folder`.
+#: The code of each process, with the file's path as `path` and a folder as `folder`.
 STEPS = {
     "imported": "",
     "opened": "taxel.open(path)",

@@ -1,8 +1,8 @@
-"""How much CPU writing a recording costs, beside the official Python library of MCAP.
+"""CPU time of writing a recording, beside the official Python library of MCAP.
 
 Datagrams of 280 words (1400 bytes) as the board sends them, change and intensity alternating, taxels at random (which
-packs badly). CPU time of the whole process, for ours writes in a thread of its own; files end with the disk in step
-(fsync, in which the CPU rests). "At 107 MB/s" is the sensor's worst case, paced as it comes.
+compresses badly). CPU time of the whole process, as ours writes in a thread of its own; each file ends with fsync, in
+which the CPU is idle. "At 107 MB/s" is the sensor's worst case, in real time.
 
 Peer: the official Python library of MCAP. Unit: MB per CPU second. Goal: not slower than the peer.
 """
@@ -106,7 +106,7 @@ def official(path: Path, messages: list[bytes], compression: str) -> Callable[[]
 
 
 def paced(path: Path, compression: str, seconds: float, stream: tuple[Any, ...]) -> float:
-    """Return how many cores writing costs at the worst case's pace, the pacing's own loop taken off."""
+    """Return the cores that writing needs at the worst case's rate, without those of the pacing loop."""
     arrived, number, offsets, raw = stream
     step = 2 * int(WORST / BYTES / 1000)
     total = min(len(arrived), int(WORST * seconds / BYTES))

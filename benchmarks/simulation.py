@@ -1,10 +1,10 @@
-"""How long 10 000 neurons take for 1000 inputs of 20 Hz and a second: on a grid, and exact in continuous time.
+"""CPU time of 10 000 neurons with 1000 inputs of 20 Hz for a second: on a grid, and exact in continuous time.
 
 All are connected to all: 2e8 synaptic events. The neuron is the one that every peer has: SRM0 with alpha kernel (two
 leaky integrators of 15 ms in a row), a fixed threshold of 0.3 mV, everything back to 0 at a spike. The peers step a
-grid, so an input acts from the next point on; NumPy is the obvious loop: each step adds the weights of the inputs that
-came. `continuous` has no grid: it computes each crossing to rounding, which no peer does. The neurons of the thesis
-(refractory time, threshold rise, inputs kept) stand beside it, with what they cost more. One thread, CPU time.
+grid, so an input acts from the next point on; NumPy is the straightforward loop: each step adds the weights of the
+inputs that spiked. `continuous` has no grid: it computes each crossing to rounding, which no peer does. The neurons of
+the thesis (refractory time, threshold rise, inputs kept) are listed with their additional cost. One thread, CPU time.
 
 Peer: NumPy, Brian2 and snnTorch. Unit: CPU seconds. Goal: at most as long as NumPy on the grid and as Brian2 in
 continuous time.
@@ -35,9 +35,9 @@ Weights = NDArray[np.float32]
 
 
 def problem(neurons: int, inputs: int, rng: np.random.Generator) -> tuple[Weights, SpikeTrains, SpikeTrains]:
-    """Return weights for some 35 output spikes a second, Poisson trains, and the same moved on to the 1 ms grid."""
+    """Return weights for some 35 output spikes a second, Poisson trains, and these moved to the 1 ms grid."""
     times = [np.sort(rng.uniform(0.0, LENGTH_MS, rng.poisson(20.0))) for _ in range(inputs)]
-    # Means and spread such that neurons fire some 35 times a second.
+    # Mean and spread are such that neurons fire some 35 times a second.
     weights = rng.normal(2.0 / inputs, 0.35 / np.sqrt(inputs), (neurons, inputs)).astype(np.float32)
     return (
         weights,
@@ -47,7 +47,7 @@ def problem(neurons: int, inputs: int, rng: np.random.Generator) -> tuple[Weight
 
 
 def numpy_loop(weights: Weights, trains: SpikeTrains) -> Callable[[], int]:
-    """Return the obvious loop over points of 1 ms; its state and weights are float32."""
+    """Return the straightforward loop over points of 1 ms; its state and weights are float32."""
     rows = np.ascontiguousarray(weights.T)
     times, numbers = trains.to_numpy()
     points = [numbers[times == k] for k in range(int(LENGTH_MS) + 1)]
@@ -73,7 +73,7 @@ def numpy_loop(weights: Weights, trains: SpikeTrains) -> Callable[[], int]:
 
 
 def brian2_network(weights: Weights, trains: SpikeTrains, step_ms: float) -> tuple[Callable[[], int], float]:
-    """Return Brian2's run, set up and compiled, and the seconds that that took."""
+    """Return Brian2's run, set up and compiled, and the seconds that setting it up took."""
     import brian2 as b2  # noqa: PLC0415  a peer need not be there
 
     begun = time.process_time()
@@ -109,7 +109,7 @@ def brian2_network(weights: Weights, trains: SpikeTrains, step_ms: float) -> tup
 
 
 def snntorch_loop(weights: Weights, trains: SpikeTrains, *, gathered: bool) -> Callable[[], int]:
-    """Return snnTorch's Alpha neuron a point of 1 ms; its two time constants must differ, so 15 and 14 ms."""
+    """Return snnTorch's Alpha neuron at steps of 1 ms; its two time constants must differ, so 15 and 14 ms."""
     import torch  # noqa: PLC0415  a peer need not be there
     from snntorch import Alpha  # noqa: PLC0415
 
@@ -134,7 +134,7 @@ def snntorch_loop(weights: Weights, trains: SpikeTrains, *, gathered: bool) -> C
 
 
 def run(*, quick: bool) -> dict[str, Any]:
-    """Measure; return seconds and ratios, and how many spikes each one found."""
+    """Measure; return seconds, ratios, and the number of output spikes of each."""
     neurons, inputs, rounds = (500, 100, 2) if quick else (10_000, 1000, 7)
     weights, trains, gridded = problem(neurons, inputs, np.random.default_rng(20))
     plain: dict[str, Any] = {
@@ -164,7 +164,7 @@ def run(*, quick: bool) -> dict[str, Any]:
                 runs[f"brian2, {step_ms:g} ms"], setup[f"brian2, {step_ms:g} ms"] = brian2_network(
                     weights, trains, step_ms
                 )
-            except (ImportError, AttributeError) as error:  # the latter from a NumPy that it does not know
+            except (ImportError, AttributeError) as error:  # AttributeError: a NumPy that the peer does not support
                 absent[f"brian2, {step_ms:g} ms"] = str(error)
         for name, gathered in (("rows gathered", True), ("dense", False)):
             try:

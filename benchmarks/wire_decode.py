@@ -1,4 +1,4 @@
-"""How fast bytes become events, beside a plain C loop, blocked NumPy, expelliarmus and faery (both EVT2).
+"""Decoding of bytes to events, beside a plain C loop, blocked NumPy, expelliarmus and faery (both EVT2).
 
 One core, 20 million words in the page cache. "Warm" columns have been written before, "fresh" ones come from NumPy in
 the call. Ours are the nouns' own columns (t int64, x and y uint16, p bool: 13 bytes an event, and 3 more for pairs); so
@@ -60,7 +60,7 @@ size_t decode(const uint8_t *b, size_t n, int64_t *t, uint16_t *x, uint16_t *y, 
 }
 """
 
-#: What each peer on EVT2 needs: faery writes the file.
+#: The modules that each peer on EVT2 needs: faery writes the file.
 EVT2 = {"faery, EVT2": "faery", "expelliarmus, EVT2": "faery expelliarmus"}
 
 
@@ -83,7 +83,7 @@ def streams(words: int) -> dict[str, bytes]:
 
 
 def numpy_blocked(data: bytes, columns: tuple[NDArray[Any], ...]) -> None:
-    """Decode clean changes as NumPy does it best: byte columns of a block, then a pass for each field."""
+    """Decode clean changes in NumPy's fastest way: byte columns of a block, then a pass for each field."""
     raw = np.frombuffer(data, np.uint8).reshape(-1, 5)
     t, x, y, p = columns
     planes, stamp16, high = np.empty((5, BLOCK), np.uint8), np.empty(BLOCK, np.uint16), np.empty(BLOCK, np.uint16)
@@ -109,7 +109,7 @@ def numpy_blocked(data: bytes, columns: tuple[NDArray[Any], ...]) -> None:
 
 
 def compiled(folder: Path) -> Callable[..., int] | None:
-    """Return the C loop, compiled here and now; None where there is no compiler."""
+    """Return the C loop, compiled on this machine; None without a compiler."""
     if shutil.which("cc") is None:
         return None
     (folder / "loop.c").write_text(C_LOOP)
@@ -218,7 +218,7 @@ def _c_order(columns: wire.Columns) -> tuple[NDArray[Any], ...]:
 def _agree(
     data: dict[str, bytes], columns: wire.Columns, blocked: tuple[NDArray[Any], ...], loop: Callable[..., int] | None
 ) -> None:
-    """See that all decode the same before anything is measured."""
+    """Check that all decode the same, before anything is measured."""
     expected = wire.decode(data["clean"])
     numpy_blocked(data["clean"], blocked)
     for ours, theirs in zip((expected.t, expected.x, expected.y, expected.p), blocked, strict=True):

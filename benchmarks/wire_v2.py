@@ -1,15 +1,15 @@
-"""How large version 2 of the wire is, and how fast it is decoded, beside version 1 with the same events.
+"""Size and decoding speed of version 2 of the wire, beside version 1 with the same events.
 
 Bytes an event: the same trip times go through a board of each version at 5208 frames/s (kind S, values included).
-What a board of version 2 sends beside events (heartbeats, states, totals) is counted apart. Scenes: every taxel in
+The other contents of version 2 (heartbeats, states, totals) are counted apart. Scenes: every taxel in
 every frame; a footfall, which is a picture that rolls from heel to toe, drawn by a seed (no recording); a ball
-dropped and pressed (the demo's scene of that seed), tared away from the noise.
+dropped and pressed (the demo's scene of that seed), with a tare.
 
 Decoding: checksums included, beside version 1's pairs of change and intensity; an event is a pair. Version 2 is always
 decoded a datagram at a time, each with its length before it; version 1 as one stream without datagrams, and a datagram
-at a time as a host receives it, with a list of lengths. In scenes a datagram has few events, so the second is what
-compares. Each is one call for all datagrams, which fills the same columns in place, as live pipelines use theirs again
-and again; beside it into new memory each time, where the kernel's first touch of each page is the larger part of few
+at a time as a host receives it, with a list of lengths. In scenes a datagram has few events, so compare with the
+second. Each is one call for all datagrams, which fills the same columns in place, as live pipelines use theirs again
+and again; beside it into new memory each time, where the kernel's page faults are the larger part for few
 events. Heartbeats, which version 1 does not know, are left out of what is decoded (in the drop 94 of 100 datagrams
 are empty): their numbers are then missing, which costs version 2 something, most in the drop. What they cost is stated
 beside.
@@ -36,13 +36,13 @@ from taxel.wire import FRAME_US, Registers
 
 SEED, TARE_MS = 20_261_121, 50.0
 
-#: Events to decode; fewer of the drop, whose frames are nearly all silent.
+#: Number of events to decode; less for the drop, whose frames are nearly all silent.
 DECODED = {"full array": 4_000_000, "footfall": 4_000_000, "drop": 300_000}
 
 #: Bytes of a datagram without events.
 EMPTY = 24
 
-#: Bytes an event against version 1 that were to be reached, at once and with a hold of 1 ms.
+#: Goals for bytes an event against version 1, sent at once and with a hold of 1 ms.
 GOALS = {"full array": (0.21, None), "footfall": (0.75, None), "drop": (1.05, 0.80)}
 
 Frames = list[NDArray[np.uint16]]
@@ -54,7 +54,7 @@ def full() -> Frames:
 
 
 def felt(acts: list[Any]) -> Frames:
-    """Return what the taxels hold frame by frame, from the start marker on, as a board of version 1 sends it."""
+    """Return the values of the taxels frame by frame, from the start marker on, as a board of version 1 sends them."""
     events = play([Silence(TARE_MS + 50.0), *acts], seed=SEED, tare_ms=TARE_MS).events
     start, stop = (t for t, _ in events.markers)
     held = np.zeros(4096, np.uint16)
@@ -89,14 +89,14 @@ def drop() -> Frames:
 
 
 def sent(frames: Frames, registers: Registers, **options: int) -> list[bytes]:
-    """Return the datagrams of a board that begins with what the first frame holds."""
+    """Return the datagrams of a board that starts with the values of the first frame."""
     board = Board(registers, version_2=Version2(**options))
     board.frame(frames[0])
     return [datagram for frame in frames[1:] for datagram in board.frame(frame)]
 
 
 def sizes(frames: Frames) -> dict[str, Any]:
-    """Return bytes an event: of version 1, and of version 2 by what they are for."""
+    """Return bytes an event: of version 1, and of version 2 by purpose."""
     one = sent(frames, Registers())
     changes = sum(map(len, one)) // 10
     found: dict[str, Any] = {"events": changes, "frames": len(frames) - 1, "version 1": 10.0}
@@ -114,7 +114,7 @@ def sizes(frames: Frames) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Stream:
-    """Hold datagrams one behind the other, how long each is, how many events they are, and the heartbeats left out."""
+    """Hold consecutive datagrams, their lengths, the number of their events, and of the heartbeats left out."""
 
     data: bytes
     lengths: NDArray[np.int64]
@@ -123,7 +123,7 @@ class Stream:
 
 
 def stream(frames: Frames, version: int, events: int) -> Stream:
-    """Return what a board sends of about so many events."""
+    """Return the datagrams of a board with about this number of events."""
     out, empty, count = [], [], 0
     board = Board(Registers(wire_version=version), version_2=Version2(states_us=0))
     board.frame(frames[0])

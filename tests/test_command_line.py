@@ -61,7 +61,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("record", "--compression", "x", "a.mcap"), '--compression is "x": must be none, lz4 or zstd'),
         (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an address or a name'),
         (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz": there are "5.2 kHz"'),
-        (("record", "there.mcap"), "there.mcap: exists already; say --overwrite, or name another"),
+        (("record", "there.mcap"), "there.mcap: exists already; give --overwrite, or name another"),
         (("record", "--trials", "3", "a.mcap"), "--trials without --length"),
         (("record",), "FILE is missing; see taxel record --help"),
         (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
@@ -99,7 +99,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("train", "walk.npz", "--labels", "labels.csv", "-o", "nowhere/x.json"), "nowhere: no such folder"),
         (
             ("train", "walk.npz", "--labels", "labels.csv", "-o", "there.json"),
-            "there.json: exists already; say --overwrite",
+            "there.json: exists already; give --overwrite",
         ),
         (("demo", "--noise", "0.1"), "--noise is 0.1 s: must be 0.5 to 86400"),
         (("study", "fig6.1", "--set", "kappa"), "--set kappa: must be KEY=VALUE"),

@@ -1,7 +1,7 @@
 """Check the types of the panel's page: its JSDoc by `tsc --strict` (`make lint`).
 
 Usage: python tools/page_types.py. Needs npm, or else PyPI's wheel of node; TypeScript is fetched once, into the virtual
-environment. Where neither can be had it says so and checks nothing.
+environment. If neither can be installed, it prints that the types were not checked, and succeeds.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ TSC = PLACE / "node_modules/typescript/bin/tsc"
 
 
 def succeeds(*command: str) -> bool:
-    """Run a command without a word; say whether it worked."""
+    """Run a command without its output; return whether it succeeded."""
     return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
 
@@ -29,7 +29,7 @@ def tool(name: str) -> str | None:
 
 
 def main() -> int:
-    """Fetch what lacks, run the compiler, return its status."""
+    """Install what is missing, run the compiler, return its status."""
     if not tool("npm") and not succeeds(sys.executable, "-m", "pip", "install", "--quiet", NODE):
         print("page: types not checked: no npm here, and its wheel could not be fetched")
         return 0
@@ -37,12 +37,12 @@ def main() -> int:
     if not npm or not node:
         print("page: types not checked: npm without node")
         return 0
-    kept = PLACE / TYPESCRIPT
-    if not kept.exists():
+    installed = PLACE / TYPESCRIPT
+    if not installed.exists():
         if not succeeds(npm, "install", "--silent", "--no-audit", "--no-fund", "--prefix", str(PLACE), TYPESCRIPT):
             print(f"page: types not checked: {TYPESCRIPT} could not be fetched")
             return 0
-        kept.touch()
+        installed.touch()
     return subprocess.run(
         [node, str(TSC), "-p", str(ROOT / "crates/taxel-panel/tsconfig.json")], check=False
     ).returncode

@@ -1,6 +1,6 @@
 """Make the tables of Rust, JavaScript and the docs from registers.toml (`make registers`).
 
-Usage: python tools/registers.py [ROOT]. Python reads Rust's table. A test holds the files against what this makes.
+Usage: python tools/registers.py [ROOT]. Python reads Rust's table. A test compares the files with what this script makes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from registers_source import OPERATOR, Table, parsed, read
 
 HEAD = "Made from registers.toml by tools/registers.py (`make registers`): edit that."
 OPPOSITE = {ast.LtE: ">", ast.Lt: ">=", ast.GtE: "<", ast.Gt: "<=", ast.Eq: "!=", ast.NotEq: "=="}
-#: What a rule may name beside the fields, and its unit.
+#: Names that a rule may use besides the fields, and their units.
 OF_THE_ARRAY = {"steps": "number", "driven_lines": "number", "sense_lines": "number"}
 
 
@@ -42,12 +42,12 @@ def value(node: ast.expr) -> str:
 
 
 def broken(node: ast.expr, *, inner: bool = False, equal: str = "==") -> str:
-    """Write when a rule does not hold: its negation, which says no more than it has to."""
+    """Write the condition under which a rule is broken: its negation, without needless brackets."""
     match node:
         case ast.BoolOp(op=op, values=values):
             word = " || " if isinstance(op, ast.And) else " && "
-            said = word.join(broken(part, inner=True, equal=equal) for part in values)
-            return f"({said})" if inner else said
+            condition = word.join(broken(part, inner=True, equal=equal) for part in values)
+            return f"({condition})" if inner else condition
         case ast.Compare(left=left, ops=[op], comparators=[right]):
             sign = OPPOSITE[type(op)]
             sign = {"==": equal, "!=": equal.replace("==", "!=")}.get(sign, sign) if equal != "==" else sign
@@ -56,7 +56,7 @@ def broken(node: ast.expr, *, inner: bool = False, equal: str = "==") -> str:
 
 
 def names(text: str) -> set[str]:
-    """Return what an expression names."""
+    """Return the names in an expression."""
     return {node.id for node in ast.walk(parsed(text)) if isinstance(node, ast.Name)}
 
 
@@ -85,8 +85,8 @@ def rust_preset(source: Table, preset: Table) -> str:
     """Write a preset as a constant."""
     entries = []
     for field in source["field"]:
-        held = preset["values"].get(field["name"], field["default"])
-        entries.append(f"{field['name']}: {str(bool(held)).lower() if field['unit'] == 'flag' else held},")
+        number = preset["values"].get(field["name"], field["default"])
+        entries.append(f"{field['name']}: {str(bool(number)).lower() if field['unit'] == 'flag' else number},")
     body = "\n            ".join(entries)
     return (
         f'    Preset {{\n        name: "{preset["name"]}",\n        sense_lines: {preset["sense_lines"]},\n'
@@ -110,9 +110,11 @@ def rust_rules(source: Table, *, warns: bool) -> str:
                 shown += "{}" + words
                 arguments.append(written)
         text = f'"{shown} (rule {rule["number"]})"'
-        found = f"({rule['number']}, format!(\n            {text},\n            {', '.join(arguments)}\n        ))"
-        give = f"warnings.push({found});" if warns else f"return Some({found});"
-        lines.append(f"    if {broken(parsed(rule['holds']))} {{\n        {give}\n    }}")
+        broken_rule = (
+            f"({rule['number']}, format!(\n            {text},\n            {', '.join(arguments)}\n        ))"
+        )
+        action = f"warnings.push({broken_rule});" if warns else f"return Some({broken_rule});"
+        lines.append(f"    if {broken(parsed(rule['holds']))} {{\n        {action}\n    }}")
     return "\n".join(lines)
 
 
@@ -122,8 +124,8 @@ def used(source: Table, *, warns: bool) -> list[str]:
     units = {field["name"]: field["unit"] for field in source["field"]} | OF_THE_ARRAY
     expressions = [rule["holds"] for rule in rules]
     expressions += [e for rule in rules for _, e, _ in template(rule["text"], units) if e]
-    named = set().union(*(names(e) for e in expressions))
-    return [name for name in units if name in named]
+    occurring = set().union(*(names(e) for e in expressions))
+    return [name for name in units if name in occurring]
 
 
 def rust_values(source: Table, *, warns: bool) -> str:
@@ -131,8 +133,8 @@ def rust_values(source: Table, *, warns: bool) -> str:
     fields = {field["name"] for field in source["field"]}
     lines = []
     for name in used(source, warns=warns):
-        given = f"registers.{name}" if name in fields else f"scanned.{name}"
-        lines.append(f"    let {name} = i64::from({given});")
+        origin = f"registers.{name}" if name in fields else f"scanned.{name}"
+        lines.append(f"    let {name} = i64::from({origin});")
     return "\n".join(lines)
 
 
@@ -143,7 +145,7 @@ def power_law(source: Table) -> list[int]:
 
 
 def rust_field(f: Table) -> str:
-    """Write where a field lies."""
+    """Write a field: its place in the registers, and its range."""
     return (
         f'    Field {{\n        name: "{f["name"]}",\n        manual: "{f["manual"]}",\n'
         f'        unit: "{f["unit"]}",\n        text: "{f["text"]}",\n        register: {f["register"]},\n'
@@ -153,7 +155,7 @@ def rust_field(f: Table) -> str:
 
 
 def as_formatted(text: str) -> str:
-    """Return Rust as the formatter has it."""
+    """Return Rust code as rustfmt formats it."""
     command = ["rustfmt", "--edition", "2024", "--config-path", str(Path(__file__).parents[1])]
     return subprocess.run(command, input=f"//! {HEAD}\n\n{text}", capture_output=True, text=True, check=True).stdout
 
@@ -163,7 +165,7 @@ def rust_table(source: Table) -> str:
     fields = source["field"]
     struct, defaults = [], []
     for field in fields:
-        # The manual's count is less one: as a name for the field it would be wrong by that.
+        # A field with an offset: the manual's value is less by it, so the manual's name is no alias for ours.
         rename = (
             ""
             if field["manual"] == field["name"] or field["offset"]
@@ -181,27 +183,27 @@ def rust_table(source: Table) -> str:
         here = [f for f in fields if f.get("register") == register]
         if not here:
             continue
-        parts, takes, mask = [], [], 0
+        parts, assignments, mask = [], [], 0
         for f in here:
             bits = 2 ** f["bits"] - 1
             mask |= bits << f["low"]
-            held = f"u32::from(self.{f['name']})" if rust_type(f) != "u32" else f"self.{f['name']}"
+            stored = f"u32::from(self.{f['name']})" if rust_type(f) != "u32" else f"self.{f['name']}"
             if f["offset"]:
-                held = f"({held}.wrapping_sub({f['offset']}) & {bits:#x})"
-            parts.append(held + (f" << {f['low']}" if f["low"] else ""))
+                stored = f"({stored}.wrapping_sub({f['offset']}) & {bits:#x})"
+            parts.append(stored + (f" << {f['low']}" if f["low"] else ""))
             cut = f"value >> {f['low']}" if f["low"] else "value"
             if f["bits"] < 32:
                 cut = f"({cut}) & {bits:#x}" if f["low"] else f"{cut} & {bits:#x}"
             if rust_type(f) == "bool":
-                taken = f"{cut} == 1"
+                decoded = f"{cut} == 1"
             elif f["offset"]:
-                taken = f"({cut}) as {rust_type(f)} + {f['offset']}"
+                decoded = f"({cut}) as {rust_type(f)} + {f['offset']}"
             else:
-                taken = cut if rust_type(f) == "u32" else f"({cut}) as {rust_type(f)}"
-            takes.append(f"                self.{f['name']} = {taken};")
+                decoded = cut if rust_type(f) == "u32" else f"({cut}) as {rust_type(f)}"
+            assignments.append(f"                self.{f['name']} = {decoded};")
         words.append(f"            {register} => {' | '.join(parts)},")
         masks.append(f"            {register} => {mask:#x},")
-        stores.append(f"            {register} => {{\n" + "\n".join(takes) + "\n            }")
+        stores.append(f"            {register} => {{\n" + "\n".join(assignments) + "\n            }")
     newline = "\n"
     return as_formatted(f"""use serde::{{Deserialize, Serialize}};
 
@@ -332,9 +334,11 @@ def javascript(source: Table) -> str:
         )
     presets = []
     for p in source["preset"]:
-        held = ", ".join(f"{name}: {value}" for name, value in p["values"].items())
+        entries = ", ".join(f"{name}: {value}" for name, value in p["values"].items())
         presets.append(
-            f'  {{ name: "{p["name"]}", sense_lines: {p["sense_lines"]}, values: {{ {held} }} }},'.replace("{  }", "{}")
+            f'  {{ name: "{p["name"]}", sense_lines: {p["sense_lines"]}, values: {{ {entries} }} }},'.replace(
+                "{  }", "{}"
+            )
         )
 
     def rules(*, warns: bool) -> str:
@@ -342,18 +346,18 @@ def javascript(source: Table) -> str:
         for rule in source["rule"]:
             if rule["warns"] != warns:
                 continue
-            said = ""
+            message = ""
             for before, expression, unit in template(rule["text"], units):
-                said += before
+                message += before
                 if expression:
                     written, words = formatted(expression, unit)
-                    said += f"${{{written}}}{words}"
+                    message += f"${{{written}}}{words}"
             condition = broken(parsed(rule["holds"]), equal="===")
             lines.append(
-                f"  if ({condition}) broken.push({{ rule: {rule['number']}, text: `{said} (rule {rule['number']})` }});"
+                f"  if ({condition}) broken.push({{ rule: {rule['number']}, text: `{message} (rule {rule['number']})` }});"
             )
-        named = ", ".join(used(source, warns=warns))
-        return f"  const {{ {named} }} = v;\n" + "\n".join(lines)
+        bound = ", ".join(used(source, warns=warns))
+        return f"  const {{ {bound} }} = v;\n" + "\n".join(lines)
 
     newline = "\n"
     return f"""// {HEAD}
@@ -442,10 +446,10 @@ def docs(source: Table) -> str:
     default = {f["name"]: f["default"] for f in source["field"]}
     presets = []
     for p in source["preset"]:
-        held = default | p["values"]
-        rate = 1e8 / (held["lines"] * held["line_period"])
-        cells = " | ".join(str(held[key]) for key in keys)
-        presets.append(f"| {p['name']} | {cells} | {held['wire_version']} | {rate:.2f} |")
+        values = default | p["values"]
+        rate = 1e8 / (values["lines"] * values["line_period"])
+        cells = " | ".join(str(values[key]) for key in keys)
+        presets.append(f"| {p['name']} | {cells} | {values['wire_version']} | {rate:.2f} |")
     law = source["power_law"]
     newline = "\n"
     return f"""<!-- {HEAD} -->
@@ -488,7 +492,7 @@ With `mechanoreceptor` set each taxel is the FA-1 afferent of 5.4.2, in whole nu
 is a table of {law["entries"]} entries, `round(ticks ** {law["exponent"]} * 2 ** {law["fraction_bits"]})`; larger values use the
 last entry. theta_0 is `threshold_rest` 1/1024; a spike raises the threshold by `threshold_jump * theta_0 / 256`, a quiet frame lowers
 it by `threshold_decay * theta_0 / 1024` while it lies above theta_0, else sets it to theta_0; both are rounded down. The first
-frame in this mode is taken as the state since ever, so it gives no event. An event is a spike: `Pol` is its sign, the intensity word the size of the
+frame in this mode counts as the state at all earlier times, so it has no event. An event is a spike: `Pol` is its sign, the intensity word the size of the
 integral in 1/1024, 65535 at most. If the queue is full, the spike is dropped and counted, and the afferent is
 reset as after any spike.
 """

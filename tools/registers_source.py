@@ -1,4 +1,4 @@
-"""Read registers.toml, for what is made from it: tables of Rust, JavaScript and the docs, and the RTL's package."""
+"""Read registers.toml, from which the tables of Rust, JavaScript and the docs, and the RTL's package are made."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-#: The operators of its arithmetic, which all languages write alike.
+#: The operators of its arithmetic, which are the same in all languages.
 OPERATOR = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
 
 Table = dict[str, Any]

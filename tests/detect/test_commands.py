@@ -300,9 +300,9 @@ def test_labels_that_lie_outside_are_left_out_and_said(folder: Path, trained: Pa
     arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--truth")
     code, out, error = call(capsys, *arguments, late, "--json")
     assert (code, json.loads(out)["score"]["missed"]) == (0, 0)
-    assert f"1 of the 13 events of {late} lie outside {folder / '9.npz'}" in error
+    assert f"1 of the 13 events of {late} left out: outside {folder / '9.npz'}" in error
     late.write_text("label,t_us\ncontact,3600000000\n")
-    assert "none of its 1 events lies within" in call(capsys, *arguments, late)[2]
+    assert "holds 1 event, none within" in call(capsys, *arguments, late)[2]
 
 
 def test_a_name_that_no_recording_has_is_listed(folder: Path, capsys, tmp_path: Path) -> None:
@@ -358,9 +358,9 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     code, out, _ = call(capsys, *arguments, *point, "--search", "--folds", 3, "-o", tmp_path / "c.json", *report)
     assert code == 0
     page = (tmp_path / "r" / "report.html").read_text()
-    held, own = page.index("On what was held out"), page.index("On its own training data")
+    held, own = page.index("On held-out data"), page.index("On its own training data")
     assert page.count("9.npz</td>", held, own) == page.count("9.npz</td>", own, page.index("The worst")) == 2
-    assert "on what was held out: whole recordings, 3 folds" in out
+    assert "on held-out data: whole recordings, 3 folds" in out
     assert "contact, chosen: tau 1.5" in out
     code, out, _ = call(capsys, *arguments, "-o", tmp_path / "d.json")
     assert "on its own training data" in out

@@ -36,7 +36,7 @@ def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path
     np.testing.assert_array_equal(taxel.open(file).events.to_numpy(), events.to_numpy())
     again = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert again.returncode == 2
-    said = f"taxel: {file}: exists already; say --overwrite, or name another"
+    said = f"taxel: {file}: exists already; give --overwrite, or name another"
     assert again.stderr.strip().splitlines() == [said]
 
 
@@ -87,7 +87,7 @@ def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> Non
     again = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert (again.returncode, again.stderr.strip()) == (
         2,
-        f"taxel: {tmp_path / 'step7.lsa'}: exists already; say --overwrite, or name another",
+        f"taxel: {tmp_path / 'step7.lsa'}: exists already; give --overwrite, or name another",
     )
 
 
@@ -151,7 +151,7 @@ def test_taxel_live_prints_a_line_a_detection_where_nobody_watches(tmp_path: Pat
         process.send_signal(signal.SIGINT)
         rest = process.stdout.read().splitlines()
     assert process.returncode == 0
-    told = re.compile(r" +\d+\.\d{4} s  touch +said -?\d+\.\d\d ms after it was known")
+    told = re.compile(r" +\d+\.\d{4} s  touch +output -?\d+\.\d\d ms after it was known")
     assert all(told.match(line) for line in lines), lines
     last = [line for line in rest if told.match(line)]
     assert rest[len(last)].startswith(f"{5 + len(last)} detections, "), rest
@@ -169,10 +169,10 @@ def test_taxel_live_says_which_taxels_its_tare_does_not_know(tmp_path: Path) -> 
         listening(process)
         play(presses(5), port)
         assert process.stderr is not None
-        said = next(line for line in process.stderr if "the tare knows" in line)
+        said = next(line for line in process.stderr if "the tare holds" in line)
         process.send_signal(signal.SIGINT)
         process.stderr.read()
-    assert said.startswith("taxel: the tare knows 1 of 16 taxels")
+    assert said.startswith("taxel: the tare holds 1 of 16 taxels")
 
 
 def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:

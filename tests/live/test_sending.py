@@ -183,7 +183,7 @@ def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
             line = json.loads(other.recv(65_536))
             told = process.stderr.read()
     assert set(line) == KEYS
-    assert f"taxel: 3 of 3 lines did not go to pipe:{pipe}: nobody reads" in told
+    assert f"taxel: lines not sent to pipe:{pipe}: 3 of 3: nobody reads" in told
     assert process.returncode == 3
     said = subprocess.run(
         command("live", "--panel", "--send", "udp:127.0.0.1:9"), capture_output=True, text=True, check=False

@@ -183,7 +183,7 @@ def test_a_trial_to_which_nothing_came_keeps_its_number_for_the_next(tmp_path: P
         with board(port):
             _, more = process.communicate(timeout=60)
     assert process.returncode == 0
-    assert nothing == f"taxel: {tmp_path / 'step1.mcap'}: nothing arrived at UDP {LOOPBACK}:{port}; not kept\n"
+    assert nothing == f"taxel: {tmp_path / 'step1.mcap'}: nothing arrived at UDP {LOOPBACK}:{port}; not saved\n"
     assert "nothing arrived" not in more
     trials = [tmp_path / "step1.mcap", tmp_path / "step2.mcap"]
     assert sorted(tmp_path.iterdir()) == trials

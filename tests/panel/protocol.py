@@ -126,7 +126,7 @@ def page_of_a_board(folder, *options):
     """A client of the command's panel, which hears an emulated board and holds its serial line."""
     port = str(free_port())
     with running("emulate", "--port", port, "--control", "0", *options, folder=folder) as emulated:
-        control = emulated.wait_for(r"commands are taken at (\S+)")
+        control = emulated.wait_for(r"commands are accepted at (\S+)")
         panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
         with running(*panel, folder=folder) as server:
             url = urlsplit(server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))

@@ -78,7 +78,7 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
     folder = tmp_path_factory.mktemp("live")
     port = str(free_port())
     with running("emulate", "--port", port, "--seed", "1", "--control", "0", folder=folder) as board:
-        control = board.wait_for(r"commands are taken at (\S+)")
+        control = board.wait_for(r"commands are accepted at (\S+)")
         panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
         with running(*panel, "--folder", str(folder), folder=folder) as server:
             url = server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
@@ -172,7 +172,7 @@ def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Pat
         running("emulate", "--port", port, "--control", "0", folder=tmp_path) as board,
         running("live", "--panel", "--port", port, "--host", "127.0.0.1", folder=tmp_path) as server,
     ):
-        control = board.wait_for(r"commands are taken at (\S+)")
+        control = board.wait_for(r"commands are accepted at (\S+)")
         page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
         shows(page, "where-info", "no control line")
         assert not page.get_by_label("Noise floor", exact=True).is_enabled()

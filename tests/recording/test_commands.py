@@ -76,7 +76,7 @@ def test_info_of_an_unfinished_file_says_so(walk: Path, tmp_path: Path) -> None:
 def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_path: Path) -> None:
     said = run("convert", walk, tmp_path / "walk.csv")
     assert said.returncode == 0
-    assert said.stdout.startswith(f"written to {tmp_path / 'walk.csv'}\n  not kept: ")
+    assert said.stdout.startswith(f"written to {tmp_path / 'walk.csv'}\n  lost: ")
     said = run("convert", walk, tmp_path / "walk.npz", "--json")
     assert json.loads(said.stdout)["lost"] == ["raw datagrams with their arrival times"]
     assert run("convert", walk, tmp_path / "p.npz", "--frames", "500").returncode == 0

@@ -269,7 +269,7 @@ def test_commands_are_answered_while_a_pipe_brings_nothing(tmp_path):
         board.stdin.write(b'{"rows": 5, "columns": 3, "rate": 100, "bits": 12}\n')
         board.stdin.flush()
         said = iter(board.stderr.readline, b"")
-        control = next(words.split()[-1].decode() for words in said if words.startswith(b"commands are taken"))
+        control = next(words.split()[-1].decode() for words in said if words.startswith(b"commands are accepted"))
         places = (control, str(line))
         for place in places:
             with Device(place, timeout=60) as device:

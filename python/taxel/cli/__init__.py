@@ -20,7 +20,7 @@ from taxel.cli._recordings import SET_HELP, assignments
 
 __all__ = ["SET_HELP", "App", "app", "assignments", "main"]
 
-#: What typer makes of words that cannot be a command line: the class is of its own copy of click.
+#: typer's error for a command line that cannot be parsed; the class belongs to its own copy of click.
 _UsageError: Any = typer.BadParameter.__base__
 
 
@@ -34,13 +34,13 @@ def _root(version: bool = typer.Option(False, "--version", help="Print the versi
 
 
 def main(arguments: list[str] | None = None) -> NoReturn:
-    """Run the command line; what the user got wrong ends in one line on stderr and an exit code."""
+    """Run the command line; a wrong input ends it with one line on stderr and an exit code."""
     try:
         code = app(arguments, prog_name="taxel", standalone_mode=False)
     except _UsageError as error:
         if not str(error.format_message()).startswith("Usage:"):
             _end(f"{_plain(error.format_message())}; see {_typed(error.ctx)} --help", WRONG_INPUT)
-        # No command at all: its help is what is wanted.
+        # Without a command, the help is printed.
         typer.echo(error.format_message(), err=True)
         sys.exit(WRONG_INPUT)
     except KeyboardInterrupt:
@@ -50,9 +50,9 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     except Error as error:
         _end(str(error), WRONG_INPUT)
     except (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError) as error:
-        _end(_said(error), WRONG_INPUT)
+        _end(_system_error(error), WRONG_INPUT)
     except OSError as error:
-        _end(_said(error), OUTSIDE)
+        _end(_system_error(error), OUTSIDE)
     except ImportError as error:
         if "pip install taxel[" not in str(error):
             raise
@@ -62,15 +62,17 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _plain(said: str) -> str:
-    """Return what is wrong with a word, without what the parser says of itself."""
-    said = re.sub(r"^Invalid value for '?(.+?)'?: ", r"\1: ", said)
-    said = re.sub(r"^Missing (?:argument|option|parameter) '(.+?)'.*", lambda m: f"{_upper(m[1])} is missing", said)
-    said = said.replace("Input should be", "must be").rstrip(".")
-    return re.sub(r"must be a valid (\w+)(, .*)?$", lambda m: f"must be {_NUMBERS.get(m[1], m[1])}", said)
+def _plain(message: str) -> str:
+    """Return a message of the parser in the form of our own messages."""
+    message = re.sub(r"^Invalid value for '?(.+?)'?: ", r"\1: ", message)
+    message = re.sub(
+        r"^Missing (?:argument|option|parameter) '(.+?)'.*", lambda m: f"{_upper(m[1])} is missing", message
+    )
+    message = message.replace("Input should be", "must be").rstrip(".")
+    return re.sub(r"must be a valid (\w+)(, .*)?$", lambda m: f"must be {_NUMBERS.get(m[1], m[1])}", message)
 
 
-#: What the parser calls numbers, in the words of our own messages.
+#: The parser's names of number types, and how our own messages name them.
 _NUMBERS = {"number": "a number", "integer": "a whole number"}
 
 
@@ -79,7 +81,7 @@ def _upper(word: str) -> str:
 
 
 def _typed(context: Any) -> str:
-    """Return the command that was being read, as it is typed."""
+    """Return the command that was being parsed, as it is typed."""
     return "taxel" if context is None else str(context.command_path)
 
 
@@ -88,7 +90,8 @@ def _end(text: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
-def _said(error: OSError) -> str:
+def _system_error(error: OSError) -> str:
+    """Return an error of the operating system as one line that names the place."""
     if isinstance(error, FileNotFoundError) and error.filename is not None:
         folder = Path(os.fsdecode(error.filename)).parent
         if not folder.is_dir():

@@ -1,4 +1,4 @@
-"""Commands that other distributions bring along, each by an entry point of the group ``taxel.commands``."""
+"""Commands of other distributions, each an entry point of the group ``taxel.commands``."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ ADDED = {"study": ("Run a study: a protocol, its parameters, a report.", 'pip in
 
 
 class WithAdded(TyperGroup):
-    """A group of commands that looks for the added ones only when they are asked for: that takes a while."""
+    """A group of commands that loads an added one only when it is used, because reading entry points takes a while."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Name all commands, the added ones among them."""
         return sorted({*super().list_commands(ctx), *ADDED})
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command; that of an added one which is not installed says how to get it."""
+        """Return a command; for an added one that is not installed, a command that prints how to install it."""
         if cmd_name in ADDED and cmd_name not in self.commands:
-            self.add_command(_found(cmd_name), cmd_name)
+            self.add_command(_loaded(cmd_name), cmd_name)
         return super().get_command(ctx, cmd_name)
 
 
-def _found(name: str) -> Any:
+def _loaded(name: str) -> Any:
     for point in entry_points(group="taxel.commands", name=name):
         return typer.main.get_command(point.load())
     about, install = ADDED[name]

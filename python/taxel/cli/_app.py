@@ -1,4 +1,4 @@
-"""The command that all others register themselves with."""
+"""The app that all commands register themselves with."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _Typed = TypeVar("_Typed")
 #: Exit codes: the user's input is wrong; board, socket or disk; stopped by Ctrl-C.
 WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
 
-#: Of commands that go on until they are stopped.
+#: Option of the commands that run until they are stopped.
 SecondsOption = Annotated[
     float | None, typer.Option(min=0.0, help="End after this many seconds; without it with Ctrl-C.")
 ]
 
 
 class _Command(TyperCommand):
-    """A command whose errors speak of what was typed, not of Python's arguments; an example is one line to copy."""
+    """A command whose errors name options as they are typed, not as Python's arguments; an example is one line."""
 
     def __init__(self, *args: Any, help: str | None = None, **options: Any) -> None:  # noqa: A002  typer's name
         paragraphs = [
@@ -46,11 +46,11 @@ class _Command(TyperCommand):
         try:
             return super().invoke(ctx)
         except Error as error:
-            raise type(error)(self._named(str(error))) from error
+            raise type(error)(self._as_typed(str(error))) from error
         except FileExistsError as error:
             if error.filename is None:
                 raise
-            replace = "say --overwrite, or name another" if "overwrite" in self._options() else "name another"
+            replace = "give --overwrite, or name another" if "overwrite" in self._options() else "name another"
             raise FileExistsError(errno.EEXIST, f"exists already; {replace}", error.filename) from error
 
     def _options(self) -> dict[str, str]:
@@ -61,9 +61,10 @@ class _Command(TyperCommand):
             if p.name is not None
         }
 
-    def _named(self, text: str) -> str:
+    def _as_typed(self, text: str) -> str:
+        """Return an error's text with the option in place of Python's argument."""
         options = self._options()
-        # Of the board's registers only a preset can be typed.
+        # The argument `registers` can be typed as a preset only.
         options |= {"registers": options["preset"]} if "preset" in options else {}
         first = re.match(r"(\w+)(?=: | is )", text)
         if first and first[1] in options:
@@ -99,7 +100,7 @@ app = App(
 
 
 def with_typed(options: type[_Typed]) -> Callable[[Callable[[_Typed], None]], Callable[..., None]]:
-    """Let a command that is written for a dataclass of what is typed have its fields as arguments and options."""
+    """Return a decorator that gives a command the fields of a dataclass as its arguments and options."""
 
     def decorate(work: Callable[[_Typed], None]) -> Callable[..., None]:
         command = with_options(options)(work)

@@ -1,4 +1,4 @@
-"""What the commands that receive from a board have in common."""
+"""Options and output that the commands that receive from a board share."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ __all__ = [
     "rest_of",
 ]
 
-#: How often the display is drawn anew, and the end checked, s.
+#: Interval at which the display is redrawn and the end is checked, s.
 REDRAW_S = 0.1
 
 
@@ -74,42 +74,42 @@ FromOption = Annotated[str | None, live_option("remote", "--from", metavar="ADDR
 CongestionOption = Annotated[
     str | None,
     typer.Option(
-        help="With --from, where this computer is too slow: block (the bridge waits) or drop (datagrams are lost and "
+        help="With --from, if this computer is too slow: block (the bridge waits) or drop (datagrams are lost and "
         "counted). Default: block with --record or --readout, else drop."
     ),
 ]
 
 
 def remote(
-    address: str | None, congestion: str | None, *, keeps: bool
+    address: str | None, congestion: str | None, *, lossless: bool
 ) -> contextlib.AbstractContextManager[Remote | None]:
-    """Return the receiver of another computer's board, where one is named."""
+    """Return the receiver of another computer's board; `lossless`: it blocks by default, else it drops."""
     if address is None:
         if congestion is not None:
             raise ProblemError("--congestion belongs to a board of another computer: give --from ADDRESS")
         return contextlib.nullcontext()
-    return Remote(address, congestion=congestion or ("block" if keeps else "drop"))
+    return Remote(address, congestion=congestion or ("block" if lossless else "drop"))
 
 
-def rest_of(said: str | None) -> Tare | float | None:
-    """Return the tare that --tare names: a file, or how long to take a fresh one, s."""
-    if said is None:
+def rest_of(value: str | None) -> Tare | float | None:
+    """Return what --tare names: the tare of a file, or how long to take a fresh one, s."""
+    if value is None:
         return None
     try:
-        seconds = float(said)
+        seconds = float(value)
     except ValueError:
-        return Tare.load(said)
+        return Tare.load(value)
     if not 1e-6 <= seconds <= 3600:
-        raise ProblemError(f"--tare {said}: must be seconds from 1e-6 to 3600, or a file")
+        raise ProblemError(f"--tare {value}: must be seconds from 1e-6 to 3600, or a file")
     return seconds
 
 
-#: Words outside the array are not damage, but another array, from so many and from this share of all on.
+#: From this number and this share of all words on, words outside the array mean that the board has another array.
 _OUTSIDE, _OUTSIDE_SHARE = 100, 0.01
 
 
 def outside(counters: dict[str, Any], array: Array) -> str | None:
-    """Return a warning where the board has more taxels than `array`; None where it has not."""
+    """Return a warning if the board has more taxels than `array`, else None."""
     first, second = counters["wire"], counters["wire_v2"]
     beyond = first["outside"] + second["outside"]
     words = first["words"] + second["events"] + second["states"] + second["outside"]
@@ -120,25 +120,25 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
 
 
 def exit_code(summary: Summary, array: Array) -> int:
-    """Return the exit code for what came and what was lost."""
+    """Return the exit code for what was received and lost."""
     unsent = any(one["lost"] for one in summary.counters["sent"])
     if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent:
         return OUTSIDE
     return WRONG_INPUT if outside(summary.counters, array) else 0
 
 
-def _bridged(counted: dict[str, Any] | None) -> list[tuple[str, str, str]]:
+def _bridged(counts: dict[str, Any] | None) -> list[tuple[str, str, str]]:
     """Return the rows of the table on the connection to another computer."""
-    if counted is None:
+    if counts is None:
         return []
-    if counted["ended"]:
+    if counts["ended"]:
         state = "ended there; waiting for another"
-    elif counted["heard"]:
+    elif counts["heard"]:
         state = "connected"
     else:
         state = "SILENT: the other computer, or the network to it, is gone; waiting"
-    lost = f"{counted['missing']:,} on the way, {counted['dropped'] + counted['dropped_by_kernel']:,} there"
-    clock = counted["clock"]
+    lost = f"{counts['missing']:,} on the way, {counts['dropped'] + counts['dropped_by_kernel']:,} there"
+    clock = counts["clock"]
     compared = "not compared yet"
     if clock is not None:
         ahead, within = (clock[name] / 1e6 for name in ("ahead_ns", "within_ns"))
@@ -163,7 +163,7 @@ def asked_to_end() -> Iterator[threading.Event]:
 
 
 def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
-    """Return rates since `before`, totals and losses, as rows that do not move about."""
+    """Return rates since `before`, totals and losses, as rows whose places stay the same."""
     passed = max(now["seconds"] - before["seconds"], 1e-9)
 
     def rate(total: float, earlier: float) -> str:

@@ -13,25 +13,25 @@ from taxel._core import Error
 
 __all__ = ["noting"]
 
-#: How often it checks whether the recording has ended, s.
-_LOOK_S = 0.1
+#: Interval at which the end of the recording is checked, s.
+_POLL_S = 0.1
 
 
 @contextlib.contextmanager
-def noting(write: Callable[[str], None], tell: Callable[[str], None]) -> Iterator[str]:
-    """Hand what is typed to `write` until the block ends: a key at once on a terminal, else a line when it is whole.
+def noting(write: Callable[[str], None], report: Callable[[str], None]) -> Iterator[str]:
+    """Pass what is typed to `write` until the block ends: on a terminal each key at once, else each complete line.
 
     Parameters
     ----------
     write : function
         Takes the label.
-    tell : function
+    report : function
         Takes one line for the user: the note, or why it was not written.
 
     Yields
     ------
     str
-        How to write a note, for the user; "" where nobody can type.
+        How to write a note, for the user; "" without an input that can be typed on.
     """
     try:
         source = sys.stdin.fileno()
@@ -46,7 +46,7 @@ def noting(write: Callable[[str], None], tell: Callable[[str], None]) -> Iterato
         return
     over = threading.Event()
     with _by_key(source) if keys else contextlib.nullcontext():
-        thread = threading.Thread(target=_read, args=(source, keys, over, write, tell), daemon=True)
+        thread = threading.Thread(target=_read, args=(source, keys, over, write, report), daemon=True)
         thread.start()
         try:
             yield "a key writes a note" if keys else "a line on standard input writes a note"
@@ -56,34 +56,34 @@ def noting(write: Callable[[str], None], tell: Callable[[str], None]) -> Iterato
 
 
 def _read(
-    source: int, keys: bool, over: threading.Event, write: Callable[[str], None], tell: Callable[[str], None]
+    source: int, keys: bool, over: threading.Event, write: Callable[[str], None], report: Callable[[str], None]
 ) -> None:
-    waiting = b""
+    pending = b""
     while not over.is_set():
-        if not select.select([source], [], [], _LOOK_S)[0]:
+        if not select.select([source], [], [], _POLL_S)[0]:
             continue
         try:
             typed = os.read(source, 4096)
         except OSError:
             return
-        waiting += typed
+        pending += typed
         if keys:
-            labels, waiting = _keys(waiting.decode("utf-8", "replace")), b""
+            labels, pending = _keys(pending.decode("utf-8", "replace")), b""
         else:
-            *lines, waiting = waiting.split(b"\n") if typed else (waiting, b"")
+            *lines, pending = pending.split(b"\n") if typed else (pending, b"")
             labels = [label for line in lines if (label := line.decode("utf-8", "replace").strip())]
         for label in labels:
             try:
                 write(label)
-                tell(f"noted: {label}")
+                report(f"noted: {label}")
             except (Error, OSError) as error:
-                tell(f"not noted: {error}")
+                report(f"not noted: {error}")
         if not typed:
             return
 
 
 def _keys(typed: str) -> list[str]:
-    """Return a label for each key: its letter, "mark" for space and return; arrows and the like give none."""
+    """Return a label for each key: its letter, "mark" for space and return; none for arrow keys and the like."""
     if typed.startswith("\x1b"):
         return []
     return [
@@ -95,7 +95,7 @@ def _keys(typed: str) -> list[str]:
 
 @contextlib.contextmanager
 def _by_key(source: int) -> Iterator[None]:
-    """Let a terminal give each key at once, without showing it; Ctrl-C works as before."""
+    """Let a terminal pass each key at once, without showing it; Ctrl-C works as before."""
     import termios  # noqa: PLC0415  Unix only
     import tty  # noqa: PLC0415
 

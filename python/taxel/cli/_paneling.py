@@ -24,7 +24,7 @@ OpenOption = Annotated[bool, typer.Option("--open/--no-open", help="Open the pan
 
 
 def announce(panel: Panel, opens: bool, console: Console) -> None:
-    """Print the panel's address, warn where other machines can reach it, and open it."""
+    """Print the panel's address, warn if other machines can reach it, and open it."""
     host = panel.address[0]
     if not ipaddress.ip_address(host).is_loopback:
         console.print(

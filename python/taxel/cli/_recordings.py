@@ -1,4 +1,4 @@
-"""What the commands that work on recordings have in common."""
+"""Options and steps that the commands that work on recordings share."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import typer
 
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._array import geometry, of_array
 from taxel.spikes import to_ms
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
     from taxel.recording import Recording
     from taxel.tare import Tare
 
-#: A rest ends so long before the first label, and lasts so long at least, us.
+#: How long before the first label the rest ends, and how long it must last at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
-#: Of the taxels that a recording has events of, so many may lack a rest without a word: the few that woke late.
+#: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
 TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or seconds at rest at the beginning of the recording."
@@ -36,7 +37,7 @@ SET_HELP = "KEY=VALUE: set a parameter to a value (TOML); a dotted key names a n
 
 
 def assignments(settings: list[str]) -> dict[str, Any]:
-    """Return the values of ``--set KEY=VALUE``; a VALUE that is no TOML is a text."""
+    """Return the values of ``--set KEY=VALUE``; a VALUE that is not TOML is text."""
     values = {}
     for one in settings:
         key, equals, value = one.partition("=")
@@ -57,43 +58,43 @@ def encoder_of(name: str | None, settings: list[str]) -> Encoder:
     return Encoder.from_json(parameters({**assignments(settings), **({"name": name} if name else {})}))
 
 
-def tare_of(given: str | None, recording: Recording) -> Tare | None:
-    """Return the tare that ``--tare`` names: a file, or so many seconds at the beginning of the recording.
+def tare_of(value: str | None, recording: Recording) -> Tare | None:
+    """Return the tare that ``--tare`` names: a file, or a number of seconds at the beginning of the recording.
 
-    The stretch ends early where the board marked the start of the recording, as a board that was tared does. One
-    longer than half of the recording is refused: hardly all of that was rest.
+    The rest ends early where the board marked the start of the recording, as a board that was tared does. A rest
+    longer than half of the recording is refused, because the sensor was hardly at rest for all of it.
     """
     from taxel.events import Events  # noqa: PLC0415
     from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
     from taxel.tare import Tare  # noqa: PLC0415
 
-    if given is None:
+    if value is None:
         return None
     try:
-        seconds = float(given)
+        seconds = float(value)
     except ValueError:
-        return Tare.load(given)
+        return Tare.load(value)
     if not 0 < seconds < np.inf:
-        raise ProblemError(f"--tare {given}: must be seconds above 0, or a file")
+        raise ProblemError(f"--tare {value}: must be seconds above 0, or a file")
     source = recorded(recording)
     if not len(source):
         raise ProblemError(f"{recording.path}: holds nothing to take a tare from")
     first, last = int(source.t[0]), int(source.t[-1])
     if seconds * 2e6 > last - first:
         raise ProblemError(
-            f"--tare {given}: more than half of {recording.path}, which lasts {(last - first) / 1e6:g} s; "
+            f"--tare {value}: more than half of {recording.path}, which lasts {(last - first) / 1e6:g} s; "
             "give the seconds at its beginning in which nothing was touched"
         )
     stop = first + int(seconds * 1e6)
     if isinstance(source, Events):
         stop = min([stop, *(t for t, start in source.markers if start and t > first)])
-    return _taken(recording, source, stop)
+    return _measured(recording, source, stop)
 
 
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
-    """Return the tare of what lies before a recording's first label, or before the board marks its start.
+    """Return the tare of the time before a recording's first label, or before the board's start marker.
 
-    A label that a person set may come late, so the rest ends a little earlier.
+    A label that a person set may be late, so the rest ends a little earlier.
     """
     from taxel.events import Events  # noqa: PLC0415
     from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
@@ -108,11 +109,11 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
         raise ProblemError(
             f"{recording.path}: holds {what}, from which to take the taxels' rest; give --tare SECONDS or --tare FILE"
         )
-    return _taken(recording, source, min(ends))
+    return _measured(recording, source, min(ends))
 
 
-def _taken(recording: Recording, source: Events | Frames, stop_us: int) -> Tare:
-    """Return the rest before a time; warn of taxels whose first event comes after it: encoders ignore them."""
+def _measured(recording: Recording, source: Events | Frames, stop_us: int) -> Tare:
+    """Return the rest before a time; warn of taxels whose first event is later, which encoders ignore."""
     from taxel.events import Events  # noqa: PLC0415  the command line starts quickly
     from taxel.tare import Tare  # noqa: PLC0415
 
@@ -125,7 +126,7 @@ def _taken(recording: Recording, source: Events | Frames, stop_us: int) -> Tare:
             warnings.warn(
                 f"{recording.path}: the rest of {unknown} of {np.count_nonzero(present)} taxels is not known, as none "
                 f"of their changes lies in its first {to_ms(stop_us - int(source.t[0])):g} ms: their events are left "
-                "out; record from before the board starts, which tells all taxels then, or give --tare FILE",
+                "out; start the recording before the board, which then sends all values, or give --tare FILE",
                 stacklevel=2,
             )
     return tare
@@ -140,32 +141,32 @@ def span_us(recording: Recording) -> tuple[int, int]:
 
 
 def new_report(folder: Path) -> Path:
-    """Return the page of a report in a folder, which is made."""
+    """Return the path of a report's page in a folder, which is created."""
     folder.mkdir(parents=True, exist_ok=True)
     return folder / "report.html"
 
 
-def references(given: str | None, option: str, recordings: Sequence[Recording]) -> list[dict[str, NDArray[np.int64]]]:
+def references(source: str | None, option: str, recordings: Sequence[Recording]) -> list[dict[str, NDArray[np.int64]]]:
     """Return the reference events of each recording: from a table, or its own notes (a note's text is the label).
 
-    A table names recordings by path, file name or stem; one that it does not name is one in which nothing happened,
-    unless the table also names one that is not there.
+    A table names recordings by path, file name or stem; in one that it does not name nothing happened, unless the
+    table also names a recording that is not there.
     """
     from taxel.labels import Labels  # noqa: PLC0415  the command line starts quickly
 
-    if given is None or given == "notes":
+    if source is None or source == "notes":
         return [_notes(recording) for recording in recordings]
-    table = Labels(given)
+    table = Labels(source)
     if len(recordings) > 1 and any(not row.recording for row in table.rows):
         raise ProblemError(
-            f"{option} {given}: names no recording, and there are {len(recordings)}; must have the column recording"
+            f"{option} {source}: names no recording, and there are {len(recordings)}; must have the column recording"
         )
     unnamed = [str(recording.path) for recording in recordings if table.named(recording.path) is None]
     known = {table.named(recording.path) for recording in recordings}
     others = [name for name in table.recordings if name not in known]
     if unnamed and (others or len(unnamed) == len(recordings)):
         names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
-        raise ProblemError(f"{option} {given}: names no event in {', '.join(unnamed)}; {names}")
+        raise ProblemError(f"{option} {source}: names no event in {', '.join(unnamed)}; {names}")
     return [_within(table, recording, option) for recording in recordings]
 
 
@@ -182,27 +183,27 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
     from taxel.recording import kind_of_file  # noqa: PLC0415  the command line starts quickly
 
     first, last = span_us(recording)
-    found = table.of(recording)
-    inside = {label: t[(t >= first) & (t <= last + 1_000_000)] for label, t in found.items()}
-    total = sum(map(len, found.values()))
-    lost = total - sum(map(len, inside.values()))
+    events = table.of(recording)
+    inside = {label: t[(t >= first) & (t <= last + 1_000_000)] for label, t in events.items()}
+    total = sum(map(len, events.values()))
+    outside = total - sum(map(len, inside.values()))
     span = f"{recording.path} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
-    if total and lost == total:
-        raise ProblemError(f"{option} {table.path}: none of its {total} events lies within {span}")
+    if total and outside == total:
+        raise ProblemError(f"{option} {table.path}: holds {counted(total, 'event')}, none within {span}")
     if recording.clock is None and any(row.at_ns for row in table.rows):
         warnings.warn(
-            f"the {kind_of_file(recording.kind)} keeps no arrival times, so host_ns cannot settle by how many turns of "
-            f"the board's clock (6.5536 s) {table.path} is ahead of it: times are taken as they are",
+            f"the {kind_of_file(recording.kind)} holds no arrival times, so host_ns cannot show by how many periods of "
+            f"the board's clock (6.5536 s) {table.path} is ahead of it: its times are used unchanged",
             stacklevel=2,
         )
-    if lost:
-        warnings.warn(f"{lost} of the {total} events of {table.path} lie outside {span}: left out", stacklevel=2)
+    if outside:
+        warnings.warn(f"{outside} of the {total} events of {table.path} left out: outside {span}", stacklevel=2)
     return inside
 
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Show what is being done, and warnings as single lines; on stderr, so that results can be piped."""
+    """Show the current step, and warnings as single lines; on stderr, so that results can be piped."""
     from rich.console import Console  # noqa: PLC0415  the command line starts quickly
 
     console = Console(stderr=True)
@@ -219,14 +220,14 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
 
 
 def open_recording(path: Path, array: str | None = None) -> Recording:
-    """Open a file with the sensor of ``--array``; imported late."""
+    """Open a file with the sensor of ``--array``."""
     from taxel import recording  # noqa: PLC0415  the command line starts quickly
 
     return of_array(recording.open_recording(path, array=None if array is None else geometry(array)), array)
 
 
 def of_source(recording: Recording, name: str | None) -> Recording:
-    """Return the source that ``--source`` names, or the recording where it names none."""
+    """Return the source that ``--source`` names; without a name the recording itself."""
     if name is None:
         return recording
     sources = recording.sources

@@ -26,7 +26,7 @@ ToOption = Annotated[
 SpikesOption = Annotated[str | None, typer.Option("--encoder", help="With --to: show the spikes of this encoder too.")]
 SpikesSetOption = Annotated[list[str] | None, typer.Option("--set", help=f"Set a parameter of --encoder. {SET_HELP}")]
 
-#: Names of what is counted, where the key is not one.
+#: Nouns for the keys of the counts that are not their own noun.
 _NAMES = {"curves": "times of the curves"}
 
 

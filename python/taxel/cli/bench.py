@@ -16,13 +16,14 @@ from typing import Annotated, Any, BinaryIO
 import typer
 
 from taxel._base.files import write_whole
+from taxel._base.messages import counted
 from taxel._base.provenance import Sources, installed_sources
 from taxel._core import ProblemError
 from taxel.cli._app import app
 
 __all__ = ["bench", "stale_results"]
 
-#: Set for benchmarks where peers that need minutes are waited for (benchmarks/_peer.py).
+#: Set by --peers: benchmarks then wait for peers that need minutes (benchmarks/_peer.py).
 _PATIENT = "TAXEL_BENCH_PEERS"
 
 
@@ -34,7 +35,7 @@ def bench(
     ),
     quick: Annotated[bool, typer.Option(help="Run few rounds, as a test; writes no result.")] = False,
     peers: Annotated[
-        bool, typer.Option("--peers", help="Wait for peers that need minutes, and keep their times for this processor.")
+        bool, typer.Option("--peers", help="Wait for peers that need minutes, and save their times for this processor.")
     ] = False,
     stale: Annotated[
         bool, typer.Option("--stale", help="List the results that are older than a change in what they measure.")
@@ -62,9 +63,9 @@ def bench(
     if changed:
         raise ProblemError(
             f"{', '.join(changed[:3])}{' ...' * (len(changed) > 3)}: changed since the last commit, "
-            "which a result names; commit first, or say --quick"
+            "which a result names; commit first, or give --quick"
         )
-    # What benchmarks share lies beside them, in files that begin with an underscore.
+    # The modules that benchmarks share lie in the same folder; their names begin with an underscore.
     sys.path.insert(0, str(folder.resolve()))
     if peers:
         os.environ[_PATIENT] = "1"
@@ -92,29 +93,29 @@ def _sources(folder: Path) -> Sources:
 
 
 def stale_results(folder: Path, names: Sequence[str]) -> dict[str, list[str]]:
-    """Return the results that are older than a change in what they measure, and what has changed of each."""
+    """Return the results that are older than a change in what they measure, with the changed parts of each."""
     sources = _sources(folder)
-    found = {}
+    stale = {}
     for name in names:
         place = folder / "results" / f"{name}.json"
         before = json.loads(place.read_text(encoding="utf-8")).get("made_of") if place.exists() else None
         now = sources.parts(name)
         if before is None:
-            found[name] = ["its sources were not recorded" if place.exists() else "no result"]
+            stale[name] = ["its sources were not recorded" if place.exists() else "no result"]
         elif before != now:
-            found[name] = sorted(part for part in before.keys() | now.keys() if before.get(part) != now.get(part))
-    return found
+            stale[name] = sorted(part for part in before.keys() | now.keys() if before.get(part) != now.get(part))
+    return stale
 
 
 def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
-    found = stale_results(folder, names)
-    for name, parts in found.items():
+    stale = stale_results(folder, names)
+    for name, parts in stale.items():
         typer.echo(f"{name}: {', '.join(parts)}")
-    typer.echo(f"{len(found)} of {len(files)} results are stale" if found else "no result is stale")
+    typer.echo(f"{counted(len(stale), 'stale result')} of {len(files)}" if stale else "no result is stale")
 
 
 def _changed(folder: Path) -> list[str]:
-    """Return the files of the checkout that differ from its last commit, but for results."""
+    """Return the files of the checkout that differ from its last commit, without the results."""
     status = subprocess.run(
         ["git", "status", "--porcelain", "--untracked-files=no", "--", ":/", f":!{folder}/results"],
         capture_output=True,
@@ -146,6 +147,6 @@ def _table(stem: str, result: dict[str, Any]) -> str:
         f"  {key}: {value:.3g}" if isinstance(value, float) else f"  {key}: {value}" for key, value in ratios.items()
     ]
     left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
-    kept = [f"  kept, not measured now: {peer}: of {when}" for peer, when in result.get("kept", {}).items()]
+    saved = [f"  saved, not measured in this run: {peer}: of {when}" for peer, when in result.get("kept", {}).items()]
     head = f"{stem}: ratios (ours over the peer's, above 1 is faster); {result['took_s']:g} s"
-    return "\n".join([head, *rows, *left_out, *kept])
+    return "\n".join([head, *rows, *left_out, *saved])

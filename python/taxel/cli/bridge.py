@@ -1,4 +1,4 @@
-"""``taxel bridge``: a board for other computers."""
+"""``taxel bridge``: publish a board to other computers."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from rich.console import Console, Group
 from rich.live import Live as Display
 from rich.text import Text
 
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import SecondsOption, app
 from taxel.cli._array import geometry
@@ -71,14 +72,14 @@ def bridge(
 
     On the other computer, taxel live and taxel record receive the board with --from zenoh:HOST:PORT/NAME. The bridge
     listens on loopback unless --listen names another address; what it publishes is neither encrypted nor protected by a
-    password. It needs the wheel taxel-bridge (make bridge). Exit code 3: nothing came, or something was lost here after
-    it had arrived.
+    password. It needs the wheel taxel-bridge (make bridge). Exit code 3: nothing was received, or something was lost
+    here after it had arrived.
 
     Example: taxel bridge --port 5208 --name left --listen 192.168.1.5:7447
     """
     if readout is None and tare is not None:
         raise ProblemError("--tare belongs to a readout: give --readout FILE")
-    heard = None if readout is None else Readout.load(readout)
+    trained = None if readout is None else Readout.load(readout)
     console = Console(stderr=True, quiet=as_json)
     with (
         Live(
@@ -87,7 +88,7 @@ def bridge(
             array=None if array is None else geometry(array),
             registers=preset,
             differences=differences,
-            readout=heard,
+            readout=trained,
             tare=rest_of(tare),
             record=record,
         ) as live,
@@ -105,7 +106,7 @@ def bridge(
         console.print(f"listening on {live.place}; Ctrl-C ends")
         with contextlib.suppress(KeyboardInterrupt):
             _watch(live, published, seconds, console)
-        # What came is published before the end is told.
+        # Everything that was received is published before the end is announced.
         summary = live.stop()
         counts = published.counts
     if as_json:
@@ -113,48 +114,49 @@ def bridge(
         typer.echo(json.dumps(asdict(summary) | {"path": path, "published": counts}))
     else:
         sent = counts["block"]["sent"] + counts["drop"]["sent"]
-        typer.echo(f"{summary.counters['capture']['datagrams']} datagrams came, {sent} parcels were sent on")
+        received = counted(summary.counters["capture"]["datagrams"], "datagram")
+        typer.echo(f"{received} received, {counted(sent, 'parcel')} published")
         typer.echo(summary.verdict)
     raise typer.Exit(exit_code(summary, live.array))
 
 
 def _announce(place: str, name: str, console: Console) -> None:
-    """Say where it is heard, and warn where others can reach it."""
+    """Print the address for receivers, and warn if other computers can reach it."""
     host = place.rpartition(":")[0].strip("[]")
     try:
-        alone = ipaddress.ip_address(host).is_loopback
+        loopback = ipaddress.ip_address(host).is_loopback
     except ValueError:
-        alone = host == "localhost"
-    if not alone:
+        loopback = host == "localhost"
+    if not loopback:
         console.print(
-            f"warning: whoever reaches {place} can listen, and the way there is not encrypted: "
-            "only on a network that you trust, or through a tunnel",
+            f"warning: every computer that reaches {place} can receive the board, and the connection is not encrypted: "
+            "use it on a network that you trust, or through a tunnel",
             soft_wrap=True,
         )
     if host in ("0.0.0.0", "::"):
-        # That says all of this computer's addresses, and is none of them.
+        # These stand for all addresses of this computer; other computers need one of them.
         place = f"HOST:{place.rpartition(':')[2]}"
         name += ", HOST being this computer's name or address"
-    console.print(f"hear it with --from zenoh:{place}/{name}", soft_wrap=True, highlight=False)
+    console.print(f"receive it with --from zenoh:{place}/{name}", soft_wrap=True, highlight=False)
 
 
 def _watch(live: Live, published: Bridge, seconds: float | None, console: Console) -> None:
-    """Show what comes and who listens until the time is over."""
+    """Show what is received and which receivers are connected, until the time is over."""
     with Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True) as display:
         before = live.counters
         while seconds is None or before["seconds"] < seconds:
-            said = live.next(REDRAW_S)
-            while said is not None:
-                said = live.next(0.0)
+            detection = live.next(REDRAW_S)
+            while detection is not None:
+                detection = live.next(0.0)
             now = live.counters
             if now["seconds"] - before["seconds"] >= REDRAW_S:
-                display.update(Group(counters_table(before, now), Text(_listeners(published.counts))))
+                display.update(Group(counters_table(before, now), Text(_receivers(published.counts))))
                 before = now
 
 
-def _listeners(counts: dict[str, dict[str, Any]]) -> str:
-    said = []
+def _receivers(counts: dict[str, dict[str, Any]]) -> str:
+    connected = []
     for what, row in (("recorders", counts["block"]), ("viewers", counts["drop"])):
         if row["heard"]:
-            said.append(f"{what} listen: {row['sent']:,} parcels sent, {row['dropped']:,} dropped")
-    return "; ".join(said) or "nobody listens"
+            connected.append(f"{what} connected; parcels: {row['sent']:,} sent, {row['dropped']:,} dropped")
+    return "; ".join(connected) or "no receiver is connected"

@@ -64,13 +64,13 @@ def calibrate(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The new file. Default: beside the recording.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Calibrate readings (ticks, counts) to N or kPa by a known load, a table or the fabric's law.
 
-    It lies beside the recording, where taxel info and Recording.calibrated find it; called calibration.json it holds
-    for all recordings of the folder.
+    The file is written beside the recording, where taxel info and Recording.calibrated find it; a file
+    calibration.json is used for all recordings of its folder.
 
     Example: taxel calibrate weight.mcap --load 9.81 --from 2 --to 4 --tare 1
     """
@@ -78,16 +78,19 @@ def calibrate(
     from taxel.calibration import Calibration  # noqa: PLC0415
 
     for wrong, why in (
-        (load is None and (start is not None or stop is not None), "--from, --to: when --load lay there; give --load"),
+        (
+            load is None and (start is not None or stop is not None),
+            "--from and --to are the time of --load: give --load",
+        ),
         (
             load is None and loads is None and not law and table is None,
             "nothing to calibrate by: give --load, --loads, --table or --law",
         ),
         (law and table is not None, "--law and --table: one of the two"),
-        (bool(set_) and not law, "--set: values of the law; say --law with it"),
+        (bool(set_) and not law, "--set: values of the law; give --law with it"),
         (
             load is None and loads is None and (each or exponent is not None),
-            "--each, --exponent: of a fit; give --load",
+            "--each and --exponent belong to a fit: give --load",
         ),
     ):
         if wrong:
@@ -98,39 +101,38 @@ def calibrate(
     with progress(as_json):
         read = _read(opened, tare)
     how: dict[str, Any] = {"unit": unit, "rest": read.rest, "floor": read.floor, "date": date, "note": note}
-    made: Calibration | None = None
+    calibration: Calibration | None = None
     if law:
         if read.frames.unit != "ticks":
             raise ProblemError(f"--law: turns ticks of a board into {unit}; {recording} holds {read.frames.unit}")
-        held = opened.registers
-        ramp = 150.0 if held is None else float(held.ramp)
-        made = Calibration.law(opened.array, ramp=ramp, sensor=assignments(set_ or []), **how)
+        registers = opened.registers
+        ramp = 150.0 if registers is None else float(registers.ramp)
+        calibration = Calibration.law(opened.array, ramp=ramp, sensor=assignments(set_ or []), **how)
     elif table is not None:
-        made = Calibration.table(opened.array, *_points(table, opened.array), of=read.frames.unit, **how)
-    laid = [] if loads is None else _loads(loads, read.frames)
+        calibration = Calibration.table(opened.array, *_points(table, opened.array), of=read.frames.unit, **how)
+    measured = [] if loads is None else _loads(loads, read.frames)
     if load is not None:
-        laid.append(_load(read.frames, "--load", load, load_unit, (start, stop), None))
-    if laid:
-        made = Calibration.fit(laid, start=made, exponent=exponent, each=each, **how)
-    assert made is not None  # one of the four was given
-    made.save(place, overwrite=overwrite)
+        measured.append(_load(read.frames, "--load", load, load_unit, (start, stop), None))
+    if measured:
+        calibration = Calibration.fit(measured, start=calibration, exponent=exponent, each=each, **how)
+    assert calibration is not None  # one of the four was given
+    calibration.save(place, overwrite=overwrite)
     if as_json:
-        said = {"calibration": str(place), "unit": made.unit, "of": made.of, "date": made.date}
-        each_load = [{"load": a, "unit": b, "made": c} for a, b, c in made.loads]
-        typer.echo(json.dumps(said | {"residual": made.residual, "loads": each_load}))
+        result: dict[str, Any] = {"calibration": str(place), "unit": calibration.unit, "of": calibration.of}
+        result |= {"date": calibration.date, "residual": calibration.residual}
+        result["loads"] = [{"load": a, "unit": b, "made": c} for a, b, c in calibration.loads]
+        typer.echo(json.dumps(result))
         return
-    typer.echo(f"{made.described()}: written to {place}")
-    for number, (given, of, value) in enumerate(made.loads, start=1):
-        typer.echo(f"  load {number}: {given:g} {of}, made of it {value:.4g} {of}")
-    if made.loads and made.residual is None:
-        typer.echo(
-            "  no residual: no more loads than unknowns, so they fit themselves; lay others to know how good it is"
-        )
+    typer.echo(f"{calibration.described()}: written to {place}")
+    for number, (true, of, value) in enumerate(calibration.loads, start=1):
+        typer.echo(f"  load {number}: {true:g} {of}, calibrated {value:.4g} {of}")
+    if calibration.loads and calibration.residual is None:
+        typer.echo("  no residual: no more loads than unknowns, so the fit is exact; further loads show how good it is")
 
 
 @dataclass(frozen=True)
 class _Read:
-    """What was read, at rest too, and what a loaded taxel reads more than that."""
+    """The readings, those at rest, and the floor above rest from which a taxel counts as loaded."""
 
     frames: Frames
     rest: NDArray[np.float64] | None
@@ -140,8 +142,8 @@ class _Read:
 def _opened(path: Path) -> Recording:
     import taxel  # noqa: PLC0415  the command line starts quickly
 
-    found = taxel.open(path)
-    every = found if isinstance(found, list) else [found]
+    opened = taxel.open(path)
+    every = opened if isinstance(opened, list) else [opened]
     if len(every) != 1:
         raise ProblemError(f"{path}: holds {len(every)} recordings; a calibration is made of one")
     one: Recording = every[0]
@@ -151,13 +153,13 @@ def _opened(path: Path) -> Recording:
 def _read(recording: Recording, tare: str | None) -> _Read:
     from taxel.recording.pressure import readings  # noqa: PLC0415
 
-    found = readings(recording)
-    if found is None:
+    values = readings(recording)
+    if values is None:
         raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
-    frames, lowest, floor = found
+    frames, lowest, floor = values
     if tare is not None:
         own = tare_of(tare, recording)
-        assert own is not None  # of no tare only None is made
+        assert own is not None  # as `tare` is not None
         return _Read(frames, own.rest, floor)
     return _Read(frames, np.where(np.isinf(lowest), np.nan, lowest) if recording.has_events else None, floor)
 
@@ -173,17 +175,24 @@ def _load(
     from taxel.calibration import Load  # noqa: PLC0415
 
     first, last = (None if s is None else s * 1e6 for s in stretch)
-    held = frames.between(float("-inf") if first is None else first, float("inf") if last is None else last)
-    if not len(held):
-        raise ProblemError(f"{place}: nothing was recorded from {stretch[0]} to {stretch[1]} s")
-    return Load(held, load, unit, taxel)
+    loaded = frames.between(float("-inf") if first is None else first, float("inf") if last is None else last)
+    if not len(loaded):
+        raise ProblemError(f"{place}: nothing was recorded{_span(*stretch)}")
+    return Load(loaded, load, unit, taxel)
+
+
+def _span(start: float | None, stop: float | None) -> str:
+    """Return a stretch of time, s, as the end of a sentence; None is the recording's own beginning or end."""
+    if stop is None:
+        return "" if start is None else f" from {start} s on"
+    return f" before {stop} s" if start is None else f" from {start} to {stop} s"
 
 
 def _loads(path: Path, frames: Frames) -> list[Load]:
     """Read a table of loads."""
     from taxel.formats import text  # noqa: PLC0415
 
-    found = []
+    loads = []
     for row in text.table(path, ["load", "unit", "from_s", "to_s"]):
         line = int(row["line"])
 
@@ -200,14 +209,14 @@ def _loads(path: Path, frames: Frames) -> list[Load]:
                 raise FormatError(f"{place}: taxel {x:g}, {y:g}; must be whole numbers, column and row")
             taxel = (int(x), int(y))
         stretch = (value("from_s"), value("to_s"))
-        found.append(_load(frames, place, value("load"), row["unit"].strip(), stretch, taxel))
-    if not found:
+        loads.append(_load(frames, place, value("load"), row["unit"].strip(), stretch, taxel))
+    if not loads:
         raise FormatError(f"{path.name}: no load in it")
-    return found
+    return loads
 
 
 def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read a table of readings and values, of one taxel for all or, with columns x and y, of each that exists."""
+    """Read a table of readings and values, for all taxels or, with columns x and y, for each that exists."""
     from taxel.formats import text  # noqa: PLC0415
 
     rows = text.table(path, ["reading", "value"])
@@ -217,7 +226,7 @@ def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.f
     places = text.numbers([[row["x"], row["y"]] for row in rows], path, 2, ["x", "y"])
     exists = np.ones(array.shape, bool) if array.exists is None else array.exists
     values = np.unique(pairs[:, 1])
-    # Taxels that do not exist bear nothing, whatever stands here.
+    # Taxels that do not exist get rising values, which are never used.
     every = np.where(exists, np.nan, np.arange(1.0, len(values) + 1)[:, None, None])
     for k, ((x, y), (reading, value)) in enumerate(zip(places, pairs, strict=True), start=2):
         if x != int(x) or y != int(y) or not (0 <= x < array.columns and 0 <= y < array.rows):
@@ -225,9 +234,9 @@ def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.f
                 f"{path.name}, line {k}: taxel {x:g}, {y:g}; the array has {array.columns} x {array.rows}"
             )
         every[np.searchsorted(values, value), int(y), int(x)] = reading
-    lacks = np.argwhere(np.isnan(every))
-    if len(lacks):
-        point, y, x = lacks[0]
+    missing = np.argwhere(np.isnan(every))
+    if len(missing):
+        point, y, x = missing[0]
         raise FormatError(
             f"{path.name}: no reading of taxel {x}, {y} under {values[point]:g}; each taxel needs each value"
         )

@@ -29,7 +29,7 @@ def convert(
         str | None, typer.Option("--source", metavar="NAME", help="The source to convert, of a recording with several.")
     ] = None,
     compression: Annotated[str, typer.Option(help="Compression of a .mcap: none, lz4 or zstd.")] = "none",
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Convert a recording to another format, and report what the target cannot hold.
@@ -40,7 +40,7 @@ def convert(
     from taxel._base.files import try_whole  # noqa: PLC0415
 
     try_whole(target, overwrite=overwrite)
-    # Shown on a terminal only, and gone when done.
+    # The status line is shown on a terminal only, and removed at the end.
     with Console(stderr=True).status(f"{source} to {target}"):
         recording = of_source(open_recording(source, array), part)
         lost = taxel.convert(recording, target, frames_hz=frames, compression=compression, overwrite=overwrite)
@@ -49,4 +49,4 @@ def convert(
         return
     typer.echo(f"written to {target}")
     for what in lost:
-        typer.echo(f"  not kept: {what}")
+        typer.echo(f"  lost: {what}")

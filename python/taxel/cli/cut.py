@@ -45,7 +45,7 @@ def cut(
     source: Annotated[
         str | None, typer.Option("--source", metavar="NAME", help="The source to cut, of a recording with several.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Cut a recording by time, by region or by label.
@@ -66,9 +66,9 @@ def cut(
         before_us=before * 1e6,
         after_us=after * 1e6,
     )
-    _reaching(whole, start, stop)
+    _check_time(whole, start, stop)
     if not parts:
-        raise ProblemError(f"{recording}: no note {label!r} with a time in it; taxel info says which there are")
+        raise ProblemError(f"{recording}: no note {label!r} with a time in it; taxel info --json lists the notes")
     written = []
     for k, part in enumerate(parts, start=1):
         place = out if label is None else Path(_core.numbered_path(out, k))
@@ -77,13 +77,13 @@ def cut(
         if not as_json:
             typer.echo(f"written to {place}: {part!r}")
             for what in lost:
-                typer.echo(f"  not kept: {what}")
+                typer.echo(f"  lost: {what}")
     if as_json:
         typer.echo(json.dumps({"recording": str(recording), "written": written}))
 
 
-def _reaching(recording: Recording, start: float | None, stop: float | None) -> None:
-    """Refuse a stretch before or after all of a recording, whose file would be empty; one of silence within is none."""
+def _check_time(recording: Recording, start: float | None, stop: float | None) -> None:
+    """Refuse a time before or after the whole recording, as its file would be empty; a silence within it is allowed."""
     if start is None and stop is None:
         return
     first, last = (t / 1e6 for t in span_us(recording))
@@ -94,10 +94,10 @@ def _reaching(recording: Recording, start: float | None, stop: float | None) -> 
         raise ProblemError(f"--to {stop}: {lasts}; must be above its beginning")
 
 
-def _range(option: str, said: str | None) -> slice | None:
-    if said is None:
+def _range(option: str, text: str | None) -> slice | None:
+    if text is None:
         return None
-    match = re.fullmatch(r"(\d{0,5}):(\d{0,5})", said)
+    match = re.fullmatch(r"(\d{0,5}):(\d{0,5})", text)
     if match is None:
-        raise ProblemError(f"{option} is {said!r}: must be first:last, the last not taken, as 0:32")
+        raise ProblemError(f"{option} is {text!r}: must be A:B, of which B is not included, as 0:32")
     return slice(*(int(n) if n else None for n in match.groups()))

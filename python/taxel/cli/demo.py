@@ -1,4 +1,4 @@
-"""``taxel demo``: the main job, shown."""
+"""``taxel demo``: contact and lift-off, detected on an emulated board."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def detect(
     report: Annotated[
         Path | None, typer.Option(help="Write a report to this folder: potential, weights, errors, the worst events.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Detect events in a recording, or in each of a folder, by a trained readout.
@@ -66,46 +66,46 @@ def detect(
             try_whole(place, overwrite=overwrite and place == csv)
     loaded = Readout.load(readout)
     opened = open_all([recording])
-    heard = []
-    with progress(as_json) as tell:
+    outcomes = []
+    with progress(as_json) as update:
         events = [None] * len(opened) if truth is None else references(truth, "--truth", opened)
         if truth is not None and not any(events):
             raise ProblemError(f"--truth {truth}: names no event in {recording}")
-        for one, happened in zip(opened, events, strict=True):
-            tell(f"reading {one.path}")
+        for one, labelled in zip(opened, events, strict=True):
+            update(f"reading {one.path}")
             rest = tare_of(tare, one)
-            found = run(loaded, one, frame_us=frame_us, tare=rest)
+            detections = run(loaded, one, frame_us=frame_us, tare=rest)
             # Labels that the readout does not have do not count as missed.
-            wanted = None if happened is None else {label: happened.get(label, _NONE) for label in loaded.labels}
-            scored = None if wanted is None else score(found, wanted, window_ms)
-            heard.append(Outcome(str(one.path), Example(one, wanted or {}, rest), found, scored))
-    truths = [one.example.labels for one in heard if one.score is not None]
-    together = score_together([one.found for one in heard], truths, window_ms) if truths else None
+            true = None if labelled is None else {label: labelled.get(label, _NONE) for label in loaded.labels}
+            scored = None if true is None else score(detections, true, window_ms)
+            outcomes.append(Outcome(str(one.path), Example(one, true or {}, rest), detections, scored))
+    truths = [one.example.labels for one in outcomes if one.score is not None]
+    together = score_together([one.found for one in outcomes], truths, window_ms) if truths else None
     if csv is not None:
-        write_whole(csv, lambda file: file.write(_table(heard).encode()), overwrite=overwrite)
+        write_whole(csv, lambda file: file.write(_table(outcomes).encode()), overwrite=overwrite)
     if report is not None:
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
-        write_listening(report, loaded, heard, title=f"What {readout} says of {recording}")
+        write_listening(report, loaded, outcomes, title=f"Detections of {readout} in {recording}")
     written = {"written": csv, "report": None if report is None else report / "report.html"}
-    places = {name: str(place) for name, place in written.items() if place is not None}
+    places = {name: str(path) for name, path in written.items() if path is not None}
     if as_json:
-        typer.echo(json.dumps(_result(recording, readout, heard, together, window_ms) | places))
+        typer.echo(json.dumps(_result(recording, readout, outcomes, together, window_ms) | places))
         return
-    for said in heard:
-        if recording.is_dir() or len(heard) > 1:
-            typer.echo(f"{said.name}:")
-        _print(said.found)
+    for outcome in outcomes:
+        if recording.is_dir() or len(outcomes) > 1:
+            typer.echo(f"{outcome.name}:")
+        _print(outcome.found)
     if together is not None:
         typer.echo(f"\nagainst {truth} (window {window_ms:g} ms):\n{together!r}")
-    for name, path_said in places.items():
-        typer.echo(f"written to {path_said}" if name == "written" else f"{name}: {path_said}")
+    for name, path in places.items():
+        typer.echo(f"written to {path}" if name == "written" else f"{name}: {path}")
 
 
 def _result(
-    recording: Path, readout: Path, heard: Sequence[Outcome], together: Score | None, window_ms: float
+    recording: Path, readout: Path, outcomes: Sequence[Outcome], together: Score | None, window_ms: float
 ) -> dict[str, Any]:
-    """Return what was found as JSON holds it; a detection has the keys that `taxel live --json` gives it."""
+    """Return the detections as plain values for JSON; a detection has the keys of `taxel live --json`."""
     each: list[dict[str, Any]] = [
         {
             "recording": one.name,
@@ -115,7 +115,7 @@ def _result(
             ],
         }
         | ({} if one.score is None else {"score": one.score.to_dict()})
-        for one in heard
+        for one in outcomes
     ]
     if len(each) == 1 and not recording.is_dir():
         result = {"readout": str(readout), **each[0]}
@@ -124,28 +124,28 @@ def _result(
     return result if together is None else result | {"window_ms": window_ms, "score": together.to_dict()}
 
 
-def _table(heard: Sequence[Outcome]) -> str:
+def _table(outcomes: Sequence[Outcome]) -> str:
     """Return the detections as a table; of several recordings each row begins with its recording's name."""
-    if len(heard) == 1:
-        return heard[0].found._csv()
+    if len(outcomes) == 1:
+        return outcomes[0].found._csv()
     lines: list[str] = []
-    # One header for all.
-    repaired = any(one.found.repaired.any() for one in heard)
-    for one in heard:
+    # All recordings share one header.
+    repaired = any(one.found.repaired.any() for one in outcomes)
+    for one in outcomes:
         head, *rows = one.found._csv(repaired=repaired).splitlines()
         name = '"' + Path(one.name).name.replace('"', '""') + '"'
         lines += [*([] if lines else [f"recording,{head}"]), *(f"{name},{row}" for row in rows)]
     return "\n".join(lines) + "\n"
 
 
-def _print(found: Detections) -> None:
-    typer.echo(repr(found))
-    if not len(found):
+def _print(detections: Detections) -> None:
+    typer.echo(repr(detections))
+    if not len(detections):
         return
-    width = max(5, *(len(label) for label in found.labels))
+    width = max(5, *(len(label) for label in detections.labels))
     typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}  {'slope (mV/ms)':>13}")
-    for k in range(min(len(found), _ROWS)):
-        row = f"{to_ms(found.t[k]):>12.3f}  {to_ms(found.known[k]):>12.3f}  {found.slope[k]:>13.4g}"
-        typer.echo(f"{found.label[k]:<{width}}  {row}")
-    if len(found) > _ROWS:
-        typer.echo(f"... and {len(found) - _ROWS} more; --csv and --json give all")
+    first = detections[:_ROWS]
+    for label, t, known, slope in zip(first.label, first.t, first.known, first.slope, strict=True):
+        typer.echo(f"{label:<{width}}  {to_ms(t):>12.3f}  {to_ms(known):>12.3f}  {slope:>13.4g}")
+    if len(detections) > _ROWS:
+        typer.echo(f"... and {len(detections) - _ROWS} more; --csv and --json hold all")

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import App, SecondsOption, app
 from taxel.device import Device, ports
@@ -21,7 +22,7 @@ from taxel.wire.registers import QUOTED_PRESETS
 __all__ = ["apply", "listed", "record", "set_registers", "show", "watch"]
 
 _device = App(
-    no_args_is_help=True, help="Find a board on its serial line, set it by name, and read back what it holds."
+    no_args_is_help=True, help="Find a board on its serial line, set it by name, and read back its registers."
 )
 app.add_typer(_device, name="device")
 
@@ -32,7 +33,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JS
 
 @_device.callback()
 def _root() -> None:
-    """Find a board on its serial line, set it by name, and read back what it holds."""
+    """Find a board on its serial line, set it by name, and read back its registers."""
 
 
 @_device.command("ports")
@@ -41,15 +42,15 @@ def listed(as_json: JsonOption = False) -> None:
 
     Example: taxel device ports
     """
-    found = ports()
+    serial_ports = ports()
     if as_json:
-        typer.echo(json.dumps([asdict(port) for port in found]))
+        typer.echo(json.dumps([asdict(port) for port in serial_ports]))
         return
-    for port in found:
+    for port in serial_ports:
         usb = "" if port.usb is None else f"{port.usb[0]:04x}:{port.usb[1]:04x}"
         typer.echo("  ".join(filter(None, (port.place, port.kind, usb, port.maker, port.product, port.serial))))
-    if not found:
-        typer.echo("no serial port: is the cable in, and may you open it?", err=True)
+    if not serial_ports:
+        typer.echo("no serial port: is the cable plugged in, and are you allowed to open it?", err=True)
 
 
 @_device.command()
@@ -59,7 +60,7 @@ def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption =
     Example: taxel device show /dev/ttyUSB0
     """
     with Device(place, baud=baud) as device:
-        _say(device, device.registers, as_json)
+        _print(device, device.registers, as_json)
 
 
 @_device.command("set")
@@ -76,9 +77,9 @@ def set_registers(
 
     Example: taxel device set /dev/ttyUSB0 noise_floor=5 wire_version=2
     """
-    values = dict(_field(said) for said in fields)
+    values = dict(_field(assignment) for assignment in fields)
     with Device(place, baud=baud) as device:
-        _say(device, device.set(**values), as_json)
+        _print(device, device.set(**values), as_json)
 
 
 @_device.command()
@@ -95,7 +96,7 @@ def apply(
     if preset not in PRESETS:
         raise ProblemError(f"preset {preset!r}: there are {', '.join(map(repr, PRESETS))}")
     with Device(place, baud=baud) as device:
-        _say(device, device.apply(preset), as_json)
+        _print(device, device.apply(preset), as_json)
 
 
 @_device.command()
@@ -112,7 +113,7 @@ def record(
     if what not in ("start", "stop"):
         raise ProblemError(f"{what}: must be start or stop")
     with Device(place, baud=baud) as device:
-        _say(device, device.record(what == "start"), as_json)
+        _print(device, device.record(what == "start"), as_json)
 
 
 @_device.command()
@@ -133,36 +134,37 @@ def watch(
         while seconds is None or time.monotonic() - begun < seconds:
             now = {"faults": device.faults, "reconnects": device.reconnects}
             if now != before:
-                said = ", ".join(f"{n} {name}" for name, n in device.faults.items()) or "no faults"
-                again = f"; found again {device.reconnects} times" if device.reconnects else ""
-                typer.echo(json.dumps(now) if as_json else said + again)
+                faults = ", ".join(f"{n} {name}" for name, n in device.faults.items()) or "no faults"
+                again = f"; reconnected {counted(device.reconnects, 'time')}" if device.reconnects else ""
+                typer.echo(json.dumps(now) if as_json else faults + again)
                 before = now
-            time.sleep(_LOOK_S)
+            time.sleep(_POLL_S)
 
 
-#: How often `watch` looks, s.
-_LOOK_S = 0.1
+#: Interval at which `watch` reads the faults, s.
+_POLL_S = 0.1
 
 
-def _field(said: str) -> tuple[str, float]:
+def _field(assignment: str) -> tuple[str, float]:
     """Return name and value of NAME=VALUE."""
-    name, equals, value = said.partition("=")
+    name, equals, value = assignment.partition("=")
     try:
         number = float(value)
     except ValueError:
         number = {"true": 1.0, "false": 0.0}.get(value, math.nan)
     if not equals or math.isnan(number):
-        raise ProblemError(f"{said}: must be NAME=NUMBER, as noise_floor=4")
+        raise ProblemError(f"{assignment}: must be NAME=NUMBER, as noise_floor=4")
     return name, int(number) if number.is_integer() else number
 
 
-def _say(device: Device, registers: Registers, as_json: bool) -> None:
+def _print(device: Device, registers: Registers, as_json: bool) -> None:
     rows = described(registers)
     if as_json:
-        said: dict[str, Any] = {"place": device.cable.place, **asdict(device.greeting), "frame_us": registers.frame_us}
-        said["registers"] = {name: value for name, value, *_ in rows}
-        said["warnings"] = list(registers.warnings)
-        typer.echo(json.dumps(said))
+        result: dict[str, Any] = {"place": device.cable.place, **asdict(device.greeting)}
+        result["frame_us"] = registers.frame_us
+        result["registers"] = {name: value for name, value, *_ in rows}
+        result["warnings"] = list(registers.warnings)
+        typer.echo(json.dumps(result))
         return
     g = device.greeting
     typer.echo(

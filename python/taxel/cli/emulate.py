@@ -1,4 +1,4 @@
-"""``taxel emulate``: a board without a board."""
+"""``taxel emulate``: an emulated board, which sends its events by UDP."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taxel._base.files import try_whole
+from taxel._base.messages import counted
 from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.cli._app import app, with_typed
@@ -41,13 +42,13 @@ def _option(name: str, *flags: str, of: type = EmulateOptions, metavar: str | No
 
 def _in_ms(name: str) -> Any:
     """Return the option of the command line, ms, that sets an option of version 2, us."""
-    found = about(Version2, name)
-    return typer.Option(help=found["help"], min=to_ms(found["min"]), max=to_ms(found["max"]))
+    described = about(Version2, name)
+    return typer.Option(help=described["help"], min=to_ms(described["min"]), max=to_ms(described["max"]))
 
 
 @dataclass(frozen=True)
 class _Typed:
-    """Hold what is typed."""
+    """Hold the options of the command."""
 
     port: Annotated[int, typer.Option(min=1, max=65_535, help="The UDP port to send to.")] = PORT
     host: Annotated[str, typer.Option(help="The machine to send to, by name or address.")] = "127.0.0.1"
@@ -108,7 +109,7 @@ class _Typed:
 
 @dataclass(frozen=True)
 class _Played:
-    """Hold what the board plays, and how: the scene's array, sensor and preset (`board`), the touch and its text."""
+    """Hold what the board plays: its array, sensor and preset (`board`), the touch and its description (`text`)."""
 
     seed: int
     tare_ms: float
@@ -150,7 +151,7 @@ def emulate(typed: _Typed) -> None:
         summary |= {"wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
         typer.echo(json.dumps({**summary, **asdict(report)}))
     else:
-        _say(report, in_time=not typed.pipe)
+        _print(report, in_time=not typed.pipe)
 
 
 def _together(typed: _Typed) -> None:
@@ -161,7 +162,7 @@ def _together(typed: _Typed) -> None:
     if typed.scene is not None and (others or typed.rest):
         raise ProblemError("--scene: leave out --replay, --pipe and --rest")
     if others and (typed.scenes is not None or typed.labels is not None or typed.rest):
-        raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
+        raise ProblemError("--scenes, --truth and --rest belong to scenes: leave them out with --replay or --pipe")
     for name, value, other, there in (
         ("--speed", typed.speed, "--replay", typed.replay is not None),
         ("--noise-floor", typed.noise_floor, "--pipe", typed.pipe),
@@ -172,56 +173,57 @@ def _together(typed: _Typed) -> None:
 
 
 def _played(typed: _Typed) -> _Played:
-    """Return what the board plays; a wrong preset is refused before anything else, where the array is known."""
+    """Return what the board plays; if the array is known, a wrong preset is refused first."""
     with progress(quiet=True):
-        written = None if typed.scene is None else SceneFile.open(typed.scene)
-    board = written or SceneFile(Scene({}))
+        scene_file = None if typed.scene is None else SceneFile.open(typed.scene)
+    board = scene_file or SceneFile(Scene({}))
     if typed.preset is not None:
         board = replace(board, preset=typed.preset)
     if typed.replay is None and not typed.pipe:
         fitting(board.preset, board.array)
     tare_ms = board.tare_ms if typed.tare is None else 1e3 * typed.tare
-    drawn_seed = secrets.randbelow(TRAINING_SEED) if written is None else written.seed
+    drawn_seed = secrets.randbelow(TRAINING_SEED) if scene_file is None else scene_file.seed
     seed = drawn_seed if typed.seed is None else typed.seed
-    spoilt = _flaws(typed.flaw or [], seed), _faults(typed.fault or [], seed), _circuit(typed.circuit or [], seed)
+    flaws, faults = _flaws(typed.flaw or [], seed), _faults(typed.fault or [], seed)
+    circuit = _circuit(typed.circuit or [], seed)
     if typed.replay is not None:
         touch: Any = Replay(open_any(typed.replay), 1.0 if typed.speed is None else typed.speed)
-        text = f"{typed.replay} again"
+        text = f"replay of {typed.replay}"
     elif typed.pipe:
         touch, text = _piped(3 if typed.noise_floor is None else typed.noise_floor)
-    elif written is not None:
-        touch, text = _written(written, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}"
+    elif scene_file is not None:
+        touch, text = _from_file(scene_file, typed.scenes, tare_ms), f"{typed.scene}, seed {seed}"
     else:
         touch, text = _scenes(seed, typed.scenes, tare_ms, typed.rest)
-    return _Played(seed, tare_ms, board, *spoilt, touch, text)
+    return _Played(seed, tare_ms, board, flaws, faults, circuit, touch, text)
 
 
 def _emulated(typed: _Typed, played: _Played, console: Console) -> EmulatorReport:
-    """Run the board until its end or Ctrl-C, and show how far it is."""
+    """Run the board until its end or Ctrl-C, and show the progress."""
     host, port, line, wire = typed.host, typed.port, typed.line, typed.wire
     version_2 = Version2(
         typed.board, typed.session, *(round(1e3 * ms) for ms in (typed.hold, typed.heartbeat, typed.states))
     )
     console.print(f"{played.text}, to {host}:{port}", soft_wrap=True)
     bar = Progress(
-        TextColumn("{task.description}"), BarColumn(pulse_style="bar.complete"), TextColumn("{task.fields[said]}"),
+        TextColumn("{task.description}"), BarColumn(pulse_style="bar.complete"), TextColumn("{task.fields[status]}"),
         TimeElapsedColumn(), console=console, transient=True, disable=typed.as_json,
     )  # fmt: skip
     last: list[EmulatorReport] = []
-    with bar, _Diary(typed.labels, typed.overwrite) as diary:
-        task = bar.add_task("playing", total=None, said="")
+    with bar, _TruthTable(typed.labels, typed.overwrite) as truth:
+        task = bar.add_task("playing", total=None, status="")
 
         def begun(address: str | None) -> None:
             if address is not None:
-                console.print(f"commands are taken at {address}")
+                console.print(f"commands are accepted at {address}")
             if line is not None:
                 console.print(f"the serial line is {line}", soft_wrap=True)
 
         def watch(report: EmulatorReport) -> None:
             last[:] = [report]
-            diary.write(report)
-            late = report.late_us["p99"]
-            bar.update(task, said=f"{report.board_seconds:.1f} s, {report.changes} events, late p99 {late:.0f} us")
+            truth.write(report)
+            played_s, late = f"{report.board_seconds:.1f} s", f"late p99 {report.late_us['p99']:.0f} us"
+            bar.update(task, status=f"{played_s}, {counted(report.changes, 'event')}, {late}")
 
         try:
             last[:] = [
@@ -249,54 +251,55 @@ def _emulated(typed: _Typed, played: _Played, console: Console) -> EmulatorRepor
                     source_port=typed.source_port,
                     begun=begun,
                     watch=watch,
-                    touched=diary.take,
+                    touched=truth.add,
                 )
             ]
         except KeyboardInterrupt:
-            # Where scenes repeat without end, Ctrl-C is the regular end; else it interrupts the command.
+            # If scenes repeat without end, Ctrl-C is the regular end; else it interrupts the command.
             if not last or typed.scenes is not None or typed.replay is not None:
                 raise
-        diary.write(last[0])
+        truth.write(last[0])
     return last[0]
 
 
 def _piped(noise_floor: int) -> tuple[Any, str]:
-    """Return what comes on standard input, and what that is."""
+    """Return the frames of standard input as a touch, and their description."""
     pipe = Pipe(sys.stdin.buffer, noise_floor)
-    halved = f", values halved {pipe.shift} times" if pipe.shift else ""
+    halved = f", values halved {counted(pipe.shift, 'time')}" if pipe.shift else ""
     rows, columns = pipe.array.shape
     return pipe, f"{rows} x {columns} taxels from standard input, {pipe.rate_hz:g} frames/s{halved}"
 
 
 def _scenes(seed: int, scenes: int | None, tare_ms: float, rest: bool) -> tuple[Any, str]:
-    """Return scenes to play, and what they are."""
+    """Return random scenes as a touch, and their description."""
     draw = left_to_rest if rest else drawn
     if scenes is None:
         return endless(seed, tare_ms=tare_ms, draw=draw), f"seed {seed}: scenes until Ctrl-C"
-    return script(seed, scenes, tare_ms=tare_ms, draw=draw), f"seed {seed}: {scenes} scene(s)"
+    return script(seed, scenes, tare_ms=tare_ms, draw=draw), f"seed {seed}: {counted(scenes, 'scene')}"
 
 
-def _written(written: SceneFile, scenes: int | None, tare_ms: float) -> Iterator[Act]:
-    """Yield silence for the tare, and a scene from a file again and again."""
-    before, scene, after = replace(written, tare_ms=tare_ms).acts()
+def _from_file(scene_file: SceneFile, scenes: int | None, tare_ms: float) -> Iterator[Act]:
+    """Yield silence for the tare, then the scene of a file repeatedly."""
+    before, scene, after = replace(scene_file, tare_ms=tare_ms).acts()
     yield before
     for _ in count() if scenes is None else range(scenes):
         yield scene
         yield after
 
 
-def _say(report: EmulatorReport, in_time: bool) -> None:
-    typer.echo(f"{report.changes} events in {report.datagrams} datagrams, {report.bytes} bytes")
+def _print(report: EmulatorReport, in_time: bool) -> None:
+    events, datagrams = counted(report.changes, "event"), counted(report.datagrams, "datagram")
+    typer.echo(f"{events} in {datagrams}, {counted(report.bytes, 'byte')}")
     if report.network is not None:
         typer.echo("network: " + ", ".join(f"{n} {name}" for name, n in report.network.items()))
     if in_time:
         typer.echo(report.verdict)
 
 
-def _pairs(option: str, said: Iterable[str]) -> dict[str, str]:
+def _pairs(option: str, assignments: Iterable[str]) -> dict[str, str]:
     """Return names and values of NAME=VALUE."""
     pairs = {}
-    for one in said:
+    for one in assignments:
         name, equals, value = one.partition("=")
         if not equals or not value:
             raise ProblemError(f"--{option} {one}: must be NAME=VALUE")
@@ -304,17 +307,17 @@ def _pairs(option: str, said: Iterable[str]) -> dict[str, str]:
     return pairs
 
 
-def _number(option: str, name: str, said: str) -> float:
+def _number(option: str, name: str, value: str) -> float:
     try:
-        return float(said)
+        return float(value)
     except ValueError:
-        raise ProblemError(f"--{option} {name}={said}: must be a number") from None
+        raise ProblemError(f"--{option} {name}={value}: must be a number") from None
 
 
-def _flaws(said: list[str], seed: int) -> Flaws | None:
+def _flaws(assignments: list[str], seed: int) -> Flaws | None:
     sizes: dict[str, Any] = {}
     seeds = {}
-    for name, value in _pairs("flaw", said).items():
+    for name, value in _pairs("flaw", assignments).items():
         if name not in Flaws._names():
             raise ProblemError(f"--flaw {name}: must be one of {', '.join(Flaws._names())}")
         size, _, own = value.partition(":")
@@ -323,44 +326,44 @@ def _flaws(said: list[str], seed: int) -> Flaws | None:
     return Flaws(**sizes, seeds=seeds) if sizes else None
 
 
-def _circuit(said: list[str], seed: int) -> Circuit | None:
+def _circuit(assignments: list[str], seed: int) -> Circuit | None:
     readout: dict[str, Any] = {"seed": seed}
     converter: dict[str, Any] = {}
-    homes = dict.fromkeys(("gain", "switch_ohm", "wire_ohm", "offset_mv"), readout)
-    homes |= dict.fromkeys(("hysteresis_v", "settle_us", "amplifier_us"), converter)
-    for name, value in _pairs("circuit", said).items():
-        if name not in homes:
-            raise ProblemError(f"--circuit {name}: must be one of {', '.join(homes)}")
-        homes[name][name] = _number("circuit", name, value)
-    return Circuit(readout=VirtualGround(**readout), converter=Converter(**converter)) if said else None
+    parts = dict.fromkeys(("gain", "switch_ohm", "wire_ohm", "offset_mv"), readout)
+    parts |= dict.fromkeys(("hysteresis_v", "settle_us", "amplifier_us"), converter)
+    for name, value in _pairs("circuit", assignments).items():
+        if name not in parts:
+            raise ProblemError(f"--circuit {name}: must be one of {', '.join(parts)}")
+        parts[name][name] = _number("circuit", name, value)
+    return Circuit(readout=VirtualGround(**readout), converter=Converter(**converter)) if assignments else None
 
 
-def _faults(said: list[str], seed: int) -> Faults | None:
-    shares = {name: _number("fault", name, value) for name, value in _pairs("fault", said).items()}
+def _faults(assignments: list[str], seed: int) -> Faults | None:
+    shares = {name: _number("fault", name, value) for name, value in _pairs("fault", assignments).items()}
     for name in shares:
         if name not in Faults._names():
             raise ProblemError(f"--fault {name}: must be one of {', '.join(Faults._names())}")
     return Faults(**shares, seed=seed) if shares else None
 
 
-class _Diary:
-    """Write what happens to a CSV, a line when it has happened."""
+class _TruthTable:
+    """Write contact and lift-off of the touches to a CSV, each when the board's time has reached it."""
 
     def __init__(self, path: Path | None, overwrite: bool) -> None:
-        self._left: deque[tuple[float, str]] = deque()
-        # Written as it goes, so not whole or not at all: what was written before Ctrl-C is what happened before it.
+        self._pending: deque[tuple[float, str]] = deque()
+        # Written line by line, not by `write_whole`, so that Ctrl-C leaves the lines of what has happened.
         self._file = None if path is None else path.open("w" if overwrite else "x", encoding="utf-8")
         self._put("label,t_us,host_ns")
 
-    def take(self, contacts: list[Contact]) -> None:
-        """Take touches to come, which lie behind all that were taken before."""
+    def add(self, contacts: list[Contact]) -> None:
+        """Add coming touches, which are later than all that were added before."""
         ends = [(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts]
-        self._left.extend(sorted(ends))
+        self._pending.extend(sorted(ends))
 
     def write(self, report: EmulatorReport) -> None:
         """Write what has happened by the board's time."""
-        while self._left and self._left[0][0] <= 1e6 * report.board_seconds:
-            t, label = self._left.popleft()
+        while self._pending and self._pending[0][0] <= 1e6 * report.board_seconds:
+            t, label = self._pending.popleft()
             self._put(f"{label},{round(t)},{report.began_ns + round(1e3 * t)}")
 
     def _put(self, line: str) -> None:

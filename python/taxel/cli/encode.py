@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from taxel._base.files import try_whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import app
 from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, open_recording, progress, tare_of
@@ -24,7 +25,7 @@ def encode(
     encoder: Annotated[str, typer.Option(help=f"One of {', '.join(encoder_names())}.")],
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Encode a recording as spike trains.
@@ -36,13 +37,13 @@ def encode(
     try_whole(out, overwrite=overwrite)
     chosen = encoder_of(encoder, values or [])
     opened = open_recording(recording)
-    with progress(as_json) as tell:
-        tell(f"reading {recording}")
+    with progress(as_json) as update:
+        update(f"reading {recording}")
         source = opened.events if opened.has_events else opened.frames()
         rest = tare_of(tare, opened)
         if rest is not None:
             chosen = chosen.with_tare(rest)
-        tell(f"encoding {len(source)} {'events' if opened.has_events else 'pictures'}")
+        update(f"encoding {counted(len(source), 'event' if opened.has_events else 'picture')}")
         trains = chosen.encode(opened)
     trains.save(out, overwrite=overwrite)
     counts = trains.counts

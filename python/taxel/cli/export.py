@@ -32,7 +32,7 @@ def nir(
             help="Time step of the reading simulator, ms, if it adds 1 in the step of a spike (snnTorch: 0.1).",
         ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Write a readout as a NIR graph, in SI units, and report what NIR cannot hold.

@@ -11,6 +11,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption, geometry, of_array
@@ -40,7 +41,7 @@ def info(
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the files that are written where they exist.")
+        bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -59,7 +60,7 @@ def info(
     for place in (picture, table):
         if place is not None:
             try_whole(place, overwrite=overwrite)
-    # Shown on a terminal only, and gone when done.
+    # The status line is shown on a terminal only, and removed at the end.
     with Console(stderr=True).status(f"reading {file}"):
         opened = _opened(file, array)
         if isinstance(opened, list):
@@ -105,7 +106,7 @@ def info(
 
 
 def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
-    """Return the facts of each source of a file, and how their clocks lie to the first one's."""
+    """Return the facts of each source of a file, with offset and drift of their clocks against the first one's."""
     from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
     from taxel.recording.summary import summary  # noqa: PLC0415
 
@@ -150,12 +151,12 @@ def _opened(file: Path, array: str | None) -> Recording | list[Recording]:
         return of_array(opened, array)
     for one in opened:
         of_array(one, array)
-    # Many files of other people's hold one recording.
+    # A file of another maker may hold several recordings; many hold one.
     return opened[0] if len(opened) == 1 else opened
 
 
 def _lines(pressed: Series) -> Iterator[str]:
-    """Give the lines of a table of pressure over time; the centre is empty where nothing is loaded."""
+    """Yield the lines of a table of pressure over time; the centre is empty where nothing is loaded."""
     yield f"t_us,area_mm2,peak_{pressed.unit},sum_{pressed.unit},centre_x_mm,centre_y_mm"
     columns = (pressed.t, pressed.area, pressed.peak, pressed.total, *pressed.centre.T)
     for t, *values in zip(*(column.tolist() for column in columns), strict=True):
@@ -163,7 +164,7 @@ def _lines(pressed: Series) -> Iterator[str]:
 
 
 def _page(facts: dict[str, Any]) -> str:
-    """Return the same as lines for people."""
+    """Return the facts of a recording as lines for people."""
     from taxel.recording import kind_of_file  # noqa: PLC0415
 
     head = f"{facts['file']}: {kind_of_file(facts['kind'])}" + f", from {facts['source']}" * bool(facts["source"])
@@ -183,7 +184,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if facts["from_us"] is not None:
         yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
     if "events" in facts:
-        words = f"{facts['intensities']} with intensity, {len(facts['markers'])} markers"
+        words = f"{facts['intensities']} with intensity, {counted(len(facts['markers']), 'marker')}"
         yield "events", f"{facts['events']}, {words}"
     else:
         yield ("samples" if "columns" in facts else "pictures"), f"{facts['pictures']} ({facts['unit']})"
@@ -196,7 +197,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "calibration", facts["calibration"]
     pressed = facts["pressure"]
     if pressed is not None:
-        # A calibration's kPa stand for the pitch's squares; of other files taxels may have any size.
+        # In a calibration a taxel's area is the pitch squared; in other files taxels may have any size.
         newtons = array["pitch_mm"] ** 2 * N_PER_KPA_MM2
         force = facts["calibration"] is not None and pressed["unit"] == "kPa"
         for name, words, unit, factor in (
@@ -236,7 +237,7 @@ def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in ("datagrams", "bytes", "received", "dropped_by_kernel", "dropped_by_queue", "missing_numbers"):
         if counts.get(name) is not None:
             yield name.replace("_", " "), str(counts[name])
-    sound = ("bytes", "words", "changes", "intensities", "markers")
+    no_loss = ("bytes", "words", "changes", "intensities", "markers")
     for name, n in {**counts.get("decoder", {}), **facts["rebuilt"]}.items():
-        if n and name not in sound:
+        if n and name not in no_loss:
             yield name.replace("_", " "), str(n)

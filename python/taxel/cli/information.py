@@ -1,4 +1,4 @@
-"""``taxel information``: how many bits labelled touches hold, at which period, of how many taxels, when."""
+"""``taxel information``: bits that labelled touches hold, by sampling period, number of taxels and time."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from taxel._base.arguments import whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption
@@ -36,7 +37,7 @@ def information(
         ),
     ] = None,
     window_ms: Annotated[
-        float | None, typer.Option(help="How long after contact events count, ms; needed where trials have no stop_us.")
+        float | None, typer.Option(help="How long after contact events count, ms; needed if trials have no stop_us.")
     ] = None,
     windows_ms: Annotated[
         str | None, typer.Option("--windows", help="Further windows: times after contact, ms, as 10,20,50.")
@@ -56,7 +57,7 @@ def information(
     shuffles: Annotated[int, typer.Option(help="How often labels are shuffled, for the test against zero.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the random phases, folds, taxels and bootstrap.")] = 0,
     report: Annotated[Path, typer.Option(help="The page with pictures, an .html.")] = Path("information.html"),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Estimate how many bits labelled touches hold, by sampling period, time, number of taxels and data rate.
@@ -69,12 +70,12 @@ def information(
     if report.suffix != ".html":
         raise ProblemError(f"--report {report}: is one page, so its name must end in .html")
     if report.exists() and not overwrite:
-        raise FileExistsError(17, "exists already; say --overwrite or another --report", str(report))
+        raise FileExistsError(17, "exists already; give --overwrite or another --report", str(report))
     chosen = _encoder(encoder, values or [])
-    with progress(as_json) as tell:
+    with progress(as_json) as update:
         opened = []
         for path in recordings:
-            tell(f"reading {path}")
+            update(f"reading {path}")
             opened += open_all([path], array)
         trials = _trials(labels, opened, window_ms)
         if labels is None and len({trial.label for trial in trials}) == 1:
@@ -82,8 +83,8 @@ def information(
                 f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, here "
                 f"{trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings a folder"
             )
-        _dealt(trials, str(recordings[0]) if labels in (None, "notes") else labels, count=folds, seed=seed)
-        found = answer(
+        _check_folds(trials, str(recordings[0]) if labels in (None, "notes") else labels, count=folds, seed=seed)
+        result = answer(
             trials,
             encoder=chosen,
             window_ms=window_ms,
@@ -96,14 +97,14 @@ def information(
             shuffles=shuffles,
             classifiers=[name for name in classifiers.split(",") if name],
             seed=seed,
-            progress=lambda what, done, of: tell(f"{what} ({done} of {of})"),
+            progress=lambda what, done, of: update(f"{what} ({done} of {of})"),
         )
-        tell("drawing")
-        write_information(report, found, overwrite=overwrite)
+        update("drawing")
+        write_information(report, result, overwrite=overwrite)
     if as_json:
-        typer.echo(json.dumps({**found.to_dict(), "report": str(report)}))
+        typer.echo(json.dumps({**result.to_dict(), "report": str(report)}))
         return
-    for line in lines(found):
+    for line in lines(result):
         typer.echo(line)
     typer.echo(f"written to {report}")
 
@@ -120,8 +121,8 @@ def _trials(labels: str | None, opened: list[Recording], window_ms: float | None
     return notes_as_trials(opened, window_ms=window_ms)
 
 
-def _dealt(trials: list[LabelledTrial], place: str, *, count: int, seed: int) -> None:
-    """Refuse labels and groups that cannot be dealt out to folds, and say in which table they stand."""
+def _check_folds(trials: list[LabelledTrial], place: str, *, count: int, seed: int) -> None:
+    """Refuse labels and groups that cannot be split into folds; the error names their table."""
     from taxel.information import folds  # noqa: PLC0415  starts quickly
 
     whole("folds", count, 2), whole("seed", seed, 0)
@@ -132,54 +133,55 @@ def _dealt(trials: list[LabelledTrial], place: str, *, count: int, seed: int) ->
         raise ProblemError(f"{place}: {error}") from None
 
 
-def lines(found: Answer) -> list[str]:
-    """Return what is printed of an answer, line by line."""
-    sizes = sorted(set(found.labels.values()))
+def lines(answer: Answer) -> list[str]:
+    """Return the lines that are printed of an answer."""
+    sizes = sorted(set(answer.labels.values()))
     each = f"{sizes[0]}" if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
-    groups = f"{found.groups} groups" if found.groups else "no groups"
-    full = found.full
-    said = [
-        f"{sum(found.labels.values())} trials, {len(found.labels)} labels x {each}, {groups}",
-        f"labels shuffled: {found.zero}",
-        "controls: " + " | ".join(f"{c.name} {_bits(c.found)} ({c.about})" for c in found.controls),
-        f"full: {full.period_ms:g} ms, {full.taxels} taxels, to {full.window_ms:g} ms {_interval(full.found)}, "
+    trials, labels = counted(sum(answer.labels.values()), "trial"), counted(len(answer.labels), "label")
+    full = answer.full
+    text = [
+        f"{trials}, {labels} x {each}, {counted(answer.groups, 'group') if answer.groups else 'no groups'}",
+        f"labels shuffled: {answer.zero}",
+        "controls: " + " | ".join(f"{c.name} {_bits(c.found)} ({c.about})" for c in answer.controls),
+        f"full: {full.period_ms:g} ms, {counted(full.taxels, 'taxel')}, to {full.window_ms:g} ms "
+        f"{_interval(full.found)}, "
         f"{100 * full.found.right:.0f} % right"
-        + "".join(f"; pictures {e.bits:.2f}" for p, e in found.frames.items() if p == full.period_ms)
-        + "".join(f"; {name} {e.bits:.2f}" for name, e in found.classifiers.items()),
+        + "".join(f"; pictures {e.bits:.2f}" for p, e in answer.frames.items() if p == full.period_ms)
+        + "".join(f"; {name} {e.bits:.2f}" for name, e in answer.classifiers.items()),
     ]
-    said += [f"warning: {text}" for text in found.warnings]
-    said += ["", _row("period", "bits", "events", "mb/event", "kb/s", "silent", "95 % of the full?")]
-    said += [_told(f"{p.period_ms:g} ms", p, found) for p in found.by_period]
-    if found.taxels:
-        said += [
+    text += [f"warning: {warning}" for warning in answer.warnings]
+    text += ["", _row("period", "bits", "events", "mb/event", "kb/s", "silent", "95 % of the full?")]
+    text += [_point(f"{p.period_ms:g} ms", p, answer) for p in answer.by_period]
+    if answer.taxels:
+        text += [
             "",
-            _row(f"taxels at {found.taxels[0].period_ms:g} ms", "bits", "events", "mb/event", "kb/s", "silent", ""),
+            _row(f"taxels at {answer.taxels[0].period_ms:g} ms", "bits", "events", "mb/event", "kb/s", "silent", ""),
         ]
-        said += [_told(f"{p.taxels} {p.kind}", p, found) for p in found.taxels]
-    said += [""]
-    for window in sorted({p.window_ms for p in found.points} - {full.window_ms}):
-        here = [p for p in found.points if p.window_ms == window]
-        told_ = "; ".join(
+        text += [_point(f"{p.taxels} {p.kind}", p, answer) for p in answer.taxels]
+    text += [""]
+    for window in sorted({p.window_ms for p in answer.points} - {full.window_ms}):
+        here = [p for p in answer.points if p.window_ms == window]
+        by_period = "; ".join(
             f"{p.period_ms:g} ms {p.found.bits:.2f}" + (f" {p.verdict}" if p.verdict is not None else "") for p in here
         )
-        said.append(f"to {window:g} ms: {told_}")
-    for name, points in found.parameters.items():
-        said.append(
+        text.append(f"to {window:g} ms: {by_period}")
+    for name, points in answer.parameters.items():
+        text.append(
             f"{name} ({points[0].found.most:.2f} bits at most): "
             + "; ".join(f"{p.period_ms:g} ms {p.found.bits:.2f}" for p in points)
         )
-    if len(found.training) > 1:
-        (n, less), (most, bits) = found.training[-2:]
-        rises, then = ("still", "more would tell more") if bits - less > 0.02 else ("hardly", "more would add little")
-        said.append(f"{rises} rising with trials: {n} -> {most} training trials a label {bits - less:+.2f}; {then}")
-    said += [f"note: {note}" for note in found.notes]
-    said.append(f"rates are of {found.wire}")
-    return said
+    if len(answer.training) > 1:
+        (n, less), (most, bits) = answer.training[-2:]
+        rises, then = ("still", "more would add bits") if bits - less > 0.02 else ("hardly", "more would add little")
+        text.append(f"{rises} rising with trials: {n} -> {most} training trials a label {bits - less:+.2f}; {then}")
+    text += [f"note: {note}" for note in answer.notes]
+    text.append(f"rates are of {answer.wire}")
+    return text
 
 
-def _told(name: str, point: Point, found: Answer) -> str:
+def _point(name: str, point: Point, answer: Answer) -> str:
     verdict = "the full one" if point.verdict is None else str(point.verdict)
-    if point is found.cheapest and not found.empty:
+    if point is answer.cheapest and not answer.empty:
         verdict += " <- cheapest"
     return _row(
         name,
@@ -197,36 +199,36 @@ def _row(*cells: str) -> str:
     return f"{name:<18} {bits:>6} {events:>8} {each:>9} {rate:>8} {silent:>7}  {verdict}".rstrip()
 
 
-def _bits(found: Estimate | None) -> str:
-    return "-" if found is None else f"{found.bits:.2f}"
+def _bits(estimate: Estimate | None) -> str:
+    return "-" if estimate is None else f"{estimate.bits:.2f}"
 
 
-def _interval(found: Estimate) -> str:
-    low, high = found.interval
-    return f"{found.bits:.2f} of {found.most:.2f} bits [{low:.2f} {high:.2f}]"
+def _interval(estimate: Estimate) -> str:
+    low, high = estimate.interval
+    return f"{estimate.bits:.2f} of {estimate.most:.2f} bits [{low:.2f} {high:.2f}]"
 
 
-def _encoder(name: str, said: list[str]):  # type: ignore[no-untyped-def]
+def _encoder(name: str, settings: list[str]):  # type: ignore[no-untyped-def]
     from taxel.cli._recordings import encoder_of  # noqa: PLC0415  the command line starts quickly
 
     if name not in ("change_events", "fa1"):
         raise ProblemError(f"--encoder {name}: must be change_events or fa1, which have one train a taxel")
-    return None if name == "change_events" and not said else encoder_of(name, said)
+    return None if name == "change_events" and not settings else encoder_of(name, settings)
 
 
-def _numbers(option: str, said: str | None) -> list[float] | None:
-    if said is None:
+def _numbers(option: str, text: str | None) -> list[float] | None:
+    if text is None:
         return None
     try:
-        return [float(cell) for cell in said.split(",")]
+        return [float(cell) for cell in text.split(",")]
     except ValueError:
-        raise ProblemError(f"{option} {said}: must be numbers, as 1,2,5") from None
+        raise ProblemError(f"{option} {text}: must be numbers, as 1,2,5") from None
 
 
-def _whole(option: str, said: str | None) -> list[int] | None:
-    if said is None:
+def _whole(option: str, text: str | None) -> list[int] | None:
+    if text is None:
         return None
     try:
-        return [int(cell) for cell in said.split(",")]
+        return [int(cell) for cell in text.split(",")]
     except ValueError:
-        raise ProblemError(f"{option} {said}: must be whole numbers, as 10,30") from None
+        raise ProblemError(f"{option} {text}: must be whole numbers, as 10,30") from None

@@ -1,4 +1,4 @@
-"""``taxel live``: detections while they come."""
+"""``taxel live``: detections in a board's events, as these arrive."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from rich.live import Live as Display
 from rich.text import Text
 
 from taxel._base.files import try_whole
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import SecondsOption, app, with_typed
 from taxel.cli._array import geometry
@@ -56,7 +57,7 @@ __all__ = ["live"]
 
 @dataclass(frozen=True)
 class _Typed:
-    """Hold what is typed."""
+    """Hold the options of the command."""
 
     readout: ReadoutOption = None
     port: PortOption = LiveOptions.port
@@ -80,7 +81,7 @@ class _Typed:
             "of 0 while a tare is taken."
         ),
     ] = None
-    save_tare: Annotated[Path | None, typer.Option(help="Save the tare that was taken, in a new file (JSON).")] = None
+    save_tare: Annotated[Path | None, typer.Option(help="Save the fresh tare in a new file (JSON).")] = None
     record: RecordOption = None
     seconds: SecondsOption = None
     guard_frames: GuardFramesOption = LiveOptions.guard_frames
@@ -115,8 +116,8 @@ def live(typed: _Typed) -> None:
     JSON, written by the thread that made it: label; t_us, known_us and said_us by the board's clock; slope_mv_per_ms;
     said_ns by this computer's clock. --send sends the same lines elsewhere; a reader that is too slow loses lines,
     which are counted. --panel shows the board in a browser, --to in Rerun or Foxglove; a slow viewer loses pictures,
-    never data. Exit code 3: nothing came, or something was lost after it had arrived; 2: the board has more taxels than
-    the array.
+    never data. Exit code 3: nothing was received, or something was lost after it had arrived; 2: the board has more
+    taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
@@ -137,12 +138,12 @@ def live(typed: _Typed) -> None:
     with contextlib.ExitStack() as at_rest:
         if typed.control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
-        keeps = typed.record is not None or trained is not None
-        far = at_rest.enter_context(remote(typed.address, typed.congestion, keeps=keeps))
+        lossless = typed.record is not None or trained is not None
+        board = at_rest.enter_context(remote(typed.address, typed.congestion, lossless=lossless))
         with Live(
             typed.port,
             host=typed.host,
-            remote=far,
+            remote=board,
             array=None if typed.array is None else geometry(typed.array),
             registers=typed.preset,
             differences=typed.differences,
@@ -155,24 +156,24 @@ def live(typed: _Typed) -> None:
         ) as pipeline:
             if spikes is not None and isinstance(rest, Tare):
                 spikes = spikes.with_tare(rest)
-            last, looks = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
+            last, external = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
             summary = last.stop()
-            # Detections that were made while it was ending.
+            # Detections that the readout made while `stop` ran.
             _drain(last, console, typer.echo)
-    taken = summary.tare
-    if typed.save_tare is not None and taken is not None:
-        taken.save(typed.save_tare)
+    tare = summary.tare
+    if typed.save_tare is not None and tare is not None:
+        tare.save(typed.save_tare)
         console.print(f"tare written to {typed.save_tare}")
     if typed.report is not None and trained is not None and summary.path is not None:
-        _report(typed.report, trained, summary.path, taken if taken is not None else rest)
+        _report(typed.report, trained, summary.path, tare if tare is not None else rest)
         console.print(f"report: {typed.report / 'report.html'}", soft_wrap=True)
     _unsent(summary)
-    report_viewers(looks, quiet=typed.as_json)
+    report_viewers(external, quiet=typed.as_json)
     if not typed.as_json:
-        _say(summary, typed.guard_frames)
+        _print_summary(summary, typed.guard_frames)
     elif summary.nothing_came or summary.lost:
         typer.echo(f"taxel: {summary.verdict}", err=True)
-    if typed.save_tare is not None and taken is None and not summary.nothing_came:
+    if typed.save_tare is not None and tare is None and not summary.nothing_came:
         seconds = summary.counters["seconds"]
         raise ProblemError(
             f"--tare {typed.tare}: not complete after {seconds:.1f} s; {typed.save_tare} was not written"
@@ -189,14 +190,14 @@ def _shown(
     *,
     fresh: bool,
 ) -> tuple[Live, list[Viewer]]:
-    """Show what comes in terminal, panel and viewers until the end; return what receives then, and the viewers."""
+    """Show the board in terminal, panel and viewers until the end; return the last receiver, and the viewers."""
     shows: Panel | None = None
-    looks: list[Viewer] = []
-    # A program that stops reading the lines ends it as Ctrl-C does.
+    external: list[Viewer] = []
+    # A reader of the lines that ends (BrokenPipeError) ends the command as Ctrl-C does.
     with contextlib.ExitStack() as shown, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
         if typed.panel:
             if fresh:
-                # A serial line has one user at a time: the tare first.
+                # A serial line has one user at a time: first the tare, then the panel.
                 _tared(pipeline, at_rest, console)
             shows = shown.enter_context(
                 Panel(
@@ -204,9 +205,9 @@ def _shown(
                 )
             )
             announce(shows, typed.opens, console)
-        looks = viewers(shown, pipeline if shows is None else shows, typed.to or (), spikes)
-        _watch(pipeline, shows, looks, typed.seconds, console, at_rest, fresh=fresh and not typed.panel)
-    return pipeline if shows is None or shows.live is None else shows.live, looks
+        external = viewers(shown, pipeline if shows is None else shows, typed.to or (), spikes)
+        _watch(pipeline, shows, external, typed.seconds, console, at_rest, fresh=fresh and not typed.panel)
+    return pipeline if shows is None or shows.live is None else shows.live, external
 
 
 def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | None) -> None:
@@ -218,23 +219,25 @@ def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | Non
     recording = taxel.open(path)
     rest = tare if isinstance(tare, Tare) else None
     outcome = Outcome(str(path), Example(recording, {}, rest), recording.detections)
-    write_listening(folder, readout, [outcome], title=f"What was said live, recorded to {path}")
+    write_listening(folder, readout, [outcome], title=f"Live detections, recorded to {path}")
 
 
-def _say(summary: Summary, guard_frames: float) -> None:
+def _print_summary(summary: Summary, guard_frames: float) -> None:
     counters = summary.counters
-    typer.echo(f"{counters['detections']} detections, {counters['events']} events in {counters['seconds']:.1f} s")
+    detections, events = counted(counters["detections"], "detection"), counted(counters["events"], "event")
+    typer.echo(f"{detections}, {events} in {counters['seconds']:.1f} s")
     if counters["detections"]:
-        typer.echo(f"from known to said: {delays(counters['said_latency'])}")
+        typer.echo(f"from known to output: {delays(counters['said_latency'])}")
     if counters["wrong"]:
-        typer.echo(f"{counters['wrong']} were said too early: events came more than {guard_frames:g} frames late")
+        wrong = counted(counters["wrong"], "detection")
+        typer.echo(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
     if counters["late"]:
         typer.echo(
-            f"{counters['late']} events came out of order, or more than 0.1 s later than the board's clock said (as "
-            "from an emulated board on a machine too busy for its rate): they were heard when they came, and recorded"
+            f"{counted(counters['late'], 'event')} out of order, or more than 0.1 s later than by the board's clock "
+            "(as from an emulated board on a machine too busy for its rate): read out on arrival, and recorded"
         )
     if counters["events_dropped"]:
-        typer.echo(f"{counters['events_dropped']} events were dropped because the readout was too slow")
+        typer.echo(f"{counted(counters['events_dropped'], 'event')} dropped because the readout was too slow")
     if summary.path is not None:
         typer.echo(f"recorded to {summary.path}")
     typer.echo(summary.verdict)
@@ -246,14 +249,14 @@ def _unsent(summary: Summary) -> None:
         if one["lost"]:
             why = one["trouble"] or "read too slowly"
             typer.echo(
-                f"taxel: {one['lost']} of {one['sent'] + one['lost']} lines did not go to {one['to']}: {why}", err=True
+                f"taxel: lines not sent to {one['to']}: {one['lost']} of {one['sent'] + one['lost']}: {why}", err=True
             )
 
 
 def _together(typed: _Typed) -> None:
-    """Refuse options that nothing would use."""
+    """Refuse options that would have no effect."""
     if typed.readout is None and not typed.panel and not typed.to:
-        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel or --to VIEWER to look")
+        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel or --to VIEWER to show the board")
     if typed.readout is None and (typed.tare or typed.report or typed.send):
         raise ProblemError("--tare, --report and --send belong to a readout: give --readout FILE")
     if typed.folder is not None and not typed.panel:
@@ -261,7 +264,7 @@ def _together(typed: _Typed) -> None:
 
 
 def _fresh(typed: _Typed, rest: Tare | float | None) -> None:
-    """Refuse what only a fresh tare could use."""
+    """Refuse options that need a fresh tare, if none is taken."""
     if isinstance(rest, float):
         if typed.save_tare is not None:
             try_whole(typed.save_tare)
@@ -272,23 +275,23 @@ def _fresh(typed: _Typed, rest: Tare | float | None) -> None:
 
 
 def _tared(pipeline: Live, at_rest: contextlib.ExitStack, console: Console) -> None:
-    """Wait for the tare: one serial line has one user, so the panel gets it afterwards."""
+    """Wait for the tare: a serial line has one user at a time, so the panel gets it afterwards."""
     console.print("taking a tare: leave the sensor at rest")
     while pipeline.counters["taring"] and not pipeline._core.is_over():
         pipeline.next(REDRAW_S)
     at_rest.close()
     if pipeline.tare is not None:
-        _unheard(pipeline.tare)
+        _warn_of_unknown(pipeline.tare)
 
 
-def _unheard(tare: Tare) -> None:
-    """Warn where a fresh tare knows few taxels: encoders ignore the others."""
+def _warn_of_unknown(tare: Tare) -> None:
+    """Warn if a fresh tare has the rest of few taxels: encoders ignore the others."""
     known = int(np.count_nonzero(~np.isnan(tare.rest)))
     if 2 * known < tare.array.taxels:
         typer.echo(
-            f"taxel: the tare knows {known} of {tare.array.taxels} taxels, those that changed while it was taken; the "
-            "others are not listened to. Start taxel live before the board, which tells all taxels then, or give "
-            "--tare FILE",
+            f"taxel: the tare holds {known} of {tare.array.taxels} taxels, those that changed while it was taken; "
+            "events of the others are ignored. Start taxel live before the board, which then sends all values, or "
+            "give --tare FILE",
             err=True,
         )
 
@@ -296,17 +299,17 @@ def _unheard(tare: Tare) -> None:
 def _watch(
     pipeline: Live,
     panel: Panel | None,
-    looks: list[Viewer],
+    external: list[Viewer],
     seconds: float | None,
     console: Console,
     at_rest: contextlib.ExitStack,
     *,
     fresh: bool,
 ) -> None:
-    """Show rates and detections until the time is over; what holds `at_rest` ends with a `fresh` tare."""
-    # Above the display where both go to one terminal; else detections are the command's output.
+    """Show rates and detections until the time is over; with a `fresh` tare, close `at_rest` when it is complete."""
+    # If both go to one terminal, detections are printed above the display; else they go to standard output.
     above = console.is_terminal and sys.stdout.isatty()
-    say: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else typer.echo
+    echo: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else typer.echo
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as asked, display:
@@ -314,51 +317,51 @@ def _watch(
         while not asked.is_set() and (before is None or seconds is None or before["seconds"] < seconds):
             try:
                 if panel is not None and panel.live is not None and panel.live is not pipeline:
-                    # A page chose another address.
+                    # A client of the panel chose another address.
                     pipeline, before = panel.live, None
                 if before is None:
                     before = pipeline.counters
                 detection = pipeline.next(REDRAW_S)
                 if detection is not None:
-                    _print(detection, console, say)
-                _drain(pipeline, console, say)
+                    _print(detection, console, echo)
+                _drain(pipeline, console, echo)
                 now = pipeline.counters
             except ProblemError:
                 if panel is None or panel.live is pipeline:
                     raise
-                # A page ended it, to begin another.
+                # A client of the panel ended this receiver, to begin another.
                 continue
             if not now["taring"]:
                 at_rest.close()
                 if fresh and pipeline.tare is not None:
                     fresh = False
-                    _unheard(pipeline.tare)
+                    _warn_of_unknown(pipeline.tare)
             if not warned and (wrong := outside(now, pipeline.array)):
                 typer.echo(f"taxel: {wrong}", err=True)
                 warned = True
             if now["seconds"] - before["seconds"] >= REDRAW_S:
-                lines = [Text(state_of(viewer)) for viewer in looks]
+                lines = [Text(state_of(viewer)) for viewer in external]
                 display.update(Group(counters_table(before, now), _state(now), *lines))
                 before = now
 
 
-def _print(detection: Detection, console: Console, say: Callable[[str], None]) -> None:
-    """Print a detection, with its delay after `known`; with --json the thread that made it has written it."""
+def _print(detection: Detection, console: Console, echo: Callable[[str], None]) -> None:
+    """Print a detection, with its delay after `known`; with --json the readout's thread has written it."""
     if not console.quiet:
         delay = to_ms(detection.latency or 0)
-        say(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} said {delay:.2f} ms after it was known")
+        echo(f"{detection.t / 1e6:10.4f} s  {detection.label:<16} output {delay:.2f} ms after it was known")
 
 
-def _drain(pipeline: Live, console: Console, say: Callable[[str], None]) -> None:
+def _drain(pipeline: Live, console: Console, echo: Callable[[str], None]) -> None:
     """Print all detections that wait."""
     while (detection := pipeline.next(0.0)) is not None:
-        _print(detection, console, say)
+        _print(detection, console, echo)
 
 
 def _state(now: dict[str, Any]) -> Text:
-    """Return the lines below the table: the tare, lines and events that were lost."""
+    """Return the lines below the table: the tare, and losses of lines and events."""
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
-    sent = "".join(f"\n{one['lost']} lines lost to {one['to']}" for one in now["sent"] if one["lost"])
-    dropped = f"\n{now['events_dropped']} events dropped before the readout" if now["events_dropped"] else ""
+    sent = "".join(f"\n{counted(one['lost'], 'line')} lost to {one['to']}" for one in now["sent"] if one["lost"])
+    dropped = f"\n{counted(now['events_dropped'], 'event')} dropped before the readout" if now["events_dropped"] else ""
     return Text((dropped + sent).lstrip())

@@ -27,7 +27,7 @@ def merge(
     label: Annotated[
         str | None, typer.Option(help="Merge only the half second before and after each note with this text.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Merge recordings: by time, side by side, or the parts around a label in each.
@@ -48,4 +48,4 @@ def merge(
         return
     typer.echo(f"written to {out}: {merged!r}")
     for what in lost:
-        typer.echo(f"  not kept: {what}")
+        typer.echo(f"  lost: {what}")

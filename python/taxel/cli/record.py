@@ -1,4 +1,4 @@
-"""``taxel record``: a board's datagrams into a file."""
+"""``taxel record``: record a board's datagrams in a file."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.live import Live as Display
 
 from taxel import _core
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import OUTSIDE, SecondsOption, app
 from taxel.cli._array import geometry
@@ -41,7 +42,7 @@ from taxel.live.options import LiveOptions
 
 __all__ = ["record"]
 
-#: With --trials: so many in a row to which nothing came end it.
+#: With --trials: the number of empty trials in a row that ends the command.
 _EMPTY = 3
 
 
@@ -81,9 +82,9 @@ def record(
     during countdowns too, so each trial begins with the values of all taxels; with --countdown 0 nothing is lost
     between two trials. An empty trial is not saved, and its number is used again; with --trials, three empty trials in
     a row end the command with exit code 3. While it records, a key on the terminal, or a line on any other standard
-    input, writes a note with that label and the board's time into the .mcap (add < /dev/null where the input is not for
+    input, writes a note with that label and the board's time into the .mcap (add < /dev/null if the input is not for
     taxel). --source records other boards, and lines of numbers, into the same .mcap, each with its own clock. Exit code
-    3: nothing came, or something was lost after it had arrived; 2: the board has more taxels than --array.
+    3: nothing was received, or something was lost after it had arrived; 2: the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
@@ -102,13 +103,13 @@ def record(
         "overwrite": overwrite,
         "differences": differences,
         "name": name,
-        "sources": _named(source or []),
+        "sources": _sources(source or []),
         "remote": address,
     }
     console = Console(stderr=True, quiet=as_json)
     if length is None:
         summary, code = _one(file, live, seconds, markers, console)
-        _say(summary, as_json)
+        _print(summary, as_json)
     else:
         code = _automatic(file, live, length, countdown, start_index, trials, markers, console, as_json)
     if code:
@@ -126,32 +127,32 @@ def _automatic(
     console: Console,
     as_json: bool,
 ) -> int:
-    """Record trial after trial from one receiver until Ctrl-C, which ends the one that runs well; return a code."""
+    """Record trials from one receiver until Ctrl-C, which ends the current one regularly; return an exit code."""
     how = {name: live.pop(name) for name in ("compression", "overwrite")}
     codes: list[int] = []
     empty = 0
 
-    def following(kept: int) -> Path:
-        name = Path(_core.numbered_path(file, index + kept))
+    def following(saved: int) -> Path:
+        name = Path(_core.numbered_path(file, index + saved))
         if name.exists() and not how["overwrite"]:
             raise FileExistsError(errno.EEXIST, "exists already", str(name))
         return name
 
     def report(ended: Summary | None) -> None:
-        """Print how a trial ended; one to which nothing came leaves its number to the next."""
+        """Print how a trial ended; the next trial gets the number of an empty one."""
         nonlocal empty
         if ended is not None and ended.path is not None:
-            _say(ended, as_json)
+            _print(ended, as_json)
             codes.append(exit_code(ended, receiver.array))
             empty = 0
         else:
-            typer.echo(f"taxel: {name}: nothing arrived at {receiver.place}; not kept", err=True)
+            typer.echo(f"taxel: {name}: nothing arrived at {receiver.place}; not saved", err=True)
             empty += 1
 
     name = following(0)
     with (
-        remote(live["remote"], None, keeps=True) as far,
-        Live(record_later=True, **{**live, "remote": far}) as receiver,
+        remote(live["remote"], None, lossless=True) as board,
+        Live(record_later=True, **{**live, "remote": board}) as receiver,
     ):
         notes = noting(receiver.note, console.print) if _takes_notes(file, live["sources"]) else nullcontext("")
         with notes as keys:
@@ -195,8 +196,11 @@ def _count_down(name: Path, seconds: int, console: Console) -> None:
 def _one(
     file: Path, options: dict[str, Any], seconds: float | None, markers: bool, console: Console
 ) -> tuple[Summary, int]:
-    """Record one file until its time is over, the board marks a stop, or Ctrl-C; return how it ended, and a code."""
-    with remote(options["remote"], None, keeps=True) as far, Live(record=file, **{**options, "remote": far}) as live:
+    """Record one file until its time is over, the board marks a stop, or Ctrl-C; return summary and exit code."""
+    with (
+        remote(options["remote"], None, lossless=True) as board,
+        Live(record=file, **{**options, "remote": board}) as live,
+    ):
         notes = noting(live.note, console.print) if _takes_notes(file, options["sources"]) else nullcontext("")
         with suppress(KeyboardInterrupt), notes as keys:
             _watch(live, file, seconds, markers, console, keys, trial=False)
@@ -205,14 +209,14 @@ def _one(
 
 
 def _takes_notes(file: Path, sources: dict[str, str]) -> bool:
-    """Return whether typed lines are notes: a .lsa holds none, and a source may read the input itself."""
+    """Return whether typed lines are notes: a .lsa holds no notes, and a source may read the input itself."""
     return file.suffix == ".mcap" and not any(what.startswith("pipe:-") for what in sources.values())
 
 
 def _watch(
     live: Live, file: Path, seconds: float | None, markers: bool, console: Console, keys: str, *, trial: bool
 ) -> None:
-    """Show what comes until the time is over, a stop was marked (if `markers` count), or the recording broke."""
+    """Show the counts until the time is over, the board marks a stop (with `markers`), or the recording has failed."""
     console.print(f"listening on {live.place}, recording to {file}; Ctrl-C ends")
     if keys:
         console.print(keys)
@@ -220,7 +224,7 @@ def _watch(
         before, warned = live.counters, False
         began = before["seconds"]
         if trial:
-            # Markers from before belong to an earlier trial.
+            # Markers that were received before belong to an earlier trial.
             live.take_markers()
         while seconds is None or before["seconds"] - began < seconds:
             left = REDRAW_S if seconds is None else min(REDRAW_S, seconds - (before["seconds"] - began))
@@ -239,34 +243,38 @@ def _watch(
             before = now
 
 
-def _named(given: list[str]) -> dict[str, str]:
-    """Return what ``--source NAME=WHAT`` says."""
+def _sources(texts: list[str]) -> dict[str, str]:
+    """Return the sources that ``--source NAME=WHAT`` describes, by name."""
     sources: dict[str, str] = {}
-    for one in given:
+    for one in texts:
         name, equals, what = one.partition("=")
         if not equals or not name or not what:
             raise ProblemError(f"--source {one}: must be NAME=WHAT, as imu=serial:/dev/ttyACM0")
         if name in sources:
-            raise ProblemError(f"--source {one}: there are two of that name")
+            raise ProblemError(f"--source {one}: there are two sources of that name")
         sources[name] = what
     return sources
 
 
-def _say(summary: Summary, as_json: bool) -> None:
+def _print(summary: Summary, as_json: bool) -> None:
     if as_json:
         path = None if summary.path is None else str(summary.path)
         typer.echo(json.dumps(asdict(summary) | {"path": path}))
         return
     counters = summary.counters
     if summary.path is not None:
-        typer.echo(
-            f"{summary.path}: {counters['seconds']:.1f} s, {counters['decoded']} datagrams, "
-            f"{counters['capture']['bytes']} bytes, {counters['events']} events, {counters['markers']} markers"
+        contents = (
+            counted(counters["decoded"], "datagram"),
+            counted(counters["capture"]["bytes"], "byte"),
+            counted(counters["events"], "event"),
+            counted(counters["markers"], "marker"),
         )
-    for name, came in counters["sources"].items():
-        what = (
-            f"{came['decoded']} datagrams, {came['events']} events" if "capture" in came else f"{came['lines']} lines"
-        )
-        trouble = came.get("trouble")  # of lines alone
-        typer.echo(f"  {name}: {what}" + (f"; {trouble}" if trouble else ""))
+        typer.echo(f"{summary.path}: {counters['seconds']:.1f} s, {', '.join(contents)}")
+    for name, counts in counters["sources"].items():
+        if "capture" in counts:
+            received = f"{counted(counts['decoded'], 'datagram')}, {counted(counts['events'], 'event')}"
+        else:
+            received = counted(counts["lines"], "line")
+        trouble = counts.get("trouble")  # sources of lines alone have this key
+        typer.echo(f"  {name}: {received}" + (f"; {trouble}" if trouble else ""))
     typer.echo(summary.verdict)

@@ -1,4 +1,4 @@
-"""``taxel simulate``: a scene from a file, as a recording, as a film."""
+"""``taxel simulate``: a scene from a file, as a recording and as a movie."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
+from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._recordings import progress
@@ -37,7 +38,7 @@ def simulate(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of taxels and noise. Default: the scene's.")] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace the files that are written where they exist.")
+        bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -51,39 +52,51 @@ def simulate(
     from taxel.simulate import SceneFile, play, truth  # noqa: PLC0415
 
     with progress(quiet=True):
-        said = SceneFile.open(scene)
-    seed = said.seed if seed is None else seed
-    wanted = [path for path in (out, movie, labels) if path is not None]
-    if len({path.resolve() for path in wanted}) < len(wanted):
+        scene_file = SceneFile.open(scene)
+    seed = scene_file.seed if seed is None else seed
+    targets = [path for path in (out, movie, labels) if path is not None]
+    if len({path.resolve() for path in targets}) < len(targets):
         raise ProblemError("--out, --movie and --truth: must be different files")
     if movie is not None:
         writer_of(movie)
-    for path in wanted:
+    for path in targets:
         try_whole(path, overwrite=overwrite)
-    contacts, force = truth(said.acts(), preset=said.preset, array=said.array)
+    contacts, force = truth(scene_file.acts(), preset=scene_file.preset, array=scene_file.array)
     about: dict[str, Any] = {"scene": str(scene), "seed": seed, "contacts": [contact._asdict() for contact in contacts]}
     about["peak_n"] = float(force.max())
-    lines = [f"{scene}: {len(contacts)} touch(es), at most {force.max():.3g} N"]
+    lines = [f"{scene}: {counted(len(contacts), 'touch', 'touches')}, at most {force.max():.3g} N"]
     bar = Progress(console=Console(stderr=True, quiet=as_json), transient=True)
     with bar:
         if out is not None or movie is not None:
             task = bar.add_task("playing", total=1.0)
-            played = play(said.acts(), seed=seed, watch=lambda share: bar.update(task, completed=share), **said.options)
+            played = play(
+                scene_file.acts(),
+                seed=seed,
+                watch=lambda share: bar.update(task, completed=share),
+                **scene_file.options,
+            )
             bar.update(task, completed=1.0)
             about["events"] = len(played.events)
         if out is not None:
             lost = taxel.convert(played.events, out, overwrite=overwrite)
-            lines.append(f"{len(played.events)} events written to {out}")
-            lines += [f"  not kept: {what}" for what in lost]
+            lines.append(f"{counted(len(played.events), 'event')} written to {out}")
+            lines += [f"  lost: {what}" for what in lost]
         if movie is not None:
             task = bar.add_task("drawing", total=1.0)
-            film(played.events, movie, force, frame_us=said.registers.frame_us, slower=slower, overwrite=overwrite,
-                 watch=lambda share: bar.update(task, completed=share))  # fmt: skip
-            lines.append(f"film written to {movie}")
+            film(
+                played.events,
+                movie,
+                force,
+                frame_us=scene_file.registers.frame_us,
+                slower=slower,
+                overwrite=overwrite,
+                watch=lambda share: bar.update(task, completed=share),
+            )
+            lines.append(f"movie written to {movie}")
     if labels is not None:
         with_ends = sorted([(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts])
         rows = "".join(f"{label},{round(t)}\n" for t, label in with_ends)
         write_whole(labels, lambda file: file.write(f"label,t_us\n{rows}".encode()), overwrite=overwrite)
         lines.append(f"truth written to {labels}")
-    about["written"] = [str(path) for path in wanted]
+    about["written"] = [str(path) for path in targets]
     typer.echo(json.dumps(about) if as_json else "\n".join(lines))

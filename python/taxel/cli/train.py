@@ -1,4 +1,4 @@
-"""``taxel train``: labelled recordings to a readout."""
+"""``taxel train``: train a readout on labelled recordings."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ def train(
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
     ),
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout if it exists.")] = False,
     window_ms: Annotated[float, typer.Option(help="Largest distance of a detection from its event, ms.")] = 50.0,
     folds: Annotated[
         int | None,
         typer.Option(
             min=2,
-            help="Cross-validate in this many folds: of recordings, or of blocks of time where there is one recording.",
+            help="Cross-validate in this many folds: of recordings, or of blocks of time of a single recording.",
         ),
     ] = None,
     search: Annotated[
@@ -105,37 +105,42 @@ def train(
     elif "encoder.name" in changes:
         plan = Recipe.from_dict(changed({}, changes))
     opened = open_all(recordings)
-    with progress(as_json) as tell:
-        tell("reading")
-        happened = references(labels, "--labels", opened)
-        if not any(happened):
+    with progress(as_json) as update:
+        update("reading")
+        labelled = references(labels, "--labels", opened)
+        if not any(labelled):
             raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
         if recipe is None and "encoder.name" not in changes:
             recipe = recipes.fitting(_source(opened[0]))
         if recipe is not None:
-            plan = Recipe.load(recipe, changes, sorted({label for events in happened for label in events}))
-            tell(f"starting from the recipe {recipe}")
-        examples = _examples(opened, happened, tare, plan)
+            plan = Recipe.load(recipe, changes, sorted({label for events in labelled for label in events}))
+            update(f"starting from the recipe {recipe}")
+        examples = _examples(opened, labelled, tare, plan)
         if search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
             raise ProblemError("--search: the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
         judged = None
         if folds is not None:
             registers = opened[0].registers
             frame_us = None if registers is None else registers.frame_us
-            judged = judge(examples, plan, folds, search=search, window_ms=window_ms, frame_us=frame_us, progress=tell)
+            judged = judge(
+                examples, plan, folds, search=search, window_ms=window_ms, frame_us=frame_us, progress=update
+            )
         if search:
-            plan = choose(examples, plan, window_ms=window_ms, progress=tell)
-        readout = train_readout(examples, plan, progress=tell)
-        heard = [] if judged is not None and report is None else _on_itself(readout, opened, examples, window_ms, tell)
+            plan = choose(examples, plan, window_ms=window_ms, progress=update)
+        readout = train_readout(examples, plan, progress=update)
+        outcomes = []
+        if judged is None or report is not None:
+            outcomes = _on_itself(readout, opened, examples, window_ms, update)
     readout.save(out, overwrite=overwrite)
     trained = _Trained(
-        out, readout, recipe, plan, opened, judged or _own(heard, window_ms), judged, window_ms, search, report
+        out, readout, recipe, plan, opened, judged or _own(outcomes, window_ms), judged, window_ms, search, report
     )
     if report is not None:
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
-        held = () if judged is None else judged.scores
-        write_listening(report, readout, heard, title=f"How {out} was trained", judged=trained.how, held_out=held)
+        held_out = () if judged is None else judged.scores
+        title = f"Training of {out}"
+        write_listening(report, readout, outcomes, title=title, judged=trained.how, held_out=held_out)
     typer.echo(json.dumps(trained.to_dict()) if as_json else trained.page())
 
 
@@ -146,15 +151,15 @@ def _source(recording: Recording) -> Events | Frames:
 
 
 def _examples(
-    opened: Sequence[Recording], happened: Sequence[Mapping[str, Any]], tare: str | None, plan: Recipe
+    opened: Sequence[Recording], labelled: Sequence[Mapping[str, Any]], tare: str | None, plan: Recipe
 ) -> list[Example]:
-    """Return recordings as examples; without a tare, where the encoder wants one, the rest is taken from each."""
+    """Return recordings as examples; if the encoder needs a tare and none is given, it is taken from each recording."""
     from taxel.detect import Example  # noqa: PLC0415
 
-    wants = tare is None and getattr(plan.encoder, "tare", True) is None
+    needs_rest = tare is None and getattr(plan.encoder, "tare", True) is None
     return [
-        Example(one, events, tare_before(events, one) if wants else tare_of(tare, one))
-        for one, events in zip(opened, happened, strict=True)
+        Example(one, events, tare_before(events, one) if needs_rest else tare_of(tare, one))
+        for one, events in zip(opened, labelled, strict=True)
     ]
 
 
@@ -163,33 +168,34 @@ def _on_itself(
     opened: Sequence[Recording],
     examples: Sequence[Example],
     window_ms: float,
-    tell: Callable[[str], None],
+    update: Callable[[str], None],
 ) -> list[Outcome]:
+    """Return the outcomes of the readout on the recordings that it was trained on."""
     from taxel.detect import Example, Outcome, run, score  # noqa: PLC0415
 
-    heard = []
+    outcomes = []
     for one, example in zip(opened, examples, strict=True):
-        tell(f"hearing {one.path} again")
+        update(f"scoring on {one.path}")
         truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
-        found = run(readout, one, tare=example.tare)
-        own = score(found, truth, window_ms)
-        heard.append(Outcome(str(one.path), Example(one, truth, example.tare), found, own))
-    return heard
+        detections = run(readout, one, tare=example.tare)
+        own = score(detections, truth, window_ms)
+        outcomes.append(Outcome(str(one.path), Example(one, truth, example.tare), detections, own))
+    return outcomes
 
 
-def _own(heard: Sequence[Outcome], window_ms: float) -> Judged:
-    """Say how it did on what it was trained on."""
+def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
+    """Return the scores of a readout on its own training data."""
     from taxel.detect import Judged  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
 
-    truths = [one.example.labels for one in heard]
-    together = score_together([one.found for one in heard], truths, window_ms)
-    return Judged(tuple(one.score for one in heard if one.score is not None), together, "its own training data")
+    truths = [one.example.labels for one in outcomes]
+    together = score_together([one.found for one in outcomes], truths, window_ms)
+    return Judged(tuple(one.score for one in outcomes if one.score is not None), together, "its own training data")
 
 
 @dataclass(frozen=True)
 class _Trained:
-    """What came out."""
+    """The result of a training: the readout, and its scores."""
 
     out: Path
     readout: Readout
@@ -204,16 +210,16 @@ class _Trained:
 
     @property
     def how(self) -> str:
-        """Return on what it was judged."""
+        """Return on which data the readout was scored."""
         if self.judged is None:
             return "on its own training data"
         one = self.judged.together
-        held = f"{one.found} of {one.events} found, {one.missed} missed, {one.false} false"
-        return f"on its own training data; held out ({self.judged.how}): {held}"
+        counts = f"{one.found} of {one.events} found, {one.missed} missed, {one.false} false"
+        return f"on its own training data; held out ({self.judged.how}): {counts}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
-        said: dict[str, Any] = {
+        """Return the result as plain values for JSON."""
+        result: dict[str, Any] = {
             "readout": str(self.out),
             "labels": list(self.readout.labels),
             "recipe": self.recipe,
@@ -224,15 +230,15 @@ class _Trained:
                 for one, each in zip(self.opened, self.scored.scores, strict=True)
             ],
         }
-        said["score"] = self.scored.together.to_dict()
+        result["score"] = self.scored.together.to_dict()
         if self.report is not None:
-            said["report"] = str(self.report / "report.html")
+            result["report"] = str(self.report / "report.html")
         if self.searched:
-            said["neurons"] = {label: dict(self.plan.neurons[label]) for label in self.readout.labels}
-        return said
+            result["neurons"] = {label: dict(self.plan.neurons[label]) for label in self.readout.labels}
+        return result
 
     def page(self) -> str:
-        """Return it as lines for people."""
+        """Return the result as lines for people."""
         lines = []
         if self.recipe is not None:
             lines.append(f"recipe {self.recipe}" + (f": {self.plan.about}" if self.plan.about else ""))
@@ -240,7 +246,7 @@ class _Trained:
         for label in self.readout.labels if self.searched else ():
             chosen = ", ".join(f"{key} {value}" for key, value in self.plan.neurons[label].items() if key != "search")
             lines.append(f"{label}, chosen: {chosen}")
-        how = "on its own training data" if self.judged is None else f"on what was held out: {self.judged.how}"
+        how = "on its own training data" if self.judged is None else f"on held-out data: {self.judged.how}"
         lines.append(f"\n{how} (window {self.window_ms:g} ms)")
         lines += [f"\n{one.path}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
         if len(self.scored.scores) > 1:

@@ -60,23 +60,23 @@ def view(
     console = Console(stderr=True, quiet=as_json)
     with contextlib.ExitStack() as shown:
         panel = shown.enter_context(Panel(recording, host=panel_host, port=panel_port))
-        looks = viewers(shown, panel, to or (), spikes, 1.0 if speed is None else speed)
+        external = viewers(shown, panel, to or (), spikes, 1.0 if speed is None else speed)
         if as_json:
-            where = {"to": [viewer.place for viewer in looks]} if looks else {}
+            where = {"to": [viewer.place for viewer in external]} if external else {}
             typer.echo(json.dumps({"url": panel.url, "token": panel.token, **where}))
         announce(panel, not to if opens is None else opens, console)
         console.print("Ctrl-C ends")
-        waited = dict.fromkeys(looks, "")
+        reported = dict.fromkeys(external, "")
         until = None if seconds is None else time.monotonic() + seconds
         with contextlib.suppress(KeyboardInterrupt):
             while until is None or time.monotonic() < until:
                 time.sleep(_CHECK_EVERY)
-                for viewer, told in list(waited.items()):
+                for viewer, trouble in list(reported.items()):
                     state = viewer.state
-                    if state.trouble and state.trouble != told:
-                        waited[viewer] = state.trouble
+                    if state.trouble and state.trouble != trouble:
+                        reported[viewer] = state.trouble
                         console.print(f"{viewer.place}: {state.trouble}", soft_wrap=True)
                     if state.over:
-                        del waited[viewer]
+                        del reported[viewer]
                         console.print(f"shown to its end in {state_of(viewer)}", soft_wrap=True)
-    report_viewers(looks, quiet=as_json)
+    report_viewers(external, quiet=as_json)

@@ -1,4 +1,4 @@
-"""From a board's datagrams to detections, while they come, and what a browser is shown of them."""
+"""From a board's datagrams to detections, as they arrive, and the panel that shows them in a browser."""
 
 import warnings
 from typing import Any
@@ -6,10 +6,10 @@ from typing import Any
 from taxel.detections import Detection
 from taxel.live.bridge import Bridge
 from taxel.live.client import PanelClient
+from taxel.live.columns import heard
 from taxel.live.live import Live
 from taxel.live.panel import Panel
 from taxel.live.remote import Remote
-from taxel.live.said import heard
 from taxel.live.sending import PORT, send
 from taxel.live.source import Source
 from taxel.live.summary import Summary

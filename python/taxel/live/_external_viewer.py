@@ -20,7 +20,7 @@ class ExternalViewer(Protocol):
 
     @property
     def place(self) -> str:
-        """Where it is, in words."""
+        """The viewer's address as text."""
 
     @property
     def why_not_connected(self) -> str:
@@ -36,7 +36,7 @@ class ExternalViewer(Protocol):
         """Show the next item. May wait for a viewer that reads slowly."""
 
     def flush(self) -> None:
-        """Wait until the viewer has read everything; raises `Disconnected` where it does not run any more."""
+        """Wait until the viewer has read everything; raises `Disconnected` if it does not run any more."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ViewerKind:
 
     def open(self, host: str, port: int) -> ExternalViewer:
         """Connect to a viewer, or open the port that viewers connect to."""
-        # The modules of extras are imported only where they are used.
+        # The modules of extras are imported only when they are used.
         kind: Any = getattr(importlib.import_module(self.module), self.name)
         viewer: ExternalViewer = kind(host, port) if self.has_host else kind(port)
         return viewer

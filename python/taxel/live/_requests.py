@@ -43,14 +43,14 @@ def presets_path() -> Path:
 
 def own_addresses() -> list[tuple[str, str]]:
     """Return the IPv4 addresses of this machine: name of the network interface and address."""
-    found = []
+    addresses = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
         for _, name in socket.if_nameindex():
             # An interface that is down has none. struct ifreq: the name, then the address from byte 20 on.
             with contextlib.suppress(OSError):
                 answer = fcntl.ioctl(any_socket, _ADDRESS_OF, struct.pack("256s", name.encode()[:15]))
-                found.append((name, socket.inet_ntoa(answer[20:24])))
-    return found
+                addresses.append((name, socket.inet_ntoa(answer[20:24])))
+    return addresses
 
 
 @contextlib.contextmanager
@@ -157,8 +157,8 @@ class RequestHandler:
         """
         sensor = Array._from_parts(array)
         counts = [np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))]
-        named = judged(sensor, TaxelStatistics(*counts)).named()
-        return named["dead"], named["stuck"], named["noisy"]
+        taxels = judged(sensor, TaxelStatistics(*counts)).named()
+        return taxels["dead"], taxels["stuck"], taxels["noisy"]
 
     def cut(self, path: Path, out: Path, start_us: int, stop_us: int) -> list[str]:
         """Write a stretch of a recording to a new file; return what that file cannot hold."""

@@ -50,7 +50,7 @@ _SCHEMAS = {
 
 
 class ToFoxglove:
-    """Show what a panel shows to anybody who opens ``ws://127.0.0.1:PORT`` in Foxglove.
+    """Show what a panel shows in every Foxglove that opens ``ws://127.0.0.1:PORT``.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def _change(picture: Picture) -> NDArray[np.uint8]:
 
 @cache
 def _colours() -> NDArray[np.uint8]:
-    """Return 256 colours that can be told apart with a colour vision deficiency."""
+    """Return 256 colours that can be distinguished with a colour vision deficiency."""
     from matplotlib import colormaps  # noqa: PLC0415  loads slowly
 
     table: NDArray[np.uint8] = (np.asarray(colormaps["viridis"](np.arange(256)))[:, :3] * 255).astype(np.uint8)

@@ -160,4 +160,6 @@ def _described(detection: Detection) -> str:
     known = f"known {to_ms(detection.known - detection.t):.2f} ms after the event"
     if detection.latency is None:
         return f"{detection.label}: {known}"
-    return f"{detection.label}: {known}, said {to_ms(detection.latency):.2f} ms later, slope {detection.slope:g} mV/ms"
+    return (
+        f"{detection.label}: {known}, output {to_ms(detection.latency):.2f} ms later, slope {detection.slope:g} mV/ms"
+    )

@@ -1,7 +1,7 @@
 """The process between a panel's server and an external viewer: whatever the viewer does, capture goes on.
 
 It holds a `PanelClient`, a bounded queue, and a thread that passes the items to the viewer. One line of JSON on the
-standard input says what to do; the end of the input ends the process. It reports its state by lines of JSON on the
+standard input holds its options; the end of the input ends the process. It reports its state by lines of JSON on the
 standard output.
 """
 
@@ -24,15 +24,15 @@ from taxel.live.client import Curves, Item, PanelClient, Picture, Spikes, Subjec
 
 __all__ = ["BoundedQueue", "main"]
 
-#: So many pictures wait at most, and so many other items: curves, spikes, detections, notes.
+#: The largest numbers of waiting pictures and of other waiting items: curves, spikes, detections, notes.
 MOST_PICTURES, MOST_OTHERS = 32, 1024
 
-#: How often the state is reported and a viewer is looked for, and how long pending items may take at the end, s.
-_REPORT_EVERY_S, _LOOK_EVERY_S, _FLUSH_WITHIN_S = 0.25, 0.1, 2.0
+#: Interval of reports, interval of checks for a viewer, and time for the pending items at the end, s.
+_REPORT_EVERY_S, _POLL_EVERY_S, _FLUSH_WITHIN_S = 0.25, 0.1, 2.0
 
 
 class BoundedQueue:
-    """The items that wait for a viewer. Where one finds no room the oldest of its kind is dropped, and counted."""
+    """The items that wait for a viewer. In a full queue the oldest item of the same kind is dropped, and counted."""
 
     def __init__(self) -> None:
         self._items: deque[tuple[Subject, Item]] = deque()
@@ -63,7 +63,7 @@ class BoundedQueue:
                 return
 
     def take_all(self, timeout: float) -> list[tuple[Subject, Item]]:
-        """Return all items, which stay in hand until `done`; none where none arrives within `timeout` s."""
+        """Return all items, which stay in hand until `done`; an empty list if none arrives within `timeout` s."""
         with self._changed:
             self._changed.wait_for(lambda: self._items, timeout)
             items = list(self._items)
@@ -118,13 +118,13 @@ class Relay:
         while True:
             if not self._viewer.is_connected():
                 self._connected = False
-                time.sleep(_LOOK_EVERY_S)
+                time.sleep(_POLL_EVERY_S)
                 continue
             if not self._connected and self._speed is not None:
                 self._client.play(self._speed)
                 self._speed = None
             self._connected = True
-            items = self._queue.take_all(_LOOK_EVERY_S)
+            items = self._queue.take_all(_POLL_EVERY_S)
             count = _counted(items)
             self._in_hand = count
             try:
@@ -160,11 +160,11 @@ class Relay:
         self._client.close()
         until = time.monotonic() + _FLUSH_WITHIN_S
         while time.monotonic() < until and not self._is_done() and self._connected:
-            time.sleep(_LOOK_EVERY_S)
+            time.sleep(_POLL_EVERY_S)
 
 
 def _kind_and_count(item: Item) -> tuple[str, int]:
-    """Return what counts of a viewer call an item, and for how many it counts."""
+    """Return an item's key in the counts of a viewer, and the number that is added there."""
     match item:
         case Picture():
             return "pictures", 1

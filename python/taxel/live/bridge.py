@@ -1,4 +1,4 @@
-"""A board of this computer, for others."""
+"""A board of this computer, published to other computers."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ __all__ = ["PLACE", "Bridge"]
 #: Default address: only this computer can connect to it.
 PLACE = "127.0.0.1:7447"
 
-#: How long a wait lasts before it is asked whether to stop, s.
-_LOOK_S = 0.05
+#: Interval at which a wait checks whether to stop, s.
+_POLL_S = 0.05
 
 #: Interval at which the published description of the sensor is updated, s.
 _UPDATE_S = 1.0
@@ -35,7 +35,7 @@ class Bridge:
     """Publish what a board sends to this computer: unchanged datagrams, low-rate pictures, detections.
 
     A context manager. Recorders on other computers receive every datagram: the bridge buffers up to 64 MiB for a slow
-    one, and disconnects it after 1.5 s without progress. Viewers lose datagrams where they are too slow. Neither slows
+    one, and disconnects it after 1.5 s without progress. Viewers that are too slow lose datagrams. Neither slows
     the `Live` of this computer. The data are neither encrypted nor protected: every computer that reaches `listen` can
     receive them.
 
@@ -48,7 +48,7 @@ class Bridge:
     listen : str or sequence of str
         HOST:PORT of this computer to listen on.
     connect : str or sequence of str
-        HOST:PORT of a Zenoh router, where there is one.
+        HOST:PORT of a Zenoh router, if there is one.
     clock_ahead_s : float, s
         For tests: offset of the clock of all published times.
     clock_drift_ppm : float, parts per million (share)
@@ -96,7 +96,7 @@ class Bridge:
         renewed = time.monotonic()
         try:
             while not (self._copies.is_over() or self._ending.is_set()):
-                copied = self._copies.next(_LOOK_S)
+                copied = self._copies.next(_POLL_S)
                 if copied is not None:
                     send[copied[0]](copied[1])
                 if time.monotonic() - renewed > _UPDATE_S:
@@ -112,11 +112,11 @@ class Bridge:
     @property
     def counts(self) -> dict[str, dict[str, Any]]:
         """Parcels sent and dropped for "block" (recorders) and "drop" (viewers), and whether there is a subscriber."""
-        counted = dict(zip(("block", "drop"), with_taxel_errors(self._zenoh.counts), strict=True))
-        return {what: dict(zip(("sent", "dropped", "heard"), row, strict=True)) for what, row in counted.items()}
+        counts = dict(zip(("block", "drop"), with_taxel_errors(self._zenoh.counts), strict=True))
+        return {what: dict(zip(("sent", "dropped", "heard"), row, strict=True)) for what, row in counts.items()}
 
     def stop(self) -> None:
-        """Publish what waits, and end; stop the `Live` first where everything is to be published.
+        """Publish what waits, and end; stop the `Live` first if everything must be published.
 
         Raises
         ------
@@ -148,17 +148,17 @@ class Bridge:
         return f"Bridge({self.name!r}, {', '.join(self.listen)})"
 
 
-def _places(name: str, said: str | Sequence[str]) -> list[str]:
-    places = [said] if isinstance(said, str) else list(said)
+def _places(name: str, addresses: str | Sequence[str]) -> list[str]:
+    places = [addresses] if isinstance(addresses, str) else list(addresses)
     for place in places:
-        found = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[\w.-]+):(\d{1,5})", text(name, place), re.ASCII)
-        if not found or not 1 <= int(found[2]) <= 65_535:
+        match = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[\w.-]+):(\d{1,5})", text(name, place), re.ASCII)
+        if not match or not 1 <= int(match[2]) <= 65_535:
             raise ProblemError(f"{name} is {place!r}: must be HOST:PORT, as {PLACE}")
     return places
 
 
 def _refused(place: str) -> None:
-    """Say why nothing can listen at a place of this computer, where that is so."""
+    """Raise the reason if no program can listen at an address of this computer."""
     host, _, port = place.rpartition(":")
     try:
         ((family, kind, _, _, address), *_) = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)
@@ -170,7 +170,7 @@ def _refused(place: str) -> None:
         raise DeviceError(f"listen {place}: no address of that name is known here") from None
     except OSError as error:
         right = {
-            errno.EADDRINUSE: "another program listens there: end it, or take another port",
+            errno.EADDRINUSE: "another program listens there: end it, or use another port",
             errno.EADDRNOTAVAIL: "it must be an address of this computer, or 0.0.0.0 for all of them",
         }.get(error.errno or 0)
         why = (error.strerror or str(error)).lower()
@@ -179,5 +179,7 @@ def _refused(place: str) -> None:
 
 def _about(live: Live) -> str:
     """Return the description of the sensor that is published."""
-    held = json.loads(live._core.registers())
-    return json.dumps({"array": live.array._geometry(), "registers": held, "differences": live._options.differences})
+    registers = json.loads(live._core.registers())
+    return json.dumps(
+        {"array": live.array._geometry(), "registers": registers, "differences": live._options.differences}
+    )

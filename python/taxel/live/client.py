@@ -31,13 +31,13 @@ __all__ = ["Curves", "Item", "PanelClient", "Picture", "Spikes", "Subject"]
 #: Pressure of a taxel without any event so far, and time of a picture before the first event.
 _UNKNOWN, _NO_TIME = 65_535, -(2**63)
 
-#: A flag of a picture: forget all columns that came before.
+#: A flag of a picture: all earlier columns are void.
 _RESTART = 4
 
-#: Late events change a column of time for so long, us; after that it is final.
+#: How long late events can change a column of time, us; after that it is final.
 _LATE_US = 120_000
 
-#: The scale of pictures is the largest value of so long, us.
+#: The scale of pictures is the largest value within this time, us.
 _SCALE_US = 10_000_000
 
 #: Longer than the server waits between two messages of spikes, s.
@@ -144,12 +144,12 @@ class PanelClient:
     Parameters
     ----------
     url : str
-        The panel's address with its token, as `Panel.url` gives it and ``taxel live --panel`` prints it. The recording
+        The panel's address with its token, as `Panel.url` holds it and ``taxel live --panel`` prints it. The recording
         that it names, if any, is opened at its beginning, paused: see `play`.
     rate_hz : float, 1 to 60
         Maximum number of pictures a second.
     encoder : Encoder, optional
-        The encoder whose spikes are wanted.
+        The encoder whose spikes are sent too.
     recording : str, optional
         Name of another recording in the panel's folder.
 
@@ -180,7 +180,7 @@ class PanelClient:
         rate = number("rate_hz", rate_hz)
         if not 1.0 <= rate <= _MOST_HZ:
             raise ProblemError(f"rate_hz is {rate:g}: must lie in 1 to {_MOST_HZ:g}")
-        wanted = None if encoder is None else instance("encoder", encoder, Encoder).to_json()
+        spikes = None if encoder is None else instance("encoder", encoder, Encoder).to_json()
         opens = opens if recording is None else text("recording", recording)
         self._socket = _connected(address, token)
         self._period_s, self._live = 1.0 / rate, opens is None
@@ -190,14 +190,14 @@ class PanelClient:
         self._time = self._curves_until = _NO_TIME
         self._columns: tuple[NDArray[np.int64], NDArray[Any]] | None = None
         self._full, self._full_change = _Scale(), _Scale()
-        #: Of a recording, what is yielded when playback has come to its time.
+        #: Items of a recording that are yielded when playback reaches their time.
         self._later: deque[Detection | Note] = deque()
         self._plays = self._ends = False
         self._warning: str | None = None
         if opens is not None:
             self._send(type="open", name=opens)
-        if wanted is not None:
-            self._send(type="encode", encoder=json.loads(wanted))
+        if spikes is not None:
+            self._send(type="encode", encoder=json.loads(spikes))
 
     @property
     def warning(self) -> str | None:
@@ -270,11 +270,11 @@ class PanelClient:
         elif kind == "opened":
             self._begin(message["array"], message["name"])
             self._noise_floor = (message["registers"] or {}).get("noise_floor", self._noise_floor)
-            found: list[Detection | Note] = [
+            items: list[Detection | Note] = [
                 Detection(one["label"], one["t_us"], one["known_us"]) for one in message["detections"]
             ]
-            found += [Note(one["text"], one["t_us"]) for one in message["notes"] if one["t_us"] is not None]
-            self._yield_later(found)
+            items += [Note(one["text"], one["t_us"]) for one in message["notes"] if one["t_us"] is not None]
+            self._yield_later(items)
         elif kind == "labels":
             self._yield_later([Note(one["label"], one["t_us"]) for one in message["labels"]])
         elif kind == "registers":
@@ -340,7 +340,7 @@ class PanelClient:
             yield subject, self._later.popleft()
 
     def _final_curves(self, *, over: bool) -> Iterator[tuple[Subject, Item]]:
-        """Yield the new curves that no late event can change any more; all of them where the source is over."""
+        """Yield the new curves that no late event can change any more; all of them when the source has ended."""
         if self._columns is None or self._subject is None:
             return
         ends, curves = self._columns

@@ -1,4 +1,4 @@
-"""From a board's datagrams to detections, while they come."""
+"""From a board's datagrams to detections, as they arrive."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from taxel.tare import Tare
 
 __all__ = ["Live"]
 
-#: How what goes to, or comes from, the lab streaming layer begins.
+#: Prefix of the sources and destinations of the lab streaming layer.
 _LSL = "lsl:"
 
 #: The largest column or row of any taxel.
 _MOST_PLACE = 2**16 - 1
 
-#: How long an iteration waits at a time.
+#: How long an iteration waits at a time, s.
 _WAIT_S = 0.5
 
 
@@ -158,7 +158,7 @@ class Live:
             None if readout is None else readout.to_json(),
             tare.to_json() if isinstance(tare, Tare) else None,
             None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
-            None if not receivers else lambda *said: [receive(Detection(*said)) for receive in receivers],
+            None if not receivers else lambda *values: [receive(Detection(*values)) for receive in receivers],
             flag("lines", options.lines),
             feed,
         )
@@ -208,16 +208,16 @@ class Live:
         ...     live.next(0.0) is None
         True
         """
-        said = self._core.next(number("timeout", timeout))
-        return None if said is None else Detection(*said)
+        values = self._core.next(number("timeout", timeout))
+        return None if values is None else Detection(*values)
 
     def __iter__(self) -> Iterator[Detection]:
         """Yield detections as they come, until `stop` is called."""
         while True:
             over = self._core.is_over()
-            said = self.next(0.0 if over else _WAIT_S)
-            if said is not None:
-                yield said
+            detection = self.next(0.0 if over else _WAIT_S)
+            if detection is not None:
+                yield detection
             elif over:
                 return
 
@@ -228,7 +228,7 @@ class Live:
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
-        `wire_late` (events of version 2 that came when time had gone on without them), `bridged` (None, or of a board
+        `wire_late` (events of version 2 that arrived after time had passed theirs), `bridged` (None, or of a board
         of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
         ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
         `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those output in a
@@ -257,8 +257,8 @@ class Live:
         """The fresh tare, once it is complete."""
         if self._summary is not None:
             return self._summary.tare
-        taken = self._core.tare()
-        return None if taken is None else Tare.from_json(taken)
+        text_of_tare = self._core.tare()
+        return None if text_of_tare is None else Tare.from_json(text_of_tare)
 
     def take_markers(self) -> list[tuple[int, bool]]:
         """Return the markers that were received since the last call: (t us, start)."""
@@ -323,13 +323,13 @@ class Live:
         ProblemError : no such source, or other columns
         OSError : the disk is full
         """
-        came = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
-        self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), came)
+        arrival = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
+        self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), arrival)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
         """Use the values that taxels hold now as their rest from now on: for taxels that drift.
 
-        The readout's encoder reads them above that rest, where it uses a tare; the recording contains the zeroing, with
+        The readout's encoder reads them above that rest, if it uses a tare; the recording contains the zeroing, with
         the rests before and after, and `taxel.detect.run` applies it. Only done on request: done automatically, it
         would use a standing load as the rest.
 
@@ -344,14 +344,13 @@ class Live:
             that is being taken, or a `.lsa` that is recorded, which cannot hold it
         OSError : the disk is full
         """
-        columns, rows = (numbers(name, given, np.int64).reshape(-1) for name, given in (("x", x), ("y", y)))
+        columns, rows = (numbers(name, value, np.int64).reshape(-1) for name, value in (("x", x), ("y", y)))
         if len(columns) != len(rows):
             raise ProblemError(f"x has {len(columns)} columns, y {len(rows)} rows: must be as many")
-        for name, given in (("x", columns), ("y", rows)):
-            if len(given) and (given.min() < 0 or given.max() > _MOST_PLACE):
-                raise ProblemError(
-                    f"{name}: holds {given.min() if given.min() < 0 else given.max()}, must be a taxel's"
-                )
+        for name, places in (("x", columns), ("y", rows)):
+            if len(places) and (places.min() < 0 or places.max() > _MOST_PLACE):
+                wrong = places.min() if places.min() < 0 else places.max()
+                raise ProblemError(f"{name}: holds {wrong}, must be a taxel's")
         return tuple(Zeroing(*one) for one in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True))))
 
     @property
@@ -404,7 +403,7 @@ class Live:
         return None if ended is None else summary_of(ended)
 
     def record_again(self) -> bool:
-        """Restart the recording, where no source has sent anything yet; return whether that was so."""
+        """Restart the recording, if no source has sent anything yet; return whether that was so."""
         return self._core.record_again()
 
     def end_recording(self) -> Summary:

@@ -1,7 +1,7 @@
 """The lab streaming layer: its streams as sources of a recording, and detections as one of its streams.
 
-Its library listens on every address of the machine, TCP and UDP from port 16572 on, whatever taxel asks of it: so
-nothing here begins unless it is named, and then with a warning.
+Its library listens on every address of the machine, TCP and UDP from port 16572 on, and taxel cannot change that: so
+it is loaded only if a stream is named, and then with a warning.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class LslInlet:
     Attributes
     ----------
     columns : list of str
-        Its stamp, `t_s`, s of the sender's clock, then its channels, by their labels where it has some.
+        Its time stamp, `t_s`, s of the sender's clock, then its channels, by their labels if it has some.
 
     Raises
     ------
@@ -53,40 +53,40 @@ class LslInlet:
 
     def __init__(self, name: str) -> None:
         lsl = _pylsl()
-        found = lsl.resolve_byprop("name", text("name", name), 1, _LOOK_S)
-        if not found:
+        streams = lsl.resolve_byprop("name", text("name", name), 1, _LOOK_S)
+        if not streams:
             raise ProblemError(f"lsl:{name}: no stream of that name was found within {_LOOK_S:g} s")
-        if found[0].channel_format() == lsl.cf_string:
+        if streams[0].channel_format() == lsl.cf_string:
             raise ProblemError(f"lsl:{name}: a stream of texts; only numbers are recorded")
         self.name = name
-        # Labels come with the connection; stamps stay the sender's own.
-        self._inlet = lsl.StreamInlet(found[0], processing_flags=lsl.proc_none)
+        # Labels arrive with the connection; the time stamps stay the sender's own.
+        self._inlet = lsl.StreamInlet(streams[0], processing_flags=lsl.proc_none)
         try:
             labels = self._inlet.info(_LOOK_S).get_channel_labels() or []
         except Exception as error:  # its library's errors have no base of their own
             raise ProblemError(f"lsl:{name}: does not name its channels ({error})") from None
-        count = found[0].channel_count()
+        count = streams[0].channel_count()
         names = [str(label) for label in labels if label]
         plain = len(set(names)) == count and not any(set(one) & set(",:=") for one in names) and "t_s" not in names
         self.columns = ["t_s", *(names if plain else [f"channel_{k}" for k in range(count)])]
         self._ends = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def begin(self, take: Callable[[list[float], int], object]) -> None:
-        """Call `take` with stamp and values, and when they came (ns since 1970), in a thread of its own."""
+    def begin(self, receive: Callable[[list[float], int], object]) -> None:
+        """Call `receive` with time stamp and values, and their arrival (ns since 1970), in a thread of its own."""
 
-        def receive() -> None:
+        def run() -> None:
             while not self._ends.is_set():
                 values, stamp = self._inlet.pull_sample(_WAIT_S)
                 if values is None:
                     continue
                 try:
-                    take([stamp, *map(float, values)], time.time_ns())
+                    receive([stamp, *map(float, values)], time.time_ns())
                 except (Error, OSError):
                     # The recording has ended; its own end reports why.
                     return
 
-        self._thread = threading.Thread(target=receive, name="taxel-lsl", daemon=True)
+        self._thread = threading.Thread(target=run, name="taxel-lsl", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
@@ -115,7 +115,7 @@ class LslOutlet:
         about = lsl.StreamInfo(text("name", name), "Markers", 1, lsl.IRREGULAR_RATE, lsl.cf_string, f"taxel {name}")
         self._clock, self._outlet = lsl.local_clock, lsl.StreamOutlet(about)
 
-    def __call__(self, said: Any) -> None:
-        """Send one: a `taxel.Detection`."""
-        ago_s = (time.time_ns() - said.said_ns) * 1e-9 + (said.said - said.t) * 1e-6
-        self._outlet.push_sample([said.label], self._clock() - ago_s)
+    def __call__(self, detection: Any) -> None:
+        """Send a `taxel.Detection`."""
+        ago_s = (time.time_ns() - detection.said_ns) * 1e-9 + (detection.said - detection.t) * 1e-6
+        self._outlet.push_sample([detection.label], self._clock() - ago_s)

@@ -67,10 +67,10 @@ class LiveOptions:
         "(serial:PATH@BAUD or pipe:PATH, columns=t_us:ax:ay). May be repeated.",
     )
     compression: str = option("none", "Compression of a .mcap: none, lz4 or zstd.")
-    overwrite: bool = option(False, "Replace the file where it exists.")
+    overwrite: bool = option(False, "Replace the file if it exists.")
     guard_frames: float = option(
         _DEFAULT.guard_frames,
-        "How far, in frames, a readout stays behind the host's clock while no events come.",
+        "How far, in frames, a readout stays behind the host's clock while no events arrive.",
         least=0.0,
     )
     gap_frames: float = option(
@@ -88,7 +88,7 @@ class LiveOptions:
     gro: bool | None = option(None, "Let the kernel hand over trains of datagrams in one piece.")
 
     def completed(self) -> LiveOptions:
-        """Return them with the sensor of the remote board or the readout; refuse what makes no sense."""
+        """Return the options with the sensor of the remote board or the readout; refuse options that make no sense."""
         readout, remote, array, registers, differences = (
             self.readout, self.remote, self.array, self.registers, self.differences,
         )  # fmt: skip
@@ -124,7 +124,7 @@ class LiveOptions:
         return [(text("name of a source", name), text(f"source {name}", what)) for name, what in self.sources.items()]
 
     def recording(self) -> tuple[str, str, bool] | None:
-        """Return path, compression and whether to overwrite, where something is recorded."""
+        """Return path, compression and whether to overwrite; None if nothing is recorded."""
         if self.record is None:
             return None
         path = os.fspath(checked_path("record", self.record))
@@ -133,10 +133,10 @@ class LiveOptions:
     def for_rust(self, *, send: list[str], sources: list[tuple[str, str]]) -> dict[str, Any]:
         """Return the options that Rust reads; `send` and `sources` are those that it can open itself."""
         registers: object = self.registers
-        held = json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
+        contents = json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
         sizes = {name: getattr(self, name) for name in ("kernel_buffer_bytes", "queue_bytes", "readout_events")}
         return {
-            "registers": held,
+            "registers": contents,
             "differences": flag("differences", self.differences),
             "guard_frames": number("guard_frames", self.guard_frames),
             "gap_frames": number("gap_frames", self.gap_frames),

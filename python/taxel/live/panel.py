@@ -179,7 +179,7 @@ class Panel:
             raise ProblemError(f"{what}: a recording was begun with this address; end it first")
         if self._live._remote is not None:
             raise ProblemError(
-                f"{what}: the board is another computer's, which says where it sends and what its intensities are"
+                f"{what}: the board is another computer's, which sets its address and the meaning of its intensities"
             )
         return self._live
 

@@ -49,7 +49,7 @@ class Address(NamedTuple):
         The computer whose bridge listens, or a Zenoh router.
     port : int
     name : str or None
-        The board; None where only one is published there.
+        The board; None if only one is published there.
     """
 
     host: str
@@ -73,15 +73,15 @@ class Address(NamedTuple):
         >>> Address.of("zenoh:192.168.1.5/left")
         Address(host='192.168.1.5', port=7447, name='left')
         """
-        found = re.fullmatch(
+        match = re.fullmatch(
             r"zenoh:(?P<host>\[[0-9a-fA-F:.]+\]|[\w.-]+)(:(?P<port>\d{1,5}))?(/(?P<name>[\w.-]{1,64}))?",
             text("address", address),
             re.ASCII,
         )
-        port = _PORT if found is None else int(found["port"] or _PORT)
-        if found is None or not 1 <= port <= 65_535:
+        port = _PORT if match is None else int(match["port"] or _PORT)
+        if match is None or not 1 <= port <= 65_535:
             raise ProblemError(f"address {address!r}: must be zenoh:HOST:PORT/NAME, as zenoh:192.168.1.5:7447/left")
-        return cls(found["host"], port, found["name"])
+        return cls(match["host"], port, match["name"])
 
     @property
     def place(self) -> str:
@@ -143,26 +143,26 @@ class Remote:
         self._feed: _core.Feed | None = None
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
-        #: The sensor, as the other computer knows it.
+        #: The sensor, as the other computer describes it.
         self.array: Array = Array._from_geometry(dict(self._about["array"]))
 
     def _find(self, timeout: float) -> tuple[str, dict[str, Any]]:
         """Return the board's name and description."""
         until = time.monotonic() + timeout
         while True:
-            found: dict[str, str] = dict(with_taxel_errors(self._zenoh.names, _ASK_S))
-            wanted = self.address.name
-            if wanted in found:
-                return wanted, json.loads(found[wanted])
-            if wanted is None and len(found) == 1:
-                ((name, about),) = found.items()
+            boards: dict[str, str] = dict(with_taxel_errors(self._zenoh.names, _ASK_S))
+            name = self.address.name
+            if name in boards:
+                return name, json.loads(boards[name])
+            if name is None and len(boards) == 1:
+                ((name, about),) = boards.items()
                 return name, json.loads(about)
-            if wanted is None and found:
-                names = ", ".join(sorted(found))
+            if name is None and boards:
+                names = ", ".join(sorted(boards))
                 raise DeviceError(f"{self.address}: publishes {names}; add /NAME")
             if time.monotonic() >= until:
-                if found:
-                    raise DeviceError(f"{self.address}: publishes {', '.join(sorted(found))}, not {wanted}")
+                if boards:
+                    raise DeviceError(f"{self.address}: publishes {', '.join(sorted(boards))}, not {name}")
                 raise DeviceError(f"{self.address}: {self._why_unreachable()}")
             # A query on a link that is not established yet returns at once.
             time.sleep(_POLL_S)
@@ -240,7 +240,7 @@ class Remote:
                 feed.compare(*trip)
 
     def _clocks(self, feed: _core.Feed) -> None:
-        # A round trip takes up to a second where the other computer is gone: parcels must not wait for it.
+        # A round trip takes up to a second if the other computer is gone: parcels must not wait for it.
         with contextlib.suppress(ConnectionError):
             while not (feed.is_over() or self._ending.wait(_COMPARE_S)):
                 self._compare(feed, 1)
@@ -250,7 +250,7 @@ class Remote:
         return self._messages("detection")
 
     def pictures(self) -> Iterator[dict[str, Any]]:
-        """Yield the held values, ten times a second while events come: t_us, rows, columns, ticks; endless."""
+        """Yield the held values, ten times a second while events arrive: t_us, rows, columns, ticks; endless."""
         return self._messages("picture")
 
     def _messages(self, what: str) -> Iterator[dict[str, Any]]:

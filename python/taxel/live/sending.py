@@ -46,7 +46,7 @@ def send(
     seconds : float, s
         Duration.
     segment : bool
-        Pass trains of datagrams to the kernel in one call where it can cut them (`UDP_SEGMENT`).
+        Pass trains of datagrams to the kernel in one call if it can cut them (`UDP_SEGMENT`).
 
     Returns
     -------

@@ -23,9 +23,9 @@ class Summary:
     verdict : str
         One line: that nothing was lost after arrival, what was lost where, or that nothing arrived.
     path : Path or None
-        The recording; None where nothing arrived: then a new file is removed, and an earlier one stays.
+        The recording; None if nothing arrived: then a new file is removed, and an earlier one stays.
     tare : Tare or None
-        The fresh tare, where one was completed.
+        The fresh tare, if it was completed.
 
     Examples
     --------
@@ -63,8 +63,8 @@ def summary_of(text: str) -> Summary:
     """Return the summary that Rust returns as JSON."""
     values = json.loads(text)
     path = None if values["path"] is None else Path(values["path"])
-    taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
-    return Summary(values["counters"], values["verdict"], path, taken)
+    tare = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
+    return Summary(values["counters"], values["verdict"], path, tare)
 
 
 def delays(measured: dict[str, Any]) -> str:

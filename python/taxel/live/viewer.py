@@ -112,11 +112,11 @@ class Viewer:
         spikes = None if encoder is None else instance("encoder", encoder, Encoder).to_json()
         if encoder is not None and isinstance(shows, Live):
             encoder.stream(shows.array)
-        _wanted(where["what"])
+        _check_installed(where["what"])
         self._panel = None if isinstance(shows, Panel) else Panel(shows)
         panel = shows if isinstance(shows, Panel) else self._panel
         assert panel is not None  # one of the two
-        asked = {
+        options = {
             "to": where,
             "url": panel.url,
             "encoder": spikes,
@@ -137,27 +137,27 @@ class Viewer:
             start_new_session=True,
         )
         try:
-            self._place = self._begun(asked)
+            self._place = self._begun(options)
         except BaseException:
             self.stop()
             raise
         self._listener = threading.Thread(target=self._listen, name="taxel-viewer", daemon=True)
         self._listener.start()
 
-    def _begun(self, asked: dict[str, Any]) -> str:
+    def _begun(self, options: dict[str, Any]) -> str:
         """Send the options to the process; return where the viewer is."""
         assert self._process.stdin is not None  # asked for
         assert self._process.stdout is not None
         with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(json.dumps(asked) + "\n")
+            self._process.stdin.write(json.dumps(options) + "\n")
             self._process.stdin.flush()
         line = self._process.stdout.readline()
         if not line:
-            raise OSError(f"{asked['to']['what']}: the process for it ended as it began")
-        said = json.loads(line)
-        if "error" in said:
-            raise OSError(said["error"])
-        return str(said["place"])
+            raise OSError(f"{options['to']['what']}: its process ended while it started")
+        answer = json.loads(line)
+        if "error" in answer:
+            raise OSError(answer["error"])
+        return str(answer["place"])
 
     def _listen(self) -> None:
         assert self._process.stdout is not None  # asked for
@@ -168,7 +168,7 @@ class Viewer:
         with self._changed:
             self._ended = True
             if not self._stopping:
-                self._state = replace(self._state, there=False, trouble="the process for it has ended")
+                self._state = replace(self._state, there=False, trouble="its process has ended")
             self._changed.notify_all()
 
     @property
@@ -227,9 +227,9 @@ class Viewer:
 
 def _where(to: object) -> dict[str, Any]:
     """Return what `to` names: the viewer's kind, host and port."""
-    said = text("to", to)
-    url = re.fullmatch(r"rerun\+http://([^/]+)/proxy", said)
-    what, colon, place = (f"rerun:{url[1]}" if url else said).partition(":")
+    address = text("to", to)
+    url = re.fullmatch(r"rerun\+http://([^/]+)/proxy", address)
+    what, colon, place = (f"rerun:{url[1]}" if url else address).partition(":")
     kind = KINDS.get(what)
     if kind is not None and not colon:
         return {"what": what, "host": "127.0.0.1", "port": kind.port}
@@ -240,8 +240,8 @@ def _where(to: object) -> dict[str, Any]:
     return {"what": what, "host": plain[1] or "127.0.0.1", "port": int(plain[2])}
 
 
-def _wanted(what: str) -> None:
-    """Refuse where an extra is not installed."""
+def _check_installed(what: str) -> None:
+    """Refuse a kind of viewer whose extra is not installed."""
     missing = [module for module in KINDS[what].needs if importlib.util.find_spec(module) is None]
     if missing:
         raise ImportError(f"{missing[0]} is not installed: pip install taxel[{what}]")

@@ -31,14 +31,14 @@ def heard(said: Sequence[Detection]) -> Detections:
     >>> heard([Detection("contact", 1000, 1344)])
     Detections(1: contact 1; 1000 to 1000 us)
     """
-    said = [instance("said", one, Detection) for one in several("said", said)]
-    times = [one.said for one in said]
+    detections = [instance("said", one, Detection) for one in several("said", said)]
+    times = [one.said for one in detections]
     reported: Any = None if None in times else times
     return Detections._of(
-        [one.label for one in said],
-        [one.t for one in said],
-        [one.known for one in said],
-        [one.slope for one in said],
+        [one.label for one in detections],
+        [one.t for one in detections],
+        [one.known for one in detections],
+        [one.slope for one in detections],
         reported,
-        [one.repaired for one in said],
+        [one.repaired for one in detections],
     )
