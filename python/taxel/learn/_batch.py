@@ -44,7 +44,7 @@ class BatchLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
         self.weights_, learnt = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
@@ -67,7 +67,7 @@ class BatchLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         return self._fired(patterns, {})

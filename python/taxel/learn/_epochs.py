@@ -89,7 +89,7 @@ class EpochLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns, targets or first weights that make no sense (names pattern and target)
+        ProblemError : invalid patterns, targets or first weights (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         trains, times = examples(patterns, targets)
@@ -114,7 +114,7 @@ class EpochLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         rule, weights = self._json(), self._fitted()
@@ -139,7 +139,7 @@ class EpochLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : weights, a pattern or targets that make no sense
+        ProblemError : invalid weights, pattern or targets
         """
         trains = instance("pattern", pattern, SpikeTrains)._parts()
         change, spikes = _core.change_rival(

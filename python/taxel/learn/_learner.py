@@ -60,7 +60,7 @@ class SpikeLearner(Learner, ABC):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense
+        ProblemError : invalid patterns or targets
         NotFittedError : before `fit`
         """
         _, target_times = examples(patterns, targets)

@@ -91,7 +91,7 @@ class ConeR(SpikeLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
@@ -172,7 +172,7 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
 
         Warns
@@ -197,7 +197,7 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target), or more than 10 000 trains
+        ProblemError : invalid patterns or targets (names pattern and target), or more than 10 000 trains
             with spikes
         """
         return ConeRProblem(self, patterns, targets)
@@ -216,7 +216,7 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         return predicted(self, patterns)

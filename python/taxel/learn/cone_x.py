@@ -180,7 +180,7 @@ class ConeX(SpikeLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
@@ -258,7 +258,7 @@ class ConeX(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         if progress is not None:
@@ -306,7 +306,7 @@ class ConeX(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         return predicted(self, patterns)

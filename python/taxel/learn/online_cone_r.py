@@ -59,7 +59,7 @@ class OnlineConeR(ConeR):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
@@ -104,7 +104,7 @@ class OnlineConeR(ConeR):
 
         Raises
         ------
-        ProblemError : a pattern or targets that make no sense (names them, counted from the first that ever came); the
+        ProblemError : an invalid pattern or invalid targets (names them, counted from the first that ever came); the
             window is then as before
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the pattern is in the window, the weights are the
             best so far
@@ -145,7 +145,7 @@ class OnlineConeR(ConeR):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         """
         if start is not None:
             raise ProblemError("start: a window starts from its own last fit")

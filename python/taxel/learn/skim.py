@@ -32,7 +32,7 @@ class SKIM(BatchLearner):
     kernel : {"alpha", "double_exponential", "exponential"}
         As in `taxel.Neuron`; the thesis takes "alpha" (6.5.4).
     tau_s : float, ms, above 0 and below `tau`, optional
-        Second time constant of "double_exponential"; ``tau / 4`` where left out.
+        Second time constant of "double_exponential"; default: ``tau / 4``.
     step_ms : float, ms, above 0
         Time between rows; 1 as the thesis samples.
     pulse_ms : float, ms, above 0
@@ -71,7 +71,7 @@ class SKIM(BatchLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
@@ -131,7 +131,7 @@ class SKIM(BatchLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
         super().fit(patterns, targets)
@@ -152,7 +152,7 @@ class SKIM(BatchLearner):
 
         Raises
         ------
-        ProblemError : a pattern that makes no sense
+        ProblemError : an invalid pattern
         """
         trains = instance("pattern", pattern, SpikeTrains)
         count = len(trains) if self.branches is None else int(self.branches)
@@ -171,7 +171,7 @@ class SKIM(BatchLearner):
 
         Raises
         ------
-        ProblemError : a pattern that makes no sense
+        ProblemError : an invalid pattern
         NotFittedError : before `fit`
 
         Examples
@@ -197,7 +197,7 @@ class SKIM(BatchLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         return self._fired(patterns, {} if threshold is None else {"threshold": number("threshold", threshold)})

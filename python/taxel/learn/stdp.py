@@ -52,7 +52,7 @@ class STDP(SpikeLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
@@ -110,7 +110,7 @@ class STDP(SpikeLearner):
 
         Raises
         ------
-        ProblemError : no patterns, or one that makes no sense (names it)
+        ProblemError : no patterns, or an invalid one (names it)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; what was learnt until then stays
         """
         trains = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
@@ -170,7 +170,7 @@ class STDP(SpikeLearner):
 
         Raises
         ------
-        ProblemError : a pattern that makes no sense (names it)
+        ProblemError : an invalid pattern (names it)
         NotFittedError : before `fit` and `partial_fit`
         """
         weights = self._fitted()

@@ -60,7 +60,7 @@ class Tempotron(Learner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
@@ -126,7 +126,7 @@ class Tempotron(Learner):
 
         Raises
         ------
-        ProblemError : patterns, labels or first weights that make no sense
+        ProblemError : invalid patterns, labels or first weights
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         numbered = enumerate(several("patterns", patterns))
@@ -152,7 +152,7 @@ class Tempotron(Learner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         weights = self._fitted()
@@ -174,7 +174,7 @@ class Tempotron(Learner):
 
         Raises
         ------
-        ProblemError : patterns or labels that make no sense
+        ProblemError : invalid patterns or labels
         NotFittedError : before `fit`
         """
         fired, truth = self.predict(patterns), _labels(labels)
@@ -199,7 +199,7 @@ class Tempotron(Learner):
 
         Raises
         ------
-        ProblemError : weights or a pattern that make no sense
+        ProblemError : invalid weights or an invalid pattern
 
         Examples
         --------
@@ -228,7 +228,7 @@ class Tempotron(Learner):
 
         Raises
         ------
-        ProblemError : weights, a pattern or a label that make no sense
+        ProblemError : invalid weights, pattern or label
         """
         trains = instance("pattern", pattern, SpikeTrains)._parts()
         return _core.change_tempotron(self._json(), floats("weights", weights), trains, flag("label", label))

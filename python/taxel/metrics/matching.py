@@ -67,7 +67,7 @@ def matching(
 
     Raises
     ------
-    ProblemError : not equally many patterns, times that do not ascend, or a window that makes no sense
+    ProblemError : not equally many patterns, times that do not ascend, or an invalid window
 
     Notes
     -----

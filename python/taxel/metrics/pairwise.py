@@ -49,7 +49,7 @@ def pairwise(
 
     Raises
     ------
-    ProblemError : no such metric, parameters or patterns that make no sense (names pattern, train and spike)
+    ProblemError : no such metric, or invalid parameters or patterns (names pattern, train and spike)
     KeyboardInterrupt : Ctrl-C, within a fraction of a second
 
     Examples
