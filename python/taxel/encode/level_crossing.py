@@ -78,7 +78,7 @@ class LevelCrossing(Encoder):
         Adds tonic spikes, the slowly adapting part: one at the crossing, then one every `tonic_ms` while above the
         level.
     tonic_level : float, one of `levels`, optional
-        The level of tonic spikes; default: the first level.
+        The level above which tonic spikes occur; default: the first level.
     running_range : RunningRange, optional
         Applies the levels to the channel's running range.
     period_ms : float, ms, whole us
