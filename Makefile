@@ -134,7 +134,7 @@ $(RTL)/.installed: rtl/requirements.txt
 	@$(RTL)/bin/python -m pip install --quiet --disable-pip-version-check -r rtl/requirements.txt
 	@touch $@
 
-.PHONY: rtl-tools rtl-registers rtl-lint rtl-quick rtl-test rtl-slow
+.PHONY: rtl-tools rtl-registers rtl-lint rtl-quick rtl-test rtl-slow rtl-timing
 rtl-tools: $(RTL)/.installed
 
 # The RTL's package of registers, from the registers' one source.
@@ -158,6 +158,11 @@ rtl-slow: released $(VENV)/.for-test
 	$(BIN)/python -m pytest -q rtl/tests -m slow
 	$(BIN)/python rtl/tools/prove.py
 slow: rtl-slow
+
+# The core is placed for an ECP5 with five seeds, of which four must meet every clock.
+rtl-timing: $(RTL)/.installed $(VENV)/.installed
+	$(BIN)/python rtl/tools/timing.py
+slow: rtl-timing
 
 # Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
 PEERS := .venv-peers

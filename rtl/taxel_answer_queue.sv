@@ -8,7 +8,7 @@ module taxel_answer_queue
     input  logic    reset,
     input  logic    answer,
     input  answer_t answered,
-    output logic    room,    // for one more command, of which the answer comes three clocks later
+    output logic    room,    // for one more command, of which the answer comes four clocks later
     output logic    ready,
     output answer_t oldest,
     input  logic    pop

@@ -24,7 +24,9 @@ module taxel_change_detector
     output event_t                    found,
     input  logic                      full,
     output logic                      frame,         // of the events to come, alternating over frames that have any
-    output logic                      lost,          // an event found no room
+    output logic                      sent,          // a taxel's event found room
+    output logic                      lost,          // an event or a marker found none
+    output logic                      frame_over,    // all events of a frame but the first one were found
     output logic                      not_returned   // a comparator had tripped when its ramp began
 );
 
@@ -38,11 +40,11 @@ module taxel_change_detector
     logic tripped;
     logic first;
     logic [14:0] at;
-  } count_t;
+  } trip_t;
 
   // What the read was; then its counts.
   read_t ended, now;
-  count_t [CHANNELS-1:0] counts;
+  trip_t [CHANNELS-1:0] counts;
   logic [CHANNEL_BITS-1:0] channel;
   logic counting, busy;
   logic [2:0] markers;
@@ -63,7 +65,7 @@ module taxel_change_detector
       markers <= markers - 3'd1;
       starts  <= starts >> 1;
     end else if (counting) begin
-      counts  <= counts >> $bits(count_t);
+      counts  <= counts >> $bits(trip_t);
       channel <= channel + CHANNEL_BITS'(1);
       if (channel == CHANNEL_BITS'(CHANNELS - 1)) counting <= 1'b0;
     end
@@ -73,7 +75,7 @@ module taxel_change_detector
     end
   end
 
-  // Five stages, one taxel a clock.
+  // Six stages, one taxel a clock.
   typedef struct packed {
     logic valid;
     logic last;    // of its frame
@@ -85,13 +87,13 @@ module taxel_change_detector
     logic [15:0] value;
   } sample_t;
 
-  sample_t counted, valued, fetched, compared;
+  sample_t counted, valued, fetched, compared, judged;
   logic [15:0] tick;
   logic [15:0] held, previous;
-  logic [15:0] moved;
-  logic more, changed;
+  logic [15:0] moved, moved_by;
+  logic more, polarity, beyond, changed;
   logic [ROW_BITS-1:0] row;
-  read_t of_counted, of_valued, of_fetched, of_compared;
+  read_t of_counted, of_valued, of_fetched, of_compared, of_judged;
 
   if (STEPS == 1) begin : g_one
     assign row = channel;
@@ -129,38 +131,45 @@ module taxel_change_detector
     of_compared          <= of_fetched;
     more                 <= fetched.value >= previous;
     moved                <= fetched.value >= previous ? fetched.value - previous : previous - fetched.value;
-    if (store) values[compared.address] <= stored;
-    if (reset) {counted.valid, valued.valid, fetched.valid, compared.valid} <= '0;
+    // Whether that is an event.
+    judged               <= compared;
+    of_judged            <= of_compared;
+    polarity             <= more;
+    moved_by             <= moved;
+    beyond               <= moved > 16'(of_compared.noise_floor);
+    if (store) values[judged.address] <= stored;
+    if (reset) {counted.valid, valued.valid, fetched.valid, compared.valid, judged.valid} <= '0;
   end
 
-  assign changed = compared.valid && compared.exists && !compared.not_returned && !of_compared.initial_frame
-      && moved > 16'(of_compared.noise_floor);
-  assign push = (changed || (compared.valid && compared.marker)) && !full;
-  assign lost = (changed || (compared.valid && compared.marker)) && full;
-  assign not_returned = compared.valid && compared.exists && compared.not_returned && !of_compared.initial_frame;
-  assign store = compared.valid && compared.exists
-      && (of_compared.initial_frame || (PREVIOUS_SAMPLE ? !compared.not_returned : changed && !full));
-  assign stored = of_compared.initial_frame ? 16'd0 : compared.value;
+  assign changed = judged.valid && judged.exists && !judged.not_returned && !of_judged.initial_frame && beyond;
+  assign push = (changed || (judged.valid && judged.marker)) && !full;
+  assign sent = changed && !full;
+  assign frame_over = judged.valid && judged.last && !of_judged.initial_frame;
+  assign lost = (changed || (judged.valid && judged.marker)) && full;
+  assign not_returned = judged.valid && judged.exists && judged.not_returned && !of_judged.initial_frame;
+  assign store = judged.valid && judged.exists
+      && (of_judged.initial_frame || (PREVIOUS_SAMPLE ? !judged.not_returned : changed && !full));
+  assign stored = of_judged.initial_frame ? 16'd0 : judged.value;
 
   always_comb begin
     found = '0;
-    found.marker = compared.marker;
+    found.marker = judged.marker;
     found.frame  = frame;
-    found.stamp  = of_compared.stamp;
-    if (compared.marker) begin
-      found.more = compared.start;
+    found.stamp  = of_judged.stamp;
+    if (judged.marker) begin
+      found.more = judged.start;
     end else begin
-      found.x     = 6'(of_compared.line);
-      found.y     = 6'(compared.address);
-      found.more  = more;
-      found.value = DIFFERENCE ? moved : compared.value;
+      found.x     = 6'(of_judged.line);
+      found.y     = 6'(judged.address);
+      found.more  = polarity;
+      found.value = DIFFERENCE ? moved_by : judged.value;
     end
   end
 
   logic pushed;  // in this frame
   always_ff @(posedge clk) begin
     if (push) pushed <= 1'b1;
-    if (compared.valid && compared.last) begin
+    if (judged.valid && judged.last) begin
       if (pushed || push) frame <= !frame;
       pushed <= 1'b0;
     end

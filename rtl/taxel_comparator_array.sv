@@ -35,7 +35,7 @@ module taxel_comparator_array #(
   end
 
   // On the fast clock.
-  logic reset_fast, began_fast, ended_fast, began_before, number, copied, copy;
+  logic reset_fast, began_fast, ended_fast, began_before, number, copied, over, copy;
   logic start, begins, begun, open, inverted_next, inverted_now, done_fast;
   logic [14:0] pair;
   logic [CHANNELS-1:0][1:0] sampled;
@@ -48,8 +48,8 @@ module taxel_comparator_array #(
   taxel_synchroniser to_done (.clk, .from(done_fast), .to(done));
 
   // The counts of a read are copied when it has ended and the samples of its ramp are over, or at the latest when the next
-  // read's begin.
-  assign copy = !copied && ((ended_fast == number && !open && !begun) || begins);
+  // read's begin: then in the clock of its pair 0, which changes them at that clock's end.
+  assign over = !copied && ((ended_fast == number && !open && !begun) || begins);
 
   always_ff @(posedge clk_fast) begin
     began_before <= began_fast;
@@ -57,19 +57,20 @@ module taxel_comparator_array #(
     if (start) inverted_next <= inverted;
     if (begins) inverted_now <= inverted_next;
     sampled <= comparators;
+    copy    <= over;
+    if (over) copied <= 1'b1;
     if (copy) begin
       tripped   <= tripped_now;
       first     <= first_now;
       at        <= at_now;
       done_fast <= !done_fast;
-      copied    <= 1'b1;
     end
     if (begins) begin
       number <= !number;
       copied <= 1'b0;
     end
     if (reset_fast) begin
-      {began_before, start, number, done_fast} <= '0;
+      {began_before, start, number, copy, done_fast} <= '0;
       copied <= 1'b1;
     end
   end

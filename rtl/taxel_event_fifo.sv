@@ -21,11 +21,11 @@ module taxel_event_fifo #(
   logic [PLACES:0] waiting;  // in the ring
   logic [BITS-1:0] fetched;
   logic fetched_valid, fetch, move;
+  logic none;  // waits
 
-  assign full  = waiting == (PLACES + 1)'(DEPTH);
-  assign empty = waiting == 0 && !fetched_valid && !ready;
+  assign empty = none && !fetched_valid && !ready;
   assign move  = fetched_valid && (!ready || pop);
-  assign fetch = waiting != 0 && (!fetched_valid || move);
+  assign fetch = !none && (!fetched_valid || move);
 
   always_ff @(posedge clk) begin
     if (push) begin
@@ -36,7 +36,12 @@ module taxel_event_fifo #(
       fetched <= ring[read];
       read    <= read == PLACES'(DEPTH - 1) ? '0 : read + PLACES'(1);
     end
-    waiting <= waiting + (PLACES + 1)'(push) - (PLACES + 1)'(fetch);
+    // What the count will be is not waited for: whether a word is fetched is known late in a clock.
+    if (push != fetch) begin
+      waiting <= push ? waiting + (PLACES + 1)'(1) : waiting - (PLACES + 1)'(1);
+      full    <= push && waiting == (PLACES + 1)'(DEPTH - 1);
+      none    <= fetch && waiting == (PLACES + 1)'(1);
+    end
     if (fetch) fetched_valid <= 1'b1;
     else if (move) fetched_valid <= 1'b0;
     if (move) oldest <= fetched;
@@ -46,6 +51,8 @@ module taxel_event_fifo #(
       write         <= '0;
       read          <= '0;
       waiting       <= '0;
+      full          <= 1'b0;
+      none          <= 1'b1;
       fetched_valid <= 1'b0;
       ready         <= 1'b0;
     end

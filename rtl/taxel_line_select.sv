@@ -22,15 +22,20 @@ module taxel_line_select #(
   logic [7:0] known;  // lines less one for which the chain is known to hold a single one
   logic       unknown;
   logic [7:0] pulses, insert;  // how many are left, and at which of them the one goes in
-  logic [7:0] out, wanted;
+  // A clock after `start`: the whole chain, or on from the old line; else so many pulses take the old one out, the new one in.
+  logic fresh, all, later;
+  logic [7:0] on, out, in;
   logic [HALF_BITS-1:0] left;
 
-  always_comb begin
-    out    = 8'(at) > lines ? 8'd0 : lines + 8'd1 - 8'(at);
-    wanted = 8'(line) + 8'd1;
-    if (unknown || lines > known) wanted = 8'(COLUMNS);
-    else if (line > at) wanted = 8'(line - at);
-    else if (out > wanted) wanted = out;
+  always_ff @(posedge clk) begin
+    fresh <= start && !reset;
+    if (start) begin
+      all   <= unknown || lines > known;
+      later <= line > at;
+      on    <= 8'(line - at);
+      out   <= 8'(at) > lines ? 8'd0 : lines + 8'd1 - 8'(at);
+      in    <= 8'(line) + 8'd1;
+    end
   end
 
   always_ff @(posedge clk) begin
@@ -44,14 +49,15 @@ module taxel_line_select #(
       insert   <= '0;
       left     <= HALF_BITS'(1);
     end else if (start) begin
-      pulses   <= wanted;
-      insert   <= (!unknown && lines <= known && line > at) ? 8'd0 : 8'(line) + 8'd1;
       at       <= line;
       known    <= lines;
       unknown  <= 1'b0;
       csel_clk <= 1'b0;
       csel_din <= 1'b0;
-      left     <= HALF_BITS'(HALF);
+    end else if (fresh) begin
+      pulses <= all ? 8'(COLUMNS) : later ? on : out > in ? out : in;
+      insert <= !all && later ? 8'd0 : in;
+      left   <= HALF_BITS'(HALF);
     end else if (left != HALF_BITS'(1)) begin
       left <= left - HALF_BITS'(1);
     end else begin

@@ -22,20 +22,19 @@ module taxel_packer_v1
 );
 
   event_t now;
-  logic busy, second, advance, word_over, event_over, known, ends, over;
+  logic busy, second, advance, word_over, event_over, known, fits, ends, over;
   logic [2:0] at;             // which byte of the word
-  logic [8:0] words;          // of the datagram, before this event
-  logic [8:0] after, more;
+  logic [8:0] words;          // of the datagram, with this event's
   logic [15:0] field;
 
-  assign after = words + (now.marker || !VALUED ? 9'd1 : 9'd2);
-  assign more  = oldest.marker || !VALUED ? 9'd1 : 9'd2;
+  // Whether the oldest event goes into the datagram too.
+  assign fits = oldest.frame == now.frame && words <= 9'(oldest.marker || !VALUED ? MOST - 1 : MOST - 2);
 
   assign word_over  = at == 3'd4;
   assign event_over = word_over && (now.marker || !VALUED || second);
   // Once it is known that its frame has no more, that stays so: what waits is not withdrawn.
   assign known      = ready || over || (empty && frame != now.frame);
-  assign ends       = ready ? oldest.frame != now.frame || after + more > 9'(MOST) : 1'b1;
+  assign ends       = !(ready && fits);
 
   assign field  = second ? now.value : now.stamp;
   assign tvalid = busy && (!event_over || known);
@@ -59,21 +58,18 @@ module taxel_packer_v1
     if (advance) begin
       at <= word_over ? 3'd0 : at + 3'd1;
       if (word_over) second <= !event_over;
-      if (event_over) begin
-        words <= ends ? 9'd0 : after;
-        busy  <= 1'b0;
-      end
+      if (event_over) busy <= 1'b0;
     end
     if (pop) begin
-      now  <= oldest;
-      busy <= 1'b1;
-      over <= 1'b0;
+      now   <= oldest;
+      busy  <= 1'b1;
+      over  <= 1'b0;
+      words <= (busy && fits ? words : 9'd0) + (oldest.marker || !VALUED ? 9'd1 : 9'd2);
     end
     if (reset) begin
       busy   <= 1'b0;
       at     <= '0;
       second <= 1'b0;
-      words  <= '0;
     end
   end
 

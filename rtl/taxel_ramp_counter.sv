@@ -17,36 +17,49 @@ module taxel_ramp_counter #(
     output logic [14:0] pair
 );
 
-  logic [15:0] left;
-  logic [14:0] pairs, last;
+  // Counters count down, and what ends with them is known a clock before, as the clock is fast.
+  logic [14:0] full, ramp_left, pairs, pairs_left;  // pairs of the ramp that are high in both halves
+  logic odd;                                        // whether half a pair follows
+  logic rising, ramp_last, pairs_last;
   logic [DELAY-1:0] delayed;
 
   assign begins = delayed[DELAY-1];
+  assign full   = length[15:1];
 
   always_ff @(posedge clk_fast) begin
     // The ramp.
     if (start) begin
-      ramp <= {length != 16'd1, 1'b1};
-      left <= length[15:1] == 15'd0 ? 16'd0 : length - 16'd2;
+      odd       <= length[0];
+      rising    <= full != 15'd0;
+      ramp      <= {full != 15'd0, 1'b1};
+      ramp_left <= full;
+      ramp_last <= full == 15'd1;
     end else begin
-      ramp <= {left[15:1] != 15'd0, left != 16'd0};
-      left <= left[15:1] == 15'd0 ? 16'd0 : left - 16'd2;
+      if (ramp_last || !rising) begin
+        ramp   <= {1'b0, rising && odd};
+        rising <= 1'b0;
+      end
+      ramp_left <= ramp_left - 15'd1;
+      ramp_last <= ramp_left == 15'd2;
     end
     // The samples of it: up to the one at its end.
     delayed <= {delayed[DELAY-2:0], start};
-    if (start) last <= length[15:1];
+    if (start) pairs <= full;
     begun <= begins;
     if (begins) begin
-      open  <= 1'b1;
-      pair  <= '0;
-      pairs <= last;
+      open       <= 1'b1;
+      pair       <= '0;
+      pairs_left <= pairs;
+      pairs_last <= pairs == 15'd0;
     end else begin
-      if (pair == pairs) open <= 1'b0;
-      pair <= pair + 15'd1;
+      if (pairs_last) open <= 1'b0;
+      pair       <= pair + 15'd1;
+      pairs_left <= pairs_left - 15'd1;
+      pairs_last <= pairs_left == 15'd1;
     end
     if (reset) begin
       ramp    <= '0;
-      left    <= '0;
+      rising  <= 1'b0;
       delayed <= '0;
       begun   <= 1'b0;
       open    <= 1'b0;

@@ -29,10 +29,9 @@ module taxel_random_lines (
   logic shuffles;
   logic [7:0] left;  // places from k on
 
-  assign left = lines + 8'd1 - 8'(k);
-
   always_ff @(posedge clk) begin
     stage   <= {stage[3:0], next};
+    left    <= lines + 8'd1 - 8'(k);
     product <= 24'(word) * 24'(left);
     place   <= shuffles ? k + 7'(product[23:16]) : k;
     at_place <= swapped[place] ? places[place] : place;

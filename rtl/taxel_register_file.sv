@@ -1,6 +1,7 @@
 // The registers as written, behind the rules of registers.toml: a write that breaks one changes nothing.
 //
-// Every command is answered. One that finds no room for its answer is refused, and counted.
+// Every command is answered, four clocks later; it takes longer than that to come. One that finds no room for its answer is
+// refused, and counted.
 module taxel_register_file
   import taxel_registers::*;
   import taxel_types::*;
@@ -28,31 +29,42 @@ module taxel_register_file
 );
 
   registers_t changed;
-  logic begun, checked;
+  logic begun, judged, checked;
   logic [2:0] n;
   logic [31:0] word_written;
   logic reserved;
+  logic [RULES-1:0] which;
   logic [3:0] rule;
-  logic reads, greets;
+  logic reads, greets, totals, lacks;
 
   // What this build does not have: FA-1 and version 2 of the wire.
   function automatic logic lacking(registers_t r);
     return r.mechanoreceptor || r.wire_version != 2'd0;
   endfunction
 
+  logic writes, marks;
+  // REG6 has no field, so a read changes nothing.
+  assign writes = checked && rule == 4'd0;
+
   always_ff @(posedge clk) begin
     // The command as it came; the registers as they would be.
     begun        <= command && room;
     refused_full <= command && !room;
-    n            <= number;
-    word_written <= value;
-    changed      <= store(written, number, value);
-    reserved     <= (value & ~mask(number)) != 0;
-    reads        <= number == 3'd6 && value < 32'd8;
-    greets       <= number == 3'd6 && value == 32'd8;
-    // What is wrong with them.
-    checked <= begun;
-    rule    <= reserved || lacking(changed) ? 4'd4 : refused(changed, STEPS, COLUMNS, ROWS, CHANNELS);
+    if (command) begin
+      n            <= number;
+      word_written <= value;
+      changed      <= store(written, number, value);
+      reserved     <= (value & ~mask(number)) != 0;
+      reads        <= number == 3'd6 && value < 32'd8;
+      greets       <= number == 3'd6 && value == 32'd8;
+      totals       <= number == 3'd6 && value == 32'd9;
+    end
+    // What is wrong with them; which of that comes first.
+    judged  <= begun;
+    which   <= broken(changed, STEPS, COLUMNS, ROWS, CHANNELS);
+    lacks   <= reserved || lacking(changed);
+    checked <= judged;
+    rule    <= lacks ? 4'd4 : refused(which);
     // The answer.
     answer            <= checked;
     answered.number <= n;
@@ -64,20 +76,21 @@ module taxel_register_file
       answered.kind     <= ANSWER_OK;
     end else if (greets) begin
       answered.kind <= ANSWER_GREETING;
+    end else if (totals) begin
+      answered.kind <= ANSWER_STATUS;
     end else if (rule != 4'd0) begin
       answered.value <= 32'(rule);
     end
-    if (checked && !reads && !greets && rule == 4'd0) written <= changed;
+    if (writes) written <= changed;
     if (reset) begin
-      {begun, checked, answer, refused_full} <= '0;
+      {begun, judged, checked, answer, refused_full} <= '0;
       written <= AT_RESET;
     end
   end
 
   // Starts and stops, the oldest in bit 0, until the scan takes them for a frame.
-  logic marks;
   logic [2:0] still;
-  assign marks  = checked && !reads && !greets && rule == 4'd0 && changed.record != written.record;
+  assign marks = writes && changed.record != written.record;
   assign still = markers_taken ? 3'd0 : markers;
 
   always_ff @(posedge clk) begin

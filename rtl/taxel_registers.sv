@@ -105,21 +105,44 @@ package taxel_registers;
     return changed;
   endfunction
 
-  // The number of the first rule that refuses these registers; 0: none.
-  function automatic logic [3:0] refused(registers_t r, int steps, int driven_lines, int sense_lines, int channels);
-    if ((40'(r.wire_version) + 40'd1) > 40'd2) return 4'd4;
-    if (40'(r.line_period) < 40'd1) return 4'd4;
-    if (40'(r.line_read) < 40'd1) return 4'd4;
-    if (40'(r.step_period) < 40'd1) return 4'd4;
-    if (40'(r.step_read) < 40'd1) return 4'd4;
-    if (40'(r.ramp) < 40'd1) return 4'd4;
-    if (!((40'(r.lines) + 40'd1) <= 40'(driven_lines))) return 4'd4;
-    if (!(40'(r.line_read) <= 40'(r.line_period))) return 4'd1;
-    if (!(40'(r.step_read) <= 40'(r.step_period))) return 4'd1;
-    if (!((40'(steps) * 40'(r.step_period)) <= 40'(r.line_read))) return 4'd2;
-    if (!(40'(r.ramp) < (40'(r.step_read) + (40'(r.step_read) << 1)))) return 4'd3;
-    if (!((40'(channels) + 40'd10) <= 40'(r.step_period))) return 4'd7;
-    if (!(((40'(r.wire_version) + 40'd1) == 40'd2) || ((40'(driven_lines) <= 40'd64) && (40'(sense_lines) <= 40'd64)))) return 4'd8;
+  localparam int RULES = 13;
+
+  // Which rules refuse these registers, in their order.
+  function automatic logic [RULES-1:0] broken(
+      registers_t r, int steps, int driven_lines, int sense_lines, int channels
+  );
+    logic [RULES-1:0] which;
+    which[0] = (40'(r.wire_version) + 40'd1) > 40'd2;
+    which[1] = 40'(r.line_period) < 40'd1;
+    which[2] = 40'(r.line_read) < 40'd1;
+    which[3] = 40'(r.step_period) < 40'd1;
+    which[4] = 40'(r.step_read) < 40'd1;
+    which[5] = 40'(r.ramp) < 40'd1;
+    which[6] = !((40'(r.lines) + 40'd1) <= 40'(driven_lines));
+    which[7] = !(40'(r.line_read) <= 40'(r.line_period));
+    which[8] = !(40'(r.step_read) <= 40'(r.step_period));
+    which[9] = !((40'(steps) * 40'(r.step_period)) <= 40'(r.line_read));
+    which[10] = !(40'(r.ramp) < (40'(r.step_read) + (40'(r.step_read) << 1)));
+    which[11] = !((40'(channels) + 40'd10) <= 40'(r.step_period));
+    which[12] = !(((40'(r.wire_version) + 40'd1) == 40'd2) || ((40'(driven_lines) <= 40'd64) && (40'(sense_lines) <= 40'd64)));
+    return which;
+  endfunction
+
+  // The number of the first of them; 0: none.
+  function automatic logic [3:0] refused(logic [RULES-1:0] which);
+    if (which[0]) return 4'd4;
+    if (which[1]) return 4'd4;
+    if (which[2]) return 4'd4;
+    if (which[3]) return 4'd4;
+    if (which[4]) return 4'd4;
+    if (which[5]) return 4'd4;
+    if (which[6]) return 4'd4;
+    if (which[7]) return 4'd1;
+    if (which[8]) return 4'd1;
+    if (which[9]) return 4'd2;
+    if (which[10]) return 4'd3;
+    if (which[11]) return 4'd7;
+    if (which[12]) return 4'd8;
     return 4'd0;
   endfunction
 

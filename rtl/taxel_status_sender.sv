@@ -1,4 +1,4 @@
-// Status lines in ASCII: the greeting, the answers to commands, and which faults there were.
+// Status lines in ASCII: the greeting, the answers to commands, the totals, and which faults there were.
 //
 // A fault line gives the count since reset. Lines of faults come unasked, at most once in FAULT_CLOCKS, where no answer waits.
 module taxel_status_sender
@@ -15,40 +15,36 @@ module taxel_status_sender
     input  logic       ready,      // an answer waits
     input  answer_t    oldest,
     output logic       pop,
-    input  logic       queue_lost,    // one event or marker more
-    input  logic       queue_lost_2,  // and one more
-    input  logic       not_returned,
-    input  logic [2:0] skipped,       // so many bytes more
-    input  logic       refused,       // one command more
+    input  count_t     lost,       // counts of which a changed one is given unasked
+    input  count_t     faults,
+    input  count_t     commands,
+    input  totals_t    totals,
     output logic       valid,      // a byte for the serial line
     output logic [7:0] data,
     input  logic       taken
 );
 
-  // The counts, by fault: queue, comparator, command; and as they were given last.
-  logic [COUNT_BITS-1:0] counts[3], given[3];
-
-  always_ff @(posedge clk) begin
-    counts[0] <= counts[0] + COUNT_BITS'(queue_lost) + COUNT_BITS'(queue_lost_2);
-    counts[1] <= counts[1] + COUNT_BITS'(not_returned);
-    counts[2] <= counts[2] + COUNT_BITS'(skipped) + COUNT_BITS'(refused);
-    if (reset) for (int k = 0; k < 3; k++) counts[k] <= '0;
-  end
+  // The counts of faults, and as they were given last.
+  count_t counts[3], given[3];
+  logic [2:0] differs;  // from what was given, a clock ago
+  assign counts = '{lost, faults, commands};
 
   typedef enum logic [1:0] {
     IDLE,
     DIGITS,   // a count becomes digits, a bit a clock
-    SENDING
+    LETTER,   // a character is looked up
+    SENDING   // and waits for the serial line
   } state_t;
 
   state_t state;
-  logic fault;           // the line is of a fault
+  logic counting;        // the line is of counts
   logic greeted;
-  logic [1:0] which;     // fault
+  logic [2:0] part;      // a name and a count
   logic [2:0] look;      // which faults are still to be looked at
   answer_t line;
   logic [5:0] at;        // character of the line
-  logic [COUNT_BITS-1:0] bits;
+  count_t bits;
+  count_t [3:0] rest;    // of the line, from the top
   logic [5:0] bits_left;
   logic [COUNT_DIGITS-1:0][3:0] digits;
   logic look_again;
@@ -83,20 +79,22 @@ module taxel_status_sender
   localparam logic [0:3][7:0] BAD = "bad ";
   localparam logic [0:2][7:0] REG = "REG";
   localparam logic [0:5][7:0] RULE = " rule ";
-  localparam logic [0:5][7:0] FAULT = "fault ";
-  localparam logic [0:2][0:10][7:0] NAMES = {"queue ", 40'd0, "comparator ", "command ", 24'd0};
-  logic [7:0] character;
-  logic last;
+  localparam int NAME = 17;
+  localparam logic [0:7][0:NAME-1][7:0] NAMES = {
+    {"fault queue ", 40'd0}, "fault comparator ", {"fault command ", 24'd0},
+    {"status frames=", 24'd0}, {" events=", 72'd0}, {" dropped=", 64'd0}, {" datagrams=", 48'd0}, {" faults=", 72'd0}
+  };
+  logic [7:0] character, letter;
+  logic last, letter_last;
   logic zeros;  // only zeros so far
 
   always_comb begin
     character = 8'd0;
     last = 1'b0;
-    if (fault) begin
-      if (at < 6'd6) character = FAULT[at[2:0]];
-      else if (at < 6'd17) character = NAMES[which][4'(at - 6'd6)];
-      else if (at < 6'd17 + 6'(COUNT_DIGITS)) begin
-        if (digits[COUNT_DIGITS-1] != 0 || !zeros || at == 6'd16 + 6'(COUNT_DIGITS))
+    if (counting) begin
+      if (at < 6'(NAME)) character = NAMES[part][5'(at)];
+      else if (at < 6'(NAME + COUNT_DIGITS)) begin
+        if (digits[COUNT_DIGITS-1] != 0 || !zeros || at == 6'(NAME + COUNT_DIGITS - 1))
           character = hex(digits[COUNT_DIGITS-1]);
       end else last = 1'b1;
     end else begin
@@ -137,55 +135,74 @@ module taxel_status_sender
     if (last) character = 8'h0A;
   end
 
-  assign valid = state == SENDING && character != 8'd0;
-  assign data  = character;
+  assign valid = state == SENDING && letter != 8'd0;
+  assign data  = letter;
   assign pop   = state == IDLE && greeted && ready;
 
   always_ff @(posedge clk) begin
     if (look_again) look <= 3'b111;
+    for (int k = 0; k < 3; k++) differs[k] <= counts[k] != given[k];
     case (state)
       IDLE: begin
-        at    <= '0;
-        zeros <= 1'b1;
-        fault <= 1'b0;
+        at        <= '0;
+        counting  <= 1'b0;
+        bits_left <= 6'(COUNT_BITS);
         if (!greeted) begin
           greeted   <= 1'b1;
           line.kind <= ANSWER_GREETING;
-          state     <= SENDING;
+          state     <= LETTER;
         end else if (ready) begin
           line  <= oldest;
-          state <= SENDING;
+          state <= LETTER;
+          if (oldest.kind == ANSWER_STATUS) begin
+            counting     <= 1'b1;
+            part         <= 3'd3;
+            {bits, rest} <= totals;
+            state        <= DIGITS;
+          end
         end else if (look != 0) begin
           // One fault a clock.
-          which <= look[0] ? 2'd0 : look[1] ? 2'd1 : 2'd2;
-          look  <= look & (look - 3'd1);
+          part <= look[0] ? 3'd0 : look[1] ? 3'd1 : 3'd2;
+          look <= look & (look - 3'd1);
           for (int k = 2; k >= 0; k--) begin
-            if (look[k] && (look & 3'((1 << k) - 1)) == 0 && counts[k] != given[k]) begin
-              fault     <= 1'b1;
-              bits      <= counts[k];
-              given[k]  <= counts[k];
-              digits    <= '0;
-              bits_left <= 6'(COUNT_BITS);
-              state     <= DIGITS;
+            if (look[k] && (look & 3'((1 << k) - 1)) == 0 && differs[k]) begin
+              counting <= 1'b1;
+              bits     <= counts[k];
+              given[k] <= counts[k];
+              state    <= DIGITS;
             end
           end
         end
       end
       DIGITS: begin
-        digits    <= doubled(digits, bits[COUNT_BITS-1]);
+        zeros     <= 1'b1;
+        digits    <= doubled(bits_left == 6'(COUNT_BITS) ? '0 : digits, bits[COUNT_BITS-1]);
         bits      <= bits << 1;
         bits_left <= bits_left - 6'd1;
-        if (bits_left == 6'd1) state <= SENDING;
+        if (bits_left == 6'd1) state <= LETTER;
+      end
+      LETTER: begin
+        letter      <= character;
+        letter_last <= last;
+        state       <= SENDING;
+        if (counting && last && part >= 3'd3 && part != 3'd7) begin
+          // The line's next count.
+          at           <= '0;
+          bits_left    <= 6'(COUNT_BITS);
+          part         <= part + 3'd1;
+          {bits, rest} <= {rest, count_t'(0)};
+          state        <= DIGITS;
+        end
       end
       default: begin
-        if (taken || character == 8'd0) begin
-          at <= at + 6'd1;
-          if (!fault && line.kind == ANSWER_OK && at >= 6'd10) line.value <= line.value << 4;
-          if (fault && at >= 6'd17) begin
-            if (character != 8'd0) zeros <= 1'b0;
+        if (taken || letter == 8'd0) begin
+          at    <= at + 6'd1;
+          state <= letter_last ? IDLE : LETTER;
+          if (!counting && line.kind == ANSWER_OK && at >= 6'd10) line.value <= line.value << 4;
+          if (counting && at >= 6'(NAME)) begin
+            if (letter != 8'd0) zeros <= 1'b0;
             digits <= digits << 4;
           end
-          if (last) state <= IDLE;
         end
       end
     endcase

@@ -115,7 +115,7 @@ module taxel_top
   );
 
   // Events.
-  logic push, full, empty, ready, pop, frame, event_lost, not_returned;
+  logic push, full, empty, ready, pop, frame, event_sent, event_lost, frame_over, not_returned;
   event_t found, oldest;
 
   taxel_change_detector #(
@@ -127,7 +127,7 @@ module taxel_top
       .DIFFERENCE(DIFFERENCE)
   ) detector (
       .clk, .reset, .step_end, .read, .read_done, .tripped, .first, .at,
-      .push, .found, .full, .frame, .lost(event_lost), .not_returned
+      .push, .found, .full, .frame, .sent(event_sent), .lost(event_lost), .frame_over, .not_returned
   );
 
   taxel_event_fifo #(.DEPTH(QUEUE), .BITS($bits(event_t))) queue (
@@ -139,10 +139,17 @@ module taxel_top
   );
 
   // Status lines.
+  count_t lost, faults, commands;
+  totals_t totals;
+
+  taxel_totals counts (
+      .clk, .reset, .event_sent, .queue_lost(event_lost), .marker_lost, .not_returned, .skipped, .refused(refused_full),
+      .datagram(tvalid && tready && tlast), .frame_over, .lost, .faults, .commands, .totals
+  );
+
   taxel_status_sender #(.COLUMNS(COLUMNS), .ROWS(ROWS), .CHANNELS(CHANNELS), .FAULT_CLOCKS(FAULT_CLOCKS)) status (
       .clk, .reset, .version(written.wire_version), .ready(answer_ready), .oldest(oldest_answer), .pop(answer_pop),
-      .queue_lost(event_lost), .queue_lost_2(marker_lost), .not_returned, .skipped, .refused(refused_full),
-      .valid(status_valid), .data(status_data), .taken(status_taken)
+      .lost, .faults, .commands, .totals, .valid(status_valid), .data(status_data), .taken(status_taken)
   );
 
   taxel_uart_tx #(.CLOCKS(BAUD_CLOCKS)) uart_tx (

@@ -33,7 +33,8 @@ package taxel_types;
   typedef enum logic [1:0] {
     ANSWER_GREETING,
     ANSWER_OK,
-    ANSWER_BAD
+    ANSWER_BAD,
+    ANSWER_STATUS
   } answer_kind_t;
 
   typedef struct packed {
@@ -42,8 +43,18 @@ package taxel_types;
     logic [31:0]  value;  // what the register holds, or the rule that refuses
   } answer_t;
 
-  // Bits of a count of faults, which a status line gives in as many digits.
+  // Bits of a count, which a status line gives in at most so many digits.
   localparam int COUNT_BITS = 48;
   localparam int COUNT_DIGITS = 15;
+  typedef logic [COUNT_BITS-1:0] count_t;
+
+  // What a status line gives, in its order.
+  typedef struct packed {
+    count_t frames;
+    count_t events;
+    count_t dropped;
+    count_t datagrams;
+    count_t faults;
+  } totals_t;
 
 endpackage

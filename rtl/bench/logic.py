@@ -24,7 +24,7 @@ QUIET = ("-Wno-UNUSEDSIGNAL", "-Wno-ASCRANGE")
 OPTIONS = ("-j", "1", "-O3", "--x-assign", "unique", "--x-initial", "unique", "-CFLAGS", "-fPIC -O1")
 LINKED = ("-std=c++20", "-O2", "-shared", "-fPIC")
 #: A write acts in the frame whose edge comes so many clocks or more after the middle of its last stop bit.
-WRITE_CLOCKS = 22
+WRITE_CLOCKS = 23
 
 
 def verilator() -> Path | None:

@@ -37,7 +37,7 @@ def write(rng: np.random.Generator, pair: Pair) -> bytes:
     if kind == "flags":
         return Command(0, int(rng.choice([0, 4, 8, 12]))).to_bytes()
     if kind == "read":
-        return Command(6, int(rng.integers(0, 10))).to_bytes()
+        return Command(6, int(rng.integers(0, 9))).to_bytes()
     if kind == "nonsense":
         # Not the high bits of the line's period: frames would last for minutes.
         number = int(rng.choice([1, 2, 3, 4, 5, 7]))

@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+from test_totals import answered_and_counted
 
 from logic import RTL
 from pair import Pair, answers
@@ -15,9 +16,9 @@ FAULTS = [
     ("taxel_change_detector.sv", "moved > 16'(of_compared", "moved >= 16'(of_compared"),
     ("taxel_change_detector.sv", "{channel, now.step[STEP_BITS-1:0]}", "{now.step[STEP_BITS-1:0], channel}"),
     ("taxel_change_detector.sv", "if (step_end) ended <= read;", "if (read_done) ended <= read;"),
-    ("taxel_change_detector.sv", "&& !compared.not_returned && !of_compared", "&& !of_compared"),
+    ("taxel_change_detector.sv", "&& !judged.not_returned && !of_judged", "&& !of_judged"),
     ("taxel_comparator_column.sv", "first   <= sample[0];", "first   <= sample[1];"),
-    ("taxel_ramp_counter.sv", "last <= length[15:1];", "last <= length[15:1] - 15'd1;"),
+    ("taxel_ramp_counter.sv", "pairs <= full;", "pairs <= full - 15'd1;"),
     ("taxel_comparator_array.sv", "if (begins) inverted_now <= inverted_next;", "inverted_now <= 1'b0;"),
     ("taxel_time_stamper.sv", "CLOCKS - 1", "CLOCKS"),
     ("taxel_mux_ctrl.sv", "read.stamp         <= stamp;", "if (frame_start) read.stamp <= stamp;"),
@@ -27,16 +28,41 @@ FAULTS = [
 ]
 
 
+#: Those that only an answer with totals shows.
+TOTALS = [
+    ("taxel_totals.sv", "if (done) totals", "if (over) totals"),
+    ("taxel_totals.sv", "if (done) totals <=", "totals <="),
+    ("taxel_change_detector.sv", "judged.last && !of_judged.initial_frame", "judged.last"),
+    ("taxel_change_detector.sv", "assign sent = changed && !full;", "assign sent = push;"),
+    ("taxel_top.sv", "tvalid && tready && tlast", "tvalid && tlast"),
+    ("taxel_status_sender.sv", "{bits, rest} <= {rest, count_t'(0)};", "{bits, rest} <= totals;"),
+    ("taxel_status_sender.sv", "'0 : digits, bits", "digits : digits, bits"),
+]
+
+
+def plant(fault, to):
+    """Write the sources with one edit."""
+    file, there, instead = fault
+    for source in RTL.glob("*.sv"):
+        shutil.copy(source, to)
+    text = (to / file).read_text()
+    assert text.count(there) == 1
+    (to / file).write_text(text.replace(there, instead))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS, ids=[f"{file[6:-3]}-{k}" for k, (file, _, _) in enumerate(FAULTS)])
 def test_a_fault_is_seen(fault, tmp_path):
-    file, there, instead = fault
-    for source in RTL.glob("*.sv"):
-        shutil.copy(source, tmp_path)
-    text = (tmp_path / file).read_text()
-    assert text.count(there) == 1
-    (tmp_path / file).write_text(text.replace(there, instead))
+    plant(fault, tmp_path)
     assert differs(Pair(8, 8, source=tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", TOTALS, ids=range(len(TOTALS)))
+def test_a_fault_of_the_totals_is_seen(fault, tmp_path):
+    plant(fault, tmp_path)
+    answered, counted = answered_and_counted(Pair(8, 8, source=tmp_path, FAULT_CLOCKS=1 << 30), 8)
+    assert answered != counted
 
 
 def test_the_sources_without_a_fault_are_not_taken_for_one():

@@ -34,12 +34,12 @@ def arithmetic(node: ast.expr, fields: dict[str, Table]) -> str:
             return f"({wide} + {WIDTH}'d{offset})" if offset else wide
         case ast.Name(id=name):
             return f"{WIDTH}'({name})"
-        case ast.Constant(value=number):
+        case ast.Constant(value=int(number)):
             return f"{WIDTH}'d{number}"
-        case ast.BinOp(left=ast.Constant(value=number), op=ast.Mult(), right=right):
+        case ast.BinOp(left=ast.Constant(value=int(number)), op=ast.Mult(), right=right):
             # Shifts and a sum, as a multiplier was the longest path of the logic.
             factor = arithmetic(right, fields)
-            places = [k for k in range(int(number).bit_length()) if int(number) >> k & 1]
+            places = [k for k in range(number.bit_length()) if number >> k & 1]
             return "(" + " + ".join(f"({factor} << {k})" if k else factor for k in places) + ")"
         case ast.BinOp(left=left, op=op, right=right):
             return f"({arithmetic(left, fields)} {OPERATOR[type(op)]} {arithmetic(right, fields)})"
@@ -119,23 +119,35 @@ def words(source: Table) -> str:
 
 
 def rules(source: Table) -> str:
-    """Write the rules that refuse, as the number of the first that is broken."""
+    """Write the rules that refuse: which of them are broken, and the number of the first."""
     fields = {field["name"]: field for field in held(source)}
-    rows = []
+    kinds = []
     for name, f in fields.items():
         if f["least"] > f["offset"]:
-            rows.append(f"    if ({arithmetic(ast.Name(name), fields)} < {WIDTH}'d{f['least']}) return 4'd4;")
+            kinds.append((4, f"{arithmetic(ast.Name(name), fields)} < {WIDTH}'d{f['least']}"))
         if f["greatest"] < 2 ** f["bits"] - 1 + f["offset"]:
-            rows.append(f"    if ({arithmetic(ast.Name(name), fields)} > {WIDTH}'d{f['greatest']}) return 4'd4;")
+            kinds.append((4, f"{arithmetic(ast.Name(name), fields)} > {WIDTH}'d{f['greatest']}"))
     for rule in source["rule"]:
         if not rule["warns"]:
             demanded = condition(parsed(rule["holds"]), fields)
-            rows.append(f"    if (!{demanded}) return 4'd{rule['number']};")
-    newline = "\n"
+            kinds.append((rule["number"], f"!{demanded}"))
+    conditions = "\n".join(f"    which[{k}] = {broken};" for k, (_, broken) in enumerate(kinds))
+    numbers = "\n".join(f"    if (which[{k}]) return 4'd{number};" for k, (number, _) in enumerate(kinds))
     return f"""
-  // The number of the first rule that refuses these registers; 0: none.
-  function automatic logic [3:0] refused(registers_t r, int steps, int driven_lines, int sense_lines, int channels);
-{newline.join(rows)}
+  localparam int RULES = {len(kinds)};
+
+  // Which rules refuse these registers, in their order.
+  function automatic logic [RULES-1:0] broken(
+      registers_t r, int steps, int driven_lines, int sense_lines, int channels
+  );
+    logic [RULES-1:0] which;
+{conditions}
+    return which;
+  endfunction
+
+  // The number of the first of them; 0: none.
+  function automatic logic [3:0] refused(logic [RULES-1:0] which);
+{numbers}
     return 4'd0;
   endfunction
 """

@@ -10,6 +10,9 @@ import numpy as np
 
 #: Weights that were trained reach the threshold at a target to rounding, mV.
 ROUNDING = 5e-12
+#: Rounding of a potential's sum, mV. Far from time 0 an output spike at the next representable time is another spike: an
+#: input may lie between.
+SUM_ROUNDING = 1e-13
 
 
 def kernel(neuron, ages):
@@ -94,7 +97,7 @@ class Simulated:
         if values[k] < 0:
             return float(high)
         while high - low > 1e-10 and low < (middle := (low + high) / 2) < high:
-            low, high = (low, middle) if self.above(middle)[0] >= 0 else (middle, high)
+            low, high = (low, middle) if self.above(middle)[0] >= -SUM_ROUNDING else (middle, high)
         return float(high)
 
 

@@ -167,6 +167,7 @@ def test_what_says_solved_fires_at_its_targets_and_nowhere_else(kind):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_thousand_that_say_solved_fire_at_their_targets_and_nowhere_else(kind):
     for seed in range(QUICK, ALL):
