@@ -53,7 +53,7 @@ def write_h5(part: Path, contents: Contents) -> None:
 
 
 def read_h5(path: Path, array: Array | None) -> Contents:
-    """Read a .h5 of ours.
+    """Read a .h5 that taxel wrote.
 
     Raises
     ------

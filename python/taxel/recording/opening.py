@@ -1,4 +1,4 @@
-"""Opens a recording: a file of taxel's, a file of another format, or a folder of trials."""
+"""Opens a recording: a file that taxel writes, a file of another format, or a folder of trials."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def open_any(
     Parameters
     ----------
     path : path
-        A .mcap, .lsa, .npz, .csv or .h5 of taxel's, finished or not, whole or damaged; a file of another format that
-        `taxel.formats` reads; or a folder of either kind.
+        A .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged; a file of another format
+        that `taxel.formats` reads; or a folder of either kind.
     array : Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
         a larger one if events lie outside it.
@@ -54,8 +54,8 @@ def open_any(
     Returns
     -------
     Recording, or list of Recording
-        One for a file of taxel's. A list for a folder, in the order of the names (2 before 10), and for a file of
-        another format, which holds one or more trials: their reference events (contact, foot-off ...) become notes.
+        One for a file as taxel writes it. A list for a folder, in the order of the names (2 before 10), and for a file
+        of another format, which holds one or more trials: their reference events (contact, foot-off ...) become notes.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def open_any(
     -----
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
     is described in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) become
-    notes of the recordings that it names; in a folder with files of taxel's, all other files are ignored.
+    notes of the recordings that it names; in a folder with files that taxel writes, all other files are ignored.
 
     Examples
     --------
@@ -93,7 +93,7 @@ def open_any(
 def open_recording(
     path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
 ) -> Recording:
-    """Open one file of taxel's: .mcap, .lsa, .npz, .csv or .h5, finished or not, whole or damaged.
+    """Open one .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def _holds_own(folder: Path) -> bool:
 
 
 def _is_own(file: Path) -> bool:
-    """Return whether a file is of taxel's kinds, by its ending and, if other formats share the ending, its content."""
+    """Return whether a file is of a kind that taxel writes, by its ending and, for shared endings, by its content."""
     ending = file.suffix.lower()
     if ending == ".csv":
         with file.open("rb") as table:
