@@ -63,8 +63,8 @@ class Registers:
     threshold_rest, threshold_jump, threshold_decay : int, in 1/1024, 1/256 theta_0, 1/1024 theta_0
         FA-1 on the board, where `mechanoreceptor` is set.
     channels : {16, 64}
-        Number of channels of the converter, a property of the board and not a register. A line of 64 taxels has 4 steps with 16
-        channels, one with 64.
+        Number of channels of the converter, a property of the board and not a register. A line of 64 taxels has 4 steps
+        with 16 channels, one with 64.
 
     Raises
     ------
