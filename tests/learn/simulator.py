@@ -10,8 +10,8 @@ import numpy as np
 
 #: Weights that were trained reach the threshold at a target to rounding, mV.
 ROUNDING = 5e-12
-#: Rounding of a potential's sum, mV. Far from time 0 an output spike at the next representable time is another spike: an
-#: input may lie between.
+#: Rounding of a potential's sum, mV. Far from time 0 an output spike at the next representable time is another
+#: spike: an input may lie between.
 SUM_ROUNDING = 1e-13
 
 

@@ -151,7 +151,7 @@ class Registers:
         array : Array, optional
             The sensor; default: the thesis' 64 x 64.
         channels : {16, 64}
-            Channels of the converter, a property of the board and not a register.
+            Number of channels of the converter, a property of the board and not a register.
 
         Returns
         -------
