@@ -151,7 +151,7 @@ class Registers:
         array : Array, optional
             The sensor; default: the thesis' 64 x 64.
         channels : {16, 64}
-            Number of channels of the converter, a property of the board and not a register.
+            The number of channels of the converter, a property of the board and not a register.
 
         Returns
         -------
