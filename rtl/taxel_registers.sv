@@ -5,35 +5,35 @@ package taxel_registers;
   typedef struct packed {
     // Lines are driven in random order.
     logic random_lines;
-    // Each taxel is an FA-1 afferent (5.4.2): an event is its spike, the intensity word its integral; else a change.
+    // Each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral; else changes.
     logic mechanoreceptor;
     // A falling edge ends a sample.
     logic invert_comparator;
     // All events of a frame carry the time of its start.
     logic frame_sync;
-    // Which version of the wire the board speaks (read: the manual has one). The bits hold 1 less.
+    // Version of the wire protocol that the board uses (read: the manual has only one). The bits hold 1 less.
     logic [1:0] wire_version;
-    // FA-1: by how much a spike raises the threshold, T A of Table 5.3.
+    // FA-1: increase of the threshold by a spike, T A of Table 5.3.
     logic [15:0] threshold_jump;
     // Time from one driven line to the next.
     logic [31:0] line_period;
-    // Part of it in which the line is read.
+    // Part of line_period in which the line is read.
     logic [31:0] line_read;
     // Time from one multiplexer step to the next.
     logic [15:0] step_period;
-    // Part of it in which the channels are read.
+    // Part of step_period in which the channels are read.
     logic [15:0] step_read;
-    // How long the ramp rises.
+    // Duration of the ramp.
     logic [15:0] ramp;
     // FA-1: theta_0, in ticks after the power law.
     logic [15:0] threshold_rest;
-    // FA-1: by how much a quiet frame lowers the threshold, B of Table 5.3.
+    // FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3.
     logic [7:0] threshold_decay;
-    // Largest difference that makes no event.
+    // Largest difference that does not cause an event.
     logic [7:0] noise_floor;
-    // Driven lines (the register holds one less; the manual's field has 6 bits, read: 8). The bits hold 1 less.
+    // Number of driven lines (the register holds one less; the manual's field has 6 bits, read: 8). The bits hold 1 less.
     logic [7:0] lines;
-    // A recording runs: setting and clearing it sends a marker and moves the sync line.
+    // Recording: setting and clearing it sends a marker and switches the sync line.
     logic record;
   } registers_t;
 

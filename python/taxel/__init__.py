@@ -1,4 +1,4 @@
-"""Touch as events: from the bytes of a tactile array to decisions that say when."""
+"""Touch as events: from the bytes of a tactile array to detections with the time of each."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -73,7 +73,7 @@ __all__ = [
 ]
 
 
-#: Where the names are that are loaded when they are first asked for, so that ``import taxel`` is quick.
+#: The module of each name that is imported at its first access, so that ``import taxel`` is quick.
 _ROOMS = (
     "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot", "recording", "simulate",
     "wire", "wire_v2",
@@ -90,7 +90,7 @@ draw_by(lambda: import_module("taxel.plot"))
 
 
 def __getattr__(name: str) -> Any:
-    """Load a room, or a name that stands in one, when it is first asked for."""
+    """Import a subpackage, or a name from one, at its first access."""
     if name in _ROOMS:
         return import_module(f"taxel.{name}")
     if name in _ELSEWHERE:

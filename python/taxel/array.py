@@ -26,7 +26,7 @@ class Array:
     pitch_mm : float, above 0
         Distance between the centres of neighbouring taxels.
     exists : bool, shape (rows, columns), optional
-        Which taxels exist; all where it is left out.
+        Which taxels exist; default: all.
     name : str
 
     Raises
@@ -73,7 +73,7 @@ class Array:
 
     @classmethod
     def _of(cls, array: object) -> Array:
-        """Return the array that was given; the thesis' where none was."""
+        """Return the given array, or the thesis' array for None."""
         return cls.thesis() if array is None else instance("array", array, cls)
 
     @property
@@ -83,7 +83,7 @@ class Array:
 
     @property
     def taxels(self) -> int:
-        """How many taxels exist."""
+        """The number of taxels that exist."""
         return self.rows * self.columns if self.exists is None else int(np.count_nonzero(self.exists))
 
     def index(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.int64]:
@@ -100,7 +100,7 @@ class Array:
 
         Raises
         ------
-        ProblemError : a column or row that the array has not, or shapes that do not fit
+        ProblemError : a column or row outside the array, or `x` and `y` of different shapes
 
         Examples
         --------
@@ -147,7 +147,7 @@ class Array:
         return limits[0], limits[1]
 
     def _parts(self) -> tuple[int, int, float, str, list[bool] | None]:
-        """Return what the compiled part wants."""
+        """Return the fields as the compiled part reads them."""
         exists = None if self.exists is None else [bool(e) for e in self.exists.ravel()]
         return self.rows, self.columns, self.pitch_mm, self.name, exists
 
@@ -158,7 +158,7 @@ class Array:
         return cls(rows, columns, pitch_mm, grid, name)
 
     def _geometry(self) -> dict[str, Any]:
-        """Return what JSON holds of an array."""
+        """Return the array as JSON values."""
         return dict(zip(("rows", "columns", "pitch_mm", "name", "exists"), self._parts(), strict=True))
 
     @classmethod

@@ -18,20 +18,20 @@ __all__ = ["Clock"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Clock:
-    """Tell a source's time, a board's or a stream's, from the host's.
+    """Convert between the clock of a source (a board or a stream) and the clock of the host.
 
-    A datagram comes late by whatever the way costs, seldom early. So a line below the points *arrival less own time* is
-    the offset between the clocks and the quick way together; they cannot be told apart. One point in a hundred may lie
-    below it, as the very quickest are chance; of all such lines it is the one nearest to the points above, by quantile
-    regression. Its slope is the drift. Over more than 32 s it is drawn again and again, each time of the last 64 s, and
-    between the middles of two such stretches time passes evenly.
+    A datagram arrives late by its network delay, and seldom early. A line below the points *arrival time less own time*
+    is therefore the offset between the clocks plus the shortest delay; the two cannot be separated. The line is a
+    quantile regression in which one point in a hundred may lie below it, as the very shortest delays are outliers. Its
+    slope is the drift. Over more than 32 s the line is fitted again and again, each time to the last 64 s; between the
+    midpoints of two such intervals time is interpolated linearly.
 
     Parameters
     ----------
     board_us : int64, shape (n,), us
-        When each datagram could leave by the source's clock: the end of its frame, as far as that is known.
+        The earliest time at which each datagram could be sent, by the source's clock: the end of its frame, if known.
     arrived_ns : int64, shape (n,), ns since 1970
-        When it came.
+        Its arrival time by the host's clock.
     """
 
     board_us: NDArray[np.int64]
@@ -46,7 +46,7 @@ class Clock:
 
     @cached_property
     def _knots(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """The middles of the stretches, us, and the host's time then, ns, with a second more on either side."""
+        """The midpoints of the intervals, us, and the host's time there, ns, extended by a second on either side."""
         lines = self._lines
         middles = [line[0] for line in lines]
         places = [middles[0] - 1_000_000, *middles, middles[-1] + 1_000_000]
@@ -81,7 +81,7 @@ class Clock:
 
         Raises
         ------
-        ProblemError : no whole numbers; no datagrams, so that nothing is known of the clock
+        ProblemError : times that are not whole numbers; no datagrams, so that the clock is unknown
 
         Examples
         --------
@@ -114,7 +114,7 @@ class Clock:
 
         Raises
         ------
-        ProblemError : no whole numbers; no datagrams, so that nothing is known of the clock
+        ProblemError : times that are not whole numbers; no datagrams, so that the clock is unknown
 
         Examples
         --------
@@ -125,13 +125,13 @@ class Clock:
         own, host = self._knots
         t = own[0] + (target - host[0]) // 1000
         for _ in range(4):
-            # What is off shrinks by the drift each time, 1e-4 or less.
+            # Each iteration multiplies the error by the drift, 1e-4 or less.
             t = t + np.rint((target - self.host_ns(t)) / 1000.0).astype(np.int64)
         return t if np.ndim(target) else int(t)
 
     @property
     def delay_us(self) -> NDArray[np.float64]:
-        """How much later than the quick ones each datagram came, us; one in a hundred may come before them."""
+        """The delay of each datagram beyond the shortest delay, us; negative for about one in a hundred."""
         late: NDArray[np.float64] = (self.arrived_ns - self.host_ns(self.board_us)) / 1000.0
         return late
 
@@ -143,7 +143,7 @@ class Clock:
 
 
 def _whole(name: str, values: Any, unit: str) -> NDArray[np.int64]:
-    """Return one time or several as int64; refuse what is no whole number."""
+    """Return one time or several as int64; refuse values that are not whole numbers."""
     try:
         times = np.asarray(values)
     except (ValueError, TypeError, OverflowError):

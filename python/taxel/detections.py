@@ -1,4 +1,4 @@
-"""Detections of a readout: what, when, and when it could first be known."""
+"""Detections of a readout: label, time of the event, and the earliest time at which it could be detected."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ class Detection(NamedTuple):
     ----------
     label : str
     t : int, us
-        When the event was, by the board's clock: the crossing less the encoder's latency and the trained delay.
+        Time of the event by the board's clock: the crossing less the encoder's latency and the trained delay.
     known : int, us
-        When it could first be detected: the end of the board's frame in which the potential crosses.
+        Earliest time of detection: the end of the board's frame in which the potential crosses the threshold.
     slope : float, mV/ms
-        How steeply the potential crossed its threshold, as a measure of how sure; NaN where that is not known.
+        Slope of the potential at its threshold, a measure of certainty; NaN if unknown.
     said : int, us, optional
-        When it was reported, by the host's clock less the estimated offset between the clocks.
+        Time of the report, by the host's clock less the estimated offset between the clocks.
     said_ns : int, ns since 1970, optional
-        The same by the host's clock; of a detection that is reported live.
+        The same by the host's clock, for a detection that is reported live.
     repaired : bool
         Whether it may rest on values that states of wire version 2 repaired after a loss.
 
@@ -66,12 +66,12 @@ class Detection(NamedTuple):
 
     @property
     def latency(self) -> int | None:
-        """How long after `known` it was reported, us; None where that is not known."""
+        """The time from `known` to the report, us; None if it is unknown."""
         return None if self.said is None else self.said - self.known
 
 
 class Detections(Columns):
-    """Hold what a readout detected: label, time of the event, time at which it could be known, and how surely.
+    """Hold the detections of a readout: label, time of the event, earliest time of detection, and slope.
 
     All times are us of the board's clock.
 
@@ -79,21 +79,21 @@ class Detections(Columns):
     ----------
     label : str, shape (n,), text
     t : int64, shape (n,), us
-        When the event was: the crossing less the encoder's latency and the trained delay.
+        Time of the event: the crossing less the encoder's latency and the trained delay.
     known : int64, shape (n,), us
-        When it could first be known: the end of the frame in which the potential crosses.
+        Earliest time of detection: the end of the frame in which the potential crosses the threshold.
     slope : float, shape (n,), mV/ms, optional
-        How steeply the potential rose above its threshold, as a measure of how sure; None for one that has none. Read
-        back as NaN, also where it is left out.
+        Slope of the potential at its threshold, a measure of certainty; None for a detection without one, which reads
+        back as NaN. Default: NaN for all.
     said : int64, shape (n,), us, optional
-        When it was reported, by the host's clock less the estimated offset.
+        Time of the report, by the host's clock less the estimated offset.
     repaired : bool, shape (n,), optional
-        Whether it may rest on values that states of wire version 2 repaired after a loss: what it reports may have
-        happened before `t`. None where it is left out.
+        Whether it may rest on values that states of wire version 2 repaired after a loss: the event may have happened
+        before `t`. Default: none.
 
     Raises
     ------
-    ProblemError : columns of unequal length, or values that make no sense
+    ProblemError : columns of unequal length, or invalid values
 
     Examples
     --------
@@ -131,7 +131,7 @@ class Detections(Columns):
         said: ArrayLike | None = None,
         repaired: ArrayLike | None = None,
     ) -> Self:
-        """Build from columns whose slope may be NaN, where a detection has none."""
+        """Build detections from columns; the slope of a detection without one is NaN."""
         detections = cls.__new__(cls)
         detections._hold(label, t, known, slope, said, repaired)
         return detections
@@ -223,7 +223,7 @@ class Detections(Columns):
 
         Raises
         ------
-        ProblemError : only one of the two says when its detections were said
+        ProblemError : only one of the two has the times of its reports (`said`)
         """
         if not isinstance(other, Detections):
             return NotImplemented
@@ -235,7 +235,7 @@ class Detections(Columns):
         return Detections._of(**columns)
 
     def to_pandas(self) -> Any:
-        """Return a table ``label t_us known_us slope_mv_per_ms``; ``said_us`` where known, ``repaired`` where any is.
+        """Return a table ``label t_us known_us slope_mv_per_ms``; ``said_us`` if known, ``repaired`` if any is.
 
         Raises
         ------
@@ -252,7 +252,7 @@ class Detections(Columns):
         return pandas.DataFrame(dict(zip(names, columns, strict=True)))
 
     def to_numpy(self) -> NDArray[np.void]:
-        """Return one record a detection: ``label t known slope``; ``said`` where known, ``repaired`` where any is."""
+        """Return one record a detection: ``label t known slope``; ``said`` if known, ``repaired`` if any is."""
         width = max(1, self.label.dtype.itemsize // 4)
         fields: list[tuple[str, Any]] = [("label", f"U{width}"), ("t", "<i8"), ("known", "<i8"), ("slope", "<f8")]
         if self.said is not None:
@@ -266,7 +266,7 @@ class Detections(Columns):
 
     @classmethod
     def from_numpy(cls, records: NDArray[np.void]) -> Detections:
-        """Build detections from records with the fields ``label t known slope``, and ``said``, ``repaired`` if there.
+        """Build detections from records with the fields ``label t known slope``, and optionally ``said``, ``repaired``.
 
         Parameters
         ----------
@@ -307,7 +307,7 @@ class Detections(Columns):
         return write_whole(path, lambda file: file.write(text), overwrite=overwrite)
 
     def _csv(self, repaired: bool | None = None) -> str:
-        """Return the table; with the column of repaired ones where any is, or where it is asked for."""
+        """Return the table; the column ``repaired`` is in it if any detection is repaired, or on request."""
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         more = {} if self.said is None else {_SAID: self.said.tolist()}
@@ -328,7 +328,7 @@ class Detections(Columns):
 
         Raises
         ------
-        FormatError : another header, or a value that makes no sense (names the line)
+        FormatError : another header, or an invalid value (names the line)
         FileNotFoundError : no such file
 
         Examples
@@ -426,7 +426,7 @@ class Detections(Columns):
 
 
 def _slopes(slope: ArrayLike) -> NDArray[np.float64]:
-    """Return slopes given by a caller, finite each; None becomes NaN."""
+    """Return a caller's slopes, each finite; None becomes NaN."""
     if isinstance(slope, list | tuple):
         none = np.array([one is None for one in slope], bool)
         values = np.full(len(slope), np.nan)

@@ -140,15 +140,15 @@ class Cable:
     Attributes
     ----------
     faults : dict
-        Number of faults by name, as far as their lines were received.
+        Number of faults by name, counted from the lines that were received.
     resets : int
-        Number of greetings that were not requested, as far as they were received: at a reset, and on connecting.
+        Number of received greetings that were not requested: the board sends one at a reset and on connecting.
 
     Raises
     ------
     OSError : the device or the server cannot be opened
-    DeviceError : the device is no serial one
-    ProblemError : a place, a baud rate or a timeout that makes no sense
+    DeviceError : the device is not a serial device
+    ProblemError : an invalid place, baud rate or timeout
 
     Notes
     -----
@@ -184,7 +184,7 @@ class Cable:
                 settings = termios.tcgetattr(self._file)
                 settings[4] = settings[5] = _SPEEDS[baud]
                 termios.tcsetattr(self._file, termios.TCSANOW, settings)
-                # Lines that came before are no answer to this request.
+                # Lines that arrived before the request are not its answer.
                 termios.tcflush(self._file, termios.TCIFLUSH)
             except termios.error as error:
                 self.close()
@@ -212,7 +212,7 @@ class Cable:
 
         Raises
         ------
-        DeviceError : the board refuses (its rule is named), or does not answer
+        DeviceError : the board refuses the command (the error names the rule), or does not answer
         ProblemError : no command
 
         Examples
@@ -231,7 +231,7 @@ class Cable:
         (140, 140)
         """
         instance("command", command, Command)
-        # A write of REG6 asks for the register that it names.
+        # A write of REG6 requests the register whose number it holds.
         register = command.value if command.register == 6 else command.register
         for line in self._answers(command):
             answer = re.fullmatch(r"ok REG(\d)=0x([0-9A-F]{8})", line)
@@ -256,7 +256,7 @@ class Cable:
         for line in self._answers(Command(6, 8)):
             greeting = _GREETING.fullmatch(line)
             if greeting:
-                # It was requested, so it shows no reset.
+                # This greeting was requested, so it does not indicate a reset.
                 self.resets -= 1
                 return Greeting(*(int(part) for part in greeting.groups()))
         raise self._silence()
@@ -429,7 +429,7 @@ class Device:
     """Set a board by its registers' names, with their units; a context manager.
 
     Registers are read back after they are set. After the cable was pulled, the next call reconnects, and sets the
-    registers again where the board was reset.
+    registers again if the board was reset.
 
     Parameters
     ----------
@@ -448,7 +448,7 @@ class Device:
     ------
     OSError : the line cannot be opened
     DeviceError : no board answers there, or one of another size than `array`
-    ProblemError : arguments that make no sense
+    ProblemError : invalid arguments
 
     Examples
     --------
@@ -510,7 +510,7 @@ class Device:
 
         Raises
         ------
-        DeviceError : a rule is broken, the board refuses, does not answer, or holds something else afterwards
+        DeviceError : a rule is broken, the board refuses, does not answer, or reports another value afterwards
         ProblemError : no such preset
 
         Examples
@@ -602,7 +602,7 @@ class Device:
         return f"Device({self.cable.place}, {g.rows} x {g.columns} taxels, {g.channels} channels)"
 
     def _try(self, work: Callable[[], T]) -> T:
-        """Call a function, a second time where the cable was pulled during the first call."""
+        """Call a function; call it once more if the cable was pulled during the first call."""
         try:
             return work()
         except OSError:

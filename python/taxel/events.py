@@ -1,4 +1,4 @@
-"""What changed, when."""
+"""Events: changes at taxels, with their times."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class Event(NamedTuple):
     p : bool
         Polarity: more pressure (true) or less.
     intensity : int, ticks, or None
-        The held value that came with the change, where one came.
+        The held value that arrived with the change, if any.
     repaired : bool
-        Whether a state told it after a loss: it happened some time before `t`.
+        Whether it was derived from a state of wire version 2 after a loss: the change happened some time before `t`.
     """
 
     t: int
@@ -47,7 +47,7 @@ class Event(NamedTuple):
 
 
 class Events(Columns):
-    """Hold changes at taxels, in the order in which they came.
+    """Hold changes at taxels, in the order of their arrival.
 
     Parameters
     ----------
@@ -60,14 +60,14 @@ class Events(Columns):
     array : Array
         The sensor; every event must lie on it.
     intensity : uint16, shape (events,), ticks, optional
-        The held value that came with each change (1/300 us of the board's counter).
+        The held value that arrived with each change (1/300 us of the board's counter).
     present : bool, shape (events,), optional
-        Which events came with an intensity; all where it is left out.
+        Which events have an intensity; default: all.
     repaired : bool, shape (events,), optional
-        Which events a state of wire version 2 gave, because it differed from the held value: what they report happened
-        some time before `t`. None where no event is of that kind.
+        Which events were derived from a state of wire version 2 that differed from the held value: their change
+        happened some time before `t`. None if there is no such event.
     markers : sequence of (t us, start), optional
-        Starts (true) and stops (false) of a recording, as the board marked them.
+        The board's markers of the start (true) and stop (false) of a recording.
 
     Raises
     ------
@@ -75,8 +75,8 @@ class Events(Columns):
 
     Notes
     -----
-    Columns are read-only: arrays of the caller's are copied once, unless they are read-only themselves. So whatever
-    reads them, reads them where they lie.
+    Columns are read-only: a caller's arrays are copied once, unless they are read-only themselves. Every reader can
+    therefore use them in place.
 
     Examples
     --------
@@ -114,7 +114,7 @@ class Events(Columns):
             all_of_them = np.ones(len(self.intensity), np.bool_)
             self.present = frozen(all_of_them) if present is None else own_column("present", present, np.bool_)
             if len(self.present) == len(self.intensity) and self.intensity[~self.present].any():
-                # What did not come has no value, so equal events have equal columns.
+                # An absent intensity is stored as 0, so that equal events have equal columns.
                 self.intensity = frozen(np.where(self.present, self.intensity, np.uint16(0)))
         elif present is not None:
             raise ProblemError("present without intensity: give both or neither")
@@ -127,7 +127,7 @@ class Events(Columns):
 
     @property
     def duration_us(self) -> int:
-        """From the first event to the last, us; 0 where there is none."""
+        """The time from the first event to the last, us; 0 without events."""
         return int(self.t.max() - self.t.min()) if len(self) else 0
 
     def between(self, start: float, stop: float) -> Events:
@@ -153,7 +153,7 @@ class Events(Columns):
         return selected
 
     def region(self, x: slice, y: slice) -> Events:
-        """Return the events of a rectangle of columns `x` and rows `y` (slices without a step); the array stays.
+        """Return the events of a rectangle of columns `x` and rows `y` (slices without a step), on the same array.
 
         Parameters
         ----------
@@ -175,9 +175,10 @@ class Events(Columns):
         return self[inside]
 
     def sorted(self) -> Events:
-        """Return the same events and markers in order of time; what has equal times keeps its order.
+        """Return the same events and markers in order of time; those with equal times keep their order.
 
-        Encoders and readouts take a whole recording in order, with up to 0.1 s of datagrams that overtook each other.
+        Encoders and readouts need a recording in order of time; they tolerate events up to 0.1 s late (reordered
+        datagrams).
         """
         ordered = self[np.argsort(self.t, kind="stable")]
         ordered.markers = tuple(sorted(self.markers, key=lambda marker: marker[0]))
@@ -199,8 +200,9 @@ class Events(Columns):
     def __getitem__(self, chosen: int | slice | ArrayLike) -> Event | Events:
         """Return one event by its number, or the chosen ones (slice, mask or numbers) with the markers of their time.
 
-        That time goes from the first chosen event to the one that follows the last; it has no end where none follows,
-        and no beginning where the very first event is chosen. So slices that make the whole hold each marker once.
+        That time begins with the first chosen event and ends before the event that follows the last one; it has no end
+        if no event follows, and no beginning if the very first event is chosen. Adjacent slices therefore hold each
+        marker once.
         """
         if isinstance(chosen, int | np.integer) and not isinstance(chosen, bool):
             n = nth("event", chosen, len(self))
@@ -237,7 +239,7 @@ class Events(Columns):
     def __add__(self, other: Events) -> Events:
         """Return the events and markers of both in order of time, those of the first before the other's at equal times.
 
-        Where only one has intensities, the other's are not present.
+        If only one of them has intensities, those of the other are marked as absent.
 
         Raises
         ------
@@ -260,7 +262,7 @@ class Events(Columns):
         return self._unchecked(t, x, y, p, self.array, ticks, present, repaired, self.markers + other.markers).sorted()
 
     def to_pandas(self) -> Any:
-        """Return a table ``t_us x y p``, ``intensity`` where there are any (missing where none came), ``repaired`` too.
+        """Return a table ``t_us x y p``, with ``intensity`` (missing if absent) and ``repaired`` if there are any.
 
         Raises
         ------
@@ -277,7 +279,7 @@ class Events(Columns):
         return table
 
     def to_numpy(self) -> NDArray[np.void]:
-        """Return one record an event: ``t x y p``; ``intensity present`` and ``repaired`` where there are any."""
+        """Return one record an event: ``t x y p``, with ``intensity present`` and ``repaired`` if there are any."""
         fields: list[tuple[str, Any]] = [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")]
         if self.intensity is not None:
             fields += [("intensity", "<u2"), ("present", "?")]
@@ -290,7 +292,7 @@ class Events(Columns):
 
     @classmethod
     def from_numpy(cls, records: NDArray[np.void], array: Array) -> Events:
-        """Build events from records with the fields ``t x y p``, and ``intensity present repaired`` if there.
+        """Build events from records with the fields ``t x y p``, and optionally ``intensity present repaired``.
 
         Parameters
         ----------
@@ -356,7 +358,7 @@ class Events(Columns):
         """
         if len(self) and self.t.min() < 0:
             raise ProblemError(f"event {int(self.t.argmin())}: t is {int(self.t.min())} us, faery's times start at 0")
-        # faery asks for exactly this type: `p` is a title, a second name, of `on`.
+        # faery requires exactly this dtype: `p` is a title (NumPy's second field name) of `on`.
         titled: list[Any] = [("t", "<u8"), ("x", "<u2"), ("y", "<u2"), (("p", "on"), "?")]
         records = np.empty(len(self), np.dtype(titled))
         records["t"], records["x"], records["y"], records["on"] = self.t, self.x, self.y, self.p
@@ -385,7 +387,7 @@ class Events(Columns):
         return cls(records["t"], records["x"], records["y"], records["on"], array=array)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the event picture: how often each taxel rose, in one colour, and how often it fell, in another."""
+        """Draw the number of events of each taxel: rises in one colour, falls in another."""
         return draw("event_picture", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
@@ -404,7 +406,7 @@ class Events(Columns):
         repaired: NDArray[np.bool_] | None,
         markers: tuple[tuple[int, bool], ...],
     ) -> Events:
-        """Build events from columns of our own that the compiled part or another `Events` has checked already."""
+        """Build events from columns that the compiled part or another `Events` has already checked."""
         events = cls.__new__(cls)
         events.array, events.markers = array, markers
         events.t, events.x, events.y, events.p = frozen(t), frozen(x), frozen(y), frozen(p)
@@ -464,12 +466,12 @@ def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...
 
 
 def _where_any(repaired: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-    """Return the mask, or None where it marks nothing, so that equal events have equal columns."""
+    """Return the mask, or None if it marks no event, so that equal events have equal columns."""
     return repaired if repaired.any() else None
 
 
 def repaired_of(tables: Sequence[Events]) -> NDArray[np.bool_] | None:
-    """Return which events of tables one after the other are repaired; None where none is."""
+    """Return the mask of repaired events of concatenated tables; None if no event is repaired."""
     if all(table.repaired is None for table in tables):
         return None
     none = (np.zeros(len(table), np.bool_) for table in tables)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Frames"]
 
-#: Of pictures made from events: 4 GiB.
+#: The largest size of pictures made from events: 4 GiB.
 MOST_VALUES = 2**30
 
 
@@ -35,9 +35,9 @@ class Frames(Columns):
     t : int64, shape (n,), us
         Ascending.
     unit : str
-        Of the values: "ticks", "N", "kPa", "counts" ...
+        Unit of the values: "ticks", "N", "kPa", "counts" ...
     array : Array, optional
-        The sensor; made from the shape where it is left out.
+        The sensor; default: made from the shape.
 
     Raises
     ------
@@ -45,7 +45,7 @@ class Frames(Columns):
 
     Notes
     -----
-    `values` and `t` are read-only: arrays of the caller's are copied once, unless they are read-only themselves.
+    `values` and `t` are read-only: a caller's arrays are copied once, unless they are read-only themselves.
 
     Examples
     --------
@@ -82,9 +82,10 @@ class Frames(Columns):
         *,
         held: ArrayLike | None = None,
     ) -> Frames:
-        """Return the held intensities as pictures, every `period_us`.
+        """Return the held intensities as pictures, one every `period_us`.
 
-        A picture at time t holds what came up to and at t. A taxel reads 0, or what it held, until its first event.
+        A picture at time t includes all events up to and at t. A taxel reads its value of `held`, or 0, until its first
+        event.
 
         Parameters
         ----------
@@ -92,9 +93,9 @@ class Frames(Columns):
             With intensities.
         period_us : int, us, 1 or more
         start, stop : int, us, optional
-            First picture, and the end (exclusive) of the pictures; the events' own time where they are left out.
+            Time of the first picture, and the end (exclusive) of the pictures; default: the time of the events.
         held : shape (rows, columns), ticks, optional
-            What the taxels hold before the first event, where it is known.
+            The values of the taxels before the first event, if known.
 
         Raises
         ------
@@ -134,7 +135,7 @@ class Frames(Columns):
         return len(self.t)
 
     def __getitem__(self, chosen: slice) -> Frames:
-        """Return a run of pictures."""
+        """Return consecutive pictures."""
         if not isinstance(chosen, slice):
             raise ProblemError(f"frames[{shown(chosen)}]: choose pictures by a slice")
         return Frames(self.values[chosen], self.t[chosen], unit=self.unit, array=self.array)
@@ -189,8 +190,8 @@ class Frames(Columns):
         Parameters
         ----------
         above : float, in the pictures' unit
-            What a loaded taxel reads more than. Where taxels at rest do not read 0, take their rest off first:
-            `Tare.off`.
+            A taxel counts as loaded if its value is greater. If taxels at rest do not read 0, subtract their rest first
+            (`Tare.off`).
 
         Returns
         -------
@@ -222,12 +223,12 @@ class Frames(Columns):
         Parameters
         ----------
         above : float, in the pictures' unit, 0 or more
-            Only taxels that read more count, each with what it reads.
+            Only taxels with a greater value count, each weighted by its value.
 
         Returns
         -------
         float64, shape (n, 2), mm
-            x to the right and y downwards from the middle of the taxel in the first column and row; NaN where no taxel
+            x to the right and y downwards from the middle of the taxel in the first column and row; NaN if no taxel
             counts.
 
         Raises
@@ -245,7 +246,7 @@ class Frames(Columns):
         return centre
 
     def _above(self, rest: NDArray[np.float64]) -> Frames:
-        """Return what the pictures read above the rest of each taxel, which is infinite where it is not known."""
+        """Return the pictures above the rest of each taxel; an unknown rest is infinite."""
         above = _core.above_rest(np.ascontiguousarray(self.values).reshape(-1), np.ascontiguousarray(rest).reshape(-1))
         return Frames(above.reshape(self.values.shape), self.t, unit=self.unit, array=self.array)
 
@@ -256,7 +257,7 @@ class Frames(Columns):
         return np.asarray(self.values > np.float64(threshold))
 
     def to_pandas(self) -> Any:
-        """Return a table with a row a picture: its time ``t_us`` as the index, and a column a taxel, ``(row, column)``.
+        """Return a table of one row a picture, indexed by its time ``t_us``, and one column a taxel, ``(row, column)``.
 
         Raises
         ------
@@ -280,7 +281,7 @@ class Frames(Columns):
         return draw("html", self)  # type: ignore[no-any-return]
 
     def _parts(self) -> _core._Frames:
-        """Return what the compiled part reads in place."""
+        """Return the columns, which the compiled part reads in place."""
         return self.array._parts(), self.t, self.values.reshape(-1)
 
     def __eq__(self, other: object) -> bool:

@@ -1,4 +1,4 @@
-"""Notes and labels: what happened when, as people wrote it down, and tables of such reference events."""
+"""Notes and labels: reference events that people wrote down with their times, and tables of them."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from taxel.recorded import Recorded
 
 __all__ = ["TURN_US", "Labels", "Note", "ahead_us", "beside", "write_labels"]
 
-#: A whole turn of the board's 16-bit clock of 100 us, us.
+#: The period after which the board's 16-bit clock of 100 us wraps, us.
 TURN_US = 6_553_600
 
-#: Columns of a table; those in brackets may be absent.
+#: The columns of a table, as an error lists them; those in brackets are optional.
 _WANTED, _OTHERS = ("label", "t_us"), ("recording", "host_ns")
 
 
 @dataclass(frozen=True)
 class Note:
-    """Hold what happened when: a person's note in a recording, or the label of an event in a table.
+    """Hold an event that a person noted: a note in a recording, or a label in a table.
 
     Parameters
     ----------
     text : str
         The note, or the label.
     t : int, us, optional
-        By the board's clock, where that is known.
+        Time by the board's clock, if known.
     at_ns : int, ns since 1970
-        By the host's clock; 0 where that is not known.
+        Time by the host's clock; 0 if unknown.
     recording : str
         In a table of several recordings (`Labels`) the path, name or stem of the file; else "".
 
@@ -58,14 +58,14 @@ class Note:
     recording: str = ""
 
     def __getattr__(self, name: str) -> Any:
-        """Return a field by the name that it had in `taxel.Label`, for one version."""
+        """Return a field by its old name in `taxel.Label`; this is removed in the next version."""
         if name not in _OF_LABEL:
             raise AttributeError(f"a Note has no {name!r}")
         _warn(f"Label.{name} is Note.{_OF_LABEL[name]} now")
         return getattr(self, _OF_LABEL[name])
 
 
-#: Fields of `Note` by the names that they had in `taxel.Label`.
+#: Fields of `Note` by their old names in `taxel.Label`.
 _OF_LABEL = {"label": "text", "t_us": "t", "host_ns": "at_ns"}
 
 
@@ -74,7 +74,7 @@ def _warn(text: str) -> None:
 
 
 def _label(recording: str, label: str, t_us: int, host_ns: int | None = None) -> Note:
-    """Return what was a `taxel.Label`, for one version."""
+    """Return the note that replaces a `taxel.Label`; this is removed in the next version."""
     _warn("taxel.Label is taxel.Note now, whose fields are text, t, at_ns, recording")
     return Note(label, t_us, host_ns or 0, recording)
 
@@ -94,7 +94,7 @@ class Labels:
 
     Raises
     ------
-    FormatError : another header, or a value that makes no sense (names the line)
+    FormatError : another header, or an invalid value (names the line)
     FileNotFoundError : no such file
 
     Examples
@@ -116,11 +116,11 @@ class Labels:
 
     @property
     def recordings(self) -> tuple[str, ...]:
-        """The names of the recordings, in order; none where it is about one."""
+        """The names of the recordings, in order; empty if the table is of one recording."""
         return tuple(sorted({row.recording for row in self.rows} - {""}))
 
     def named(self, recording: str | os.PathLike[str]) -> str | None:
-        """Return as what the table names a recording: by its path, its name or its stem; None where it does not.
+        """Return the table's name of a recording: its path, file name or stem; None if the table does not name it.
 
         Parameters
         ----------
@@ -128,17 +128,17 @@ class Labels:
 
         Raises
         ------
-        ProblemError : no path
+        ProblemError : `recording` is not a path
         """
         place = Path(checked_path("recording", recording))
         names = {row.recording for row in self.rows}
         return next((name for name in ("", str(recording), place.name, place.stem) if name in names), None)
 
     def of(self, recording: Recorded) -> dict[str, NDArray[np.int64]]:
-        """Return the events of a `taxel.Recording` by label, us on its own clock; none where it is not named.
+        """Return the events of a `taxel.Recording` by label, us on its own clock; empty if the table does not name it.
 
-        A recording that began in mid-stream counts from its first stamp, which is whole turns of the board's clock
-        (6.5536 s) behind the board. Where both know the host's time, that settles how many.
+        A recording that began in mid-stream counts from its first stamp, which lies a whole number of wraps of the
+        board's clock (6.5536 s each) behind the board's time. The number follows from the host's time if both have it.
 
         Parameters
         ----------
@@ -150,15 +150,15 @@ class Labels:
 
         Raises
         ------
-        ProblemError : events whose host's time and board's time do not fit this recording
+        ProblemError : an event whose times by host and board contradict this recording
         """
-        # Asked of the class, as the clock itself may take long to read.
+        # The class is checked, not the attribute: reading the clock may take long.
         if isinstance(recording, type) or not (hasattr(recording, "path") and hasattr(type(recording), "clock")):
             raise ProblemError(f"recording is {shown(recording)}: must be a taxel.Recording")
         return self._of(recording.path, lambda: recording.clock)
 
     def _of(self, path: Path, clock_of: Callable[[], Clock | None]) -> dict[str, NDArray[np.int64]]:
-        """Return the events of a recording of this path, whose clock is asked for where it matters."""
+        """Return the events of the recording at this path; its clock is read only if it is needed."""
         name = self.named(path)
         rows = [row for row in self.rows if row.recording == name]
         clock = clock_of() if any(row.at_ns for row in rows) else None
@@ -174,11 +174,11 @@ class Labels:
 
 
 def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> int:
-    """Return by how many us (whole turns of its clock) a board is ahead of a recording's time; 0 where none can tell.
+    """Return how far a board is ahead of a recording's time, us, in whole wraps of its clock; 0 if unknown.
 
     Raises
     ------
-    ProblemError : the host's time and the board's do not fit this recording
+    ProblemError : the times by host and board contradict this recording
     """
     if not row.at_ns or row.t is None or clock is None or not len(clock.board_us):
         return 0
@@ -192,7 +192,7 @@ def ahead_us(row: Note, recording: Path, clock: Clock | None, table: Path) -> in
 
 
 def beside(recording: str | os.PathLike[str]) -> Path:
-    """Return where the labels lie that people set on one recording: `walk.notes.csv` of `walk.mcap`.
+    """Return the path of the labels that people set on a recording: `walk.notes.csv` for `walk.mcap`.
 
     Examples
     --------
@@ -204,7 +204,7 @@ def beside(recording: str | os.PathLike[str]) -> Path:
 
 
 def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int]]) -> None:
-    r"""Write a table `label,t_us`, in the order of time; one that is there is replaced, as a whole or not at all.
+    r"""Write a table `label,t_us` in the order of time; an existing one is replaced atomically.
 
     Raises
     ------

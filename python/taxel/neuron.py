@@ -1,4 +1,4 @@
-"""The SRM0 neuron: spikes to spikes."""
+"""The SRM0 neuron: from input spikes to output spikes."""
 
 from __future__ import annotations
 
@@ -33,37 +33,38 @@ class Neuron(Value):
     theta_0 : float, mV, above 0
         Baseline threshold.
     theta_plus : float, mV, 0 or more
-        Rise of the threshold by a spike.
+        Increase of the threshold at a spike.
     tau_rec : float, ms, above 0, optional
-        Time constant by which that rise decays; ``2 * tau`` where left out, as in Tables 6.1 and 6.2.
+        Time constant with which that increase decays; default: ``2 * tau``, as in Tables 6.1 and 6.2.
     refractory : float, ms, 0 or more
-        Absolute refractory time: 0 potential, no spike. 0 with `after_spike` "reset" alone.
+        Absolute refractory time: the potential is 0 and no spike occurs. May be 0 only if `after_spike` is "reset".
     after_spike : {"keep", "ignore", "reset"}
-        What remains of the inputs after a spike. "keep": all (6.7 as printed). "ignore": those of the refractory time
-        are lost. "reset": all up to the end of the refractory time are lost.
+        Effect of a spike on the inputs. "keep": all remain (6.7 as printed). "ignore": those of the refractory time
+        are dropped. "reset": all up to the end of the refractory time are dropped.
     first_threshold : {"theta_0", "printed"}
-        The threshold before the first spike: `theta_0`, or raised from the start as 6.9 prints it.
+        The threshold before the first spike: `theta_0`, or raised from the start as equation 6.9 is printed.
     time : {"continuous", "grid"}
-        Crossings are found exactly, or sought at the points ``start + k * step_ms``.
+        Crossings are computed exactly, or tested only at the times ``start + k * step_ms``.
     step_ms : float, ms, above 0
         Step of the grid.
     kernel : {"alpha", "double_exponential", "exponential"}
         The effect of an input on the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))``,
-        its largest value 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential only jumps, at inputs.
+        with a maximum of 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential rises in jumps.
     tau_s : float, ms, above 0 and below `tau`, optional
-        Synaptic time constant of the double exponential; ``tau / 4`` where left out.
+        Synaptic time constant of the double exponential; default: ``tau / 4``.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    Thesis 6.3.1, equations 6.4 to 6.8. The choices that it leaves open stand on the page *Readings*.
+    Thesis 6.3.1, equations 6.4 to 6.8. The page *Readings* lists the choices that the thesis leaves open.
 
-    Times are in double precision: at 2**33 ms (100 days) neighbouring ones are 1.9e-6 ms apart. On a grid a potential
-    counts as reaching the threshold within its slope times four such distances, so that far from 0 a neuron may fire at
-    a point that is up to that long before its crossing. Times that count from the start of a recording avoid both.
+    Times are in double precision: at 2**33 ms (100 days) neighbouring numbers are 1.9e-6 ms apart. On a grid a
+    potential counts as reaching the threshold within a tolerance of its slope times four such distances, so that far
+    from 0 a neuron may fire at a grid point up to four distances before the crossing. Times that count from the start
+    of a recording avoid both.
 
     Examples
     --------
@@ -90,7 +91,7 @@ class Neuron(Value):
     _kind = "neuron"
 
     def run(self, weights: ArrayLike, trains: SpikeTrains, *, threshold: float = 1.0) -> NDArray[np.float64]:
-        """Return when the neuron fires.
+        """Return the neuron's spike times.
 
         Parameters
         ----------
@@ -106,11 +107,12 @@ class Neuron(Value):
 
         Raises
         ------
-        ProblemError : not one weight a train, or nothing finite
+        ProblemError : not one weight a train, or a value that is not finite
 
         Notes
         -----
-        In continuous time each crossing is the root of the potential less threshold, to rounding. Cost: O(1) a spike.
+        In continuous time each crossing is the root of the potential less the threshold, to rounding. Cost: O(1) a
+        spike.
 
         Examples
         --------
@@ -121,12 +123,12 @@ class Neuron(Value):
         return self._run(weights, trains, threshold)[0]
 
     def run_many(self, weights: ArrayLike, trains: SpikeTrains, *, threshold: float = 1.0) -> SpikeTrains:
-        """Return when many neurons of this kind fire, all on the same inputs.
+        """Return the spike times of many neurons with these parameters, all on the same inputs.
 
         Parameters
         ----------
         weights : float64 or float32, shape (neurons, trains), mV
-            Single precision is read as it stands, which saves memory; the reckoning is in double.
+            Single precision is read without a copy, which saves memory; the computation is in double precision.
         trains : SpikeTrains
             As in `run`.
         threshold : float, above 0
@@ -135,15 +137,15 @@ class Neuron(Value):
         Returns
         -------
         SpikeTrains
-            One train a neuron, with the window of `trains`: the spikes that `run` gives with that row of weights.
+            One train a neuron, with the window of `trains`: the spikes that `run` returns for that row of weights.
 
         Raises
         ------
-        ProblemError : not one weight a neuron and train, or nothing finite (names neuron and train)
+        ProblemError : not one weight a neuron and train, or a value that is not finite (names neuron and train)
 
         Notes
         -----
-        Cost: a few operations an input spike and neuron, exact in continuous time too.
+        Cost: a few operations an input spike and neuron. Crossings are exact in continuous time too.
 
         Examples
         --------
@@ -180,8 +182,9 @@ class Neuron(Value):
         trains : SpikeTrains
         times : float64, shape (n,), ms, ascending
         spikes : float64, shape (m,), ms, ascending
-            When the neuron fired; without any, the linear sum 6.4. With them 6.7: 0 in the refractory time, then what
-            `after_spike` leaves; at a spike itself, what the potential came up to.
+            The neuron's spikes. Without any the result is the linear sum 6.4. With spikes it is 6.7: 0 in the
+            refractory time, then the effect of the inputs that `after_spike` leaves; at a spike itself, the potential
+            that it reached.
 
         Returns
         -------

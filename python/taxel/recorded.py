@@ -1,4 +1,4 @@
-"""What a recording is to those below it: something that holds events or pictures."""
+"""The interface of a recording for the modules that `taxel.recording` imports: it holds events or pictures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Recorded(Protocol):
 
     @property
     def clock(self) -> Clock | None:
-        """Arrival times against the board's time; None where there are none."""
+        """Arrival times against the board's time; None without arrival times."""
         ...
 
     @property
@@ -43,7 +43,7 @@ class Recorded(Protocol):
 
     @property
     def held(self) -> NDArray[np.float32] | None:
-        """What the taxels held when it began, ticks, NaN of one without an event so far; None where it is not known."""
+        """The values of the taxels at its beginning, ticks, NaN for one without an event so far; None if unknown."""
         ...
 
     def frames(self) -> Frames:
@@ -52,7 +52,7 @@ class Recorded(Protocol):
 
 
 def recorded(x: Events | Frames | Recorded | T) -> Events | Frames | T:
-    """Return what a recording holds, begun with what its taxels held then; anything else as it is."""
+    """Return a recording's events, preceded by the values held at its beginning, or its pictures; else `x` itself."""
     if isinstance(x, type) or not all(hasattr(x, name) for name in ("has_events", "frames")):
         return x  # type: ignore[return-value]
     if not x.has_events:  # type: ignore[union-attr]
@@ -61,7 +61,7 @@ def recorded(x: Events | Frames | Recorded | T) -> Events | Frames | T:
 
 
 def _begun(events: Events, held: NDArray[np.float32] | None) -> Events:
-    """Return events that begin with what the taxels held then: values told again, which are no changes."""
+    """Return events preceded by the held values of the taxels, as repaired events, which are not changes."""
     if held is None or events.intensity is None or events.present is None or not len(events):
         return events
     ticks = np.where(np.isnan(held), _core.UNKNOWN, held).astype(np.uint16).reshape(-1)

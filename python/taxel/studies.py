@@ -1,4 +1,4 @@
-"""`taxel.studies` is a distribution of its own, `taxel_studies`; this name goes with the next version."""
+"""The old name of the distribution `taxel_studies`; it is removed in the next version."""
 
 import sys
 import warnings

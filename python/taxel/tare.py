@@ -1,4 +1,4 @@
-"""What taxels read at rest: of one board, on one day."""
+"""The readings of unloaded taxels, of one board on one day."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ __all__ = ["Tare"]
 
 
 class Tare:
-    """Hold the rest of each taxel: the mean by time of its held values over a stretch at rest.
+    """Hold the rest of each taxel: the time-weighted mean of its held values over an unloaded interval.
 
-    Made by `Tare.take`, `Tare.load` or `Tare.from_json`. Take it with the board's noise floor at 0, else a rest is
-    known no better than the floor.
+    Made by `Tare.take`, `Tare.load` or `Tare.from_json`. Measure it with the board's noise floor at 0; otherwise a rest
+    is no more precise than the noise floor.
 
     Attributes
     ----------
@@ -36,9 +36,9 @@ class Tare:
     rest : float64, shape (rows, columns), in the sensor's unit
         NaN for a taxel without any event.
     start_us, stop_us : int, us
-        The stretch.
+        The interval.
     note : str
-        Which board, which day.
+        Board and day of the measurement.
 
     Examples
     --------
@@ -64,21 +64,21 @@ class Tare:
     def take(
         cls, x: Events | Frames | Recorded, *, start_us: int | None = None, stop_us: int | None = None, note: str = ""
     ) -> Tare:
-        """Take the mean by time of each taxel's held values.
+        """Return the time-weighted mean of each taxel's held values.
 
         Parameters
         ----------
         x : Events, Frames or Recording
             Events need their intensities.
         start_us, stop_us : int, us, optional
-            The stretch at rest, its end exclusive; from the first stamp to the last where left out. What came before
-            it still holds at its start.
+            The unloaded interval, its end exclusive; default: from the first stamp to the last. Values of events
+            before the interval are held at its start.
         note : str
-            Which board, which day.
+            Board and day of the measurement.
 
         Raises
         ------
-        ProblemError : events without intensities, or a stretch without an event
+        ProblemError : events without intensities, or an interval without an event
         """
         note = checked_text("note", note)
         window = (
@@ -93,7 +93,7 @@ class Tare:
         raise ProblemError(f"{type(x).__name__}: a tare is measured from taxel.Events or taxel.Frames")
 
     def off(self, frames: Frames) -> Frames:
-        """Return pictures with each taxel's rest subtracted: 0 where it reads less, or where its rest is not known.
+        """Return pictures with each taxel's rest subtracted: 0 if it reads less, or if its rest is unknown.
 
         Parameters
         ----------
@@ -119,8 +119,8 @@ class Tare:
 
         Raises
         ------
-        FormatError : no tare
-        ProblemError : a tare whose parts do not fit
+        FormatError : the text is not a tare
+        ProblemError : a tare whose parts contradict each other
         """
         if not isinstance(text, str):
             raise ProblemError(f"tare is {shown(text)}: must be JSON text")
@@ -138,7 +138,7 @@ class Tare:
         return self._text
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the tare to a JSON file, whole or not at all.
+        """Write the tare to a JSON file, atomically.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class Tare:
 
         Raises
         ------
-        FormatError : no tare (names the file)
+        FormatError : the file is not a tare (names it)
 
         Examples
         --------

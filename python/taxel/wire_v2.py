@@ -1,4 +1,4 @@
-"""Version 2 of the wire by its old names, which go with the next version: everything is in `taxel.wire`."""
+"""The old names of wire version 2, which are removed in the next version; use `taxel.wire`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from taxel.wire.buffer import buffer_bytes
 
 @dataclass(frozen=True, eq=False)
 class _Heard:
-    """Hold what one datagram held, and what it was (now the events that `push` returns, and `Decoder.last`)."""
+    """Hold the events and the status of one datagram (now the result of `push`, and `Decoder.last`)."""
 
     events: Events
     until: int | None
@@ -44,7 +44,7 @@ def _decode(
     return (room._owning if own else room._first)(sensor, *filled), wire.Counts(**json.loads(counts)), skipped
 
 
-#: By old name: what it was, and what to use.
+#: By old name: the object, and the name that replaces it.
 _MOVED: dict[str, tuple[Any, str]] = {
     "Counts": (wire.Counts, "Counts"),
     "Decoder": (_Decoder, "Decoder(version=2), whose push gives Events and whose last gives what Heard gave"),
@@ -56,7 +56,7 @@ _MOVED: dict[str, tuple[Any, str]] = {
 
 
 def __getattr__(name: str) -> Any:
-    """Return what an old name stands for, with a warning that names the new place."""
+    """Return the object of an old name, with a warning that names the new one."""
     if name not in _MOVED:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     old, new = _MOVED[name]

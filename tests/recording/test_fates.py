@@ -272,7 +272,8 @@ def sliced(m: Model, a: float, b: float) -> Model:
 
 
 def untimed(m: Model) -> set[str]:
-    return {f"{count} notes without a time"} if (count := sum(t is None for _, t in m.notes)) else set()
+    count = sum(t is None for _, t in m.notes)
+    return {f"{count} note{'s' * (count > 1)} without a time"} if count else set()
 
 
 def cut_to(m: Model, x0: int, x1: int, y0: int, y1: int) -> Model:
@@ -312,8 +313,8 @@ def through(m: Model, kind: str, made: bool) -> tuple[Model, set[str]]:
         return replace(m, datagrams=True, counts=True, source=True, lost=m.lost | said), said
     words = {
         "sensor": True, "held at the beginning": bool(m.held), "registers": m.registers is not None,
-        "settings of the registers": bool(m.changes), "changes of the board": bool(m.board), "notes": bool(m.notes),
-        "detections": bool(m.found), "zeroed taxels": bool(m.zeroed), "arrival times": m.clock, "received": m.counts,
+        "of the registers": bool(m.changes), "of the board": bool(m.board), "note": bool(m.notes),
+        "detection": bool(m.found), "zeroed taxel": bool(m.zeroed), "arrival times": m.clock, "received": m.counts,
         "where it came from": m.source,
     }  # fmt: skip
     said = {word for word, there in words.items() if there}

@@ -21,22 +21,22 @@
 /** @type {readonly Field[]} */
 export const FIELDS = [
   { name: "random_lines", manual: "use_rand_row", register: 0, low: 0, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "Lines are driven in random order." },
-  { name: "mechanoreceptor", manual: "comparator_mode", register: 0, low: 1, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "Each taxel is an FA-1 afferent (5.4.2): an event is its spike, the intensity word its integral; else a change." },
+  { name: "mechanoreceptor", manual: "comparator_mode", register: 0, low: 1, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "Each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral; else changes." },
   { name: "invert_comparator", manual: "invert_comparator", register: 0, low: 2, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "A falling edge ends a sample." },
   { name: "frame_sync", manual: "use_frame_sync", register: 0, low: 3, bits: 1, offset: 0, unit: "flag", default: true, least: 0, greatest: 1, text: "All events of a frame carry the time of its start." },
-  { name: "wire_version", manual: "wire_version", register: 0, low: 4, bits: 2, offset: 1, unit: "version", default: 1, least: 1, greatest: 2, text: "Which version of the wire the board speaks (read: the manual has one)." },
-  { name: "threshold_jump", manual: "threshold_jump", register: 0, low: 16, bits: 16, offset: 0, unit: "1/256 theta_0", default: 0, least: 0, greatest: 65535, text: "FA-1: by how much a spike raises the threshold, T A of Table 5.3." },
+  { name: "wire_version", manual: "wire_version", register: 0, low: 4, bits: 2, offset: 1, unit: "version", default: 1, least: 1, greatest: 2, text: "Version of the wire protocol that the board uses (read: the manual has only one)." },
+  { name: "threshold_jump", manual: "threshold_jump", register: 0, low: 16, bits: 16, offset: 0, unit: "1/256 theta_0", default: 0, least: 0, greatest: 65535, text: "FA-1: increase of the threshold by a spike, T A of Table 5.3." },
   { name: "line_period", manual: "row_change_period", register: 1, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Time from one driven line to the next." },
-  { name: "line_read", manual: "row_read_duration", register: 2, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Part of it in which the line is read." },
+  { name: "line_read", manual: "row_read_duration", register: 2, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Part of line_period in which the line is read." },
   { name: "step_period", manual: "col_change_period", register: 3, low: 0, bits: 16, offset: 0, unit: "10 ns", default: 75, least: 1, greatest: 65535, text: "Time from one multiplexer step to the next." },
-  { name: "step_read", manual: "col_read_duration", register: 3, low: 16, bits: 16, offset: 0, unit: "10 ns", default: 55, least: 1, greatest: 65535, text: "Part of it in which the channels are read." },
-  { name: "ramp", manual: "ramp_time", register: 4, low: 0, bits: 16, offset: 0, unit: "ticks", default: 150, least: 1, greatest: 65535, text: "How long the ramp rises." },
+  { name: "step_read", manual: "col_read_duration", register: 3, low: 16, bits: 16, offset: 0, unit: "10 ns", default: 55, least: 1, greatest: 65535, text: "Part of step_period in which the channels are read." },
+  { name: "ramp", manual: "ramp_time", register: 4, low: 0, bits: 16, offset: 0, unit: "ticks", default: 150, least: 1, greatest: 65535, text: "Duration of the ramp." },
   { name: "threshold_rest", manual: "threshold_rest", register: 4, low: 16, bits: 16, offset: 0, unit: "1/1024", default: 0, least: 0, greatest: 65535, text: "FA-1: theta_0, in ticks after the power law." },
-  { name: "threshold_decay", manual: "threshold_decay", register: 5, low: 0, bits: 8, offset: 0, unit: "1/1024 theta_0", default: 0, least: 0, greatest: 255, text: "FA-1: by how much a quiet frame lowers the threshold, B of Table 5.3." },
-  { name: "noise_floor", manual: "noise_floor", register: 5, low: 8, bits: 8, offset: 0, unit: "ticks", default: 3, least: 0, greatest: 255, text: "Largest difference that makes no event." },
-  { name: "lines", manual: "nrows", register: 5, low: 16, bits: 8, offset: 1, unit: "lines", default: 64, least: 1, greatest: 256, text: "Driven lines (the register holds one less; the manual's field has 6 bits, read: 8)." },
-  { name: "record", manual: "record", register: 7, low: 16, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "A recording runs: setting and clearing it sends a marker and moves the sync line." },
-  { name: "channels", manual: "channels", bits: 8, offset: 0, unit: "channels", default: 16, least: 0, greatest: 255, text: "Channels of the converter, 16 or 64: the board's build, not a register." },
+  { name: "threshold_decay", manual: "threshold_decay", register: 5, low: 0, bits: 8, offset: 0, unit: "1/1024 theta_0", default: 0, least: 0, greatest: 255, text: "FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3." },
+  { name: "noise_floor", manual: "noise_floor", register: 5, low: 8, bits: 8, offset: 0, unit: "ticks", default: 3, least: 0, greatest: 255, text: "Largest difference that does not cause an event." },
+  { name: "lines", manual: "nrows", register: 5, low: 16, bits: 8, offset: 1, unit: "lines", default: 64, least: 1, greatest: 256, text: "Number of driven lines (the register holds one less; the manual's field has 6 bits, read: 8)." },
+  { name: "record", manual: "record", register: 7, low: 16, bits: 1, offset: 0, unit: "flag", default: false, least: 0, greatest: 1, text: "Recording: setting and clearing it sends a marker and switches the sync line." },
+  { name: "channels", manual: "channels", bits: 8, offset: 0, unit: "channels", default: 16, least: 0, greatest: 255, text: "Channels of the converter, 16 or 64: a property of the board, not a register." },
 ];
 
 /** @type {readonly { name: string, sense_lines: number, values: Record<string, number> }[]} */

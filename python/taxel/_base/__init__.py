@@ -1,1 +1,1 @@
-"""What every room needs and no user imports: checks of arguments, parameters, columns, files, limits."""
+"""Private base of all subpackages: checks of arguments, parameters, columns, files, limits."""

@@ -1,4 +1,4 @@
-"""Arrays of a .npz, which may be damaged or made to harm: the stated size is checked before anything is unpacked."""
+"""Reads arrays of a .npz, which may be damaged or malicious: sizes are checked before anything is unpacked."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["read_arrays", "stored_names"]
 
 
 def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
-    """Return the names of the arrays of a .npz; none where the file is no archive or cannot be read.
+    """Return the names of the arrays of a .npz; empty if the file is not an archive or cannot be read.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
     try:
         with zipfile.ZipFile(path) as archive:
             return tuple(name.removesuffix(".npy") for name in archive.namelist())
-    # What zipfile raises on damage is no closed list; reading the arrays says what is wrong.
+    # The errors that zipfile raises on damage are not documented; reading the arrays reports what is wrong.
     except Exception:
         return ()
 
@@ -41,12 +41,12 @@ def stored_names(path: str | os.PathLike[str]) -> tuple[str, ...]:
 def read_arrays(
     path: str | os.PathLike[str], names: Iterable[str], *, texts: Iterable[str] = ()
 ) -> dict[str, NDArray[Any]]:
-    """Read arrays of a .npz by name, those of the wanted ones that it has.
+    """Read those of the wanted arrays that a .npz has.
 
     Parameters
     ----------
     path : path
-    wanted : names of arrays; others are not looked at
+    wanted : names of arrays; others are ignored
     texts : names of those that hold one text: at most 64 Mi characters each
 
     Returns
@@ -73,13 +73,13 @@ def read_arrays(
         except (FormatError, MemoryError):
             raise
         # NumPy and zipfile raise many kinds of errors on damage: zlib.error, NotImplementedError, TokenError,
-        # struct.error, OSError where an archive says that it goes on before its beginning ...
+        # struct.error, OSError for an archive with a negative offset ...
         except Exception as error:
             raise FormatError(f"{path}: a .npz that cannot be unpacked ({first_line(error)}); write it again") from None
 
 
 def _arrays(path: Path, file: IO[bytes], names: tuple[str, ...], texts: frozenset[str]) -> dict[str, NDArray[Any]]:
-    """Read the arrays once all have said how large they are."""
+    """Read the arrays after the sizes of all of them have been checked."""
     columns = {}
     with zipfile.ZipFile(file) as archive:
         members = {name.removesuffix(".npy"): name for name in archive.namelist()}
@@ -94,7 +94,7 @@ def _arrays(path: Path, file: IO[bytes], names: tuple[str, ...], texts: frozense
                 raise FormatError(f"{place}: holds Python objects; must be numbers or text")
             size = math.prod(shape) * dtype.itemsize
             total += size
-            # Python keeps a character in 4 bytes.
+            # Python stores a character in up to 4 bytes.
             unpacked(place, size, 4 * DESCRIPTION if name in texts else UNPACKED)
             unpacked(place, total)
             stored = archive.getinfo(members[name]).file_size - begin
@@ -107,7 +107,7 @@ def _arrays(path: Path, file: IO[bytes], names: tuple[str, ...], texts: frozense
 
 
 def _described(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Read the shape and the kind that an array says it has."""
+    """Read the shape and the dtype from the header of an array."""
     read = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}
     version = np.lib.format.read_magic(file)
     if version[0] not in read:

@@ -1,4 +1,4 @@
-"""A caller's arguments, checked once by name, on their way to the nouns and to the compiled part."""
+"""Checks of a caller's arguments; each error names the argument."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ __all__ = [
 T = TypeVar("T")
 
 
-#: Characters of a value in an error.
+#: The most characters of a value that an error shows.
 _SHOWN = 60
 #: The most values that a parameter may hold.
 _MOST = 10_000_000
-#: The most entries of an iterator, which may have no end.
+#: The most entries that are read of an iterator, which may be infinite.
 _MOST_ENTRIES = 1_000_000
 #: The most values to which an array that NumPy repeats (`np.broadcast_to`) is copied.
 _MOST_REPEATED = 100_000_000
@@ -55,14 +55,14 @@ def shown(value: object) -> str:
     """Return the representation of a value for an error: one line, at most 60 characters."""
     try:
         words = " ".join(repr(_beginning(value)).split())
-    except Exception:  # a class of the caller's may fail in any way
+    except Exception:  # a caller's class may raise any error
         return f"a {type(value).__name__} that cannot be shown"
     words = words.encode("ascii", "backslashreplace").decode() if _lone_surrogate(words) else words
     return words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."
 
 
 def _beginning(value: object, depth: int = 3) -> object:
-    """Return as much of a long value as an error shows: each entry takes at least one character."""
+    """Return the part of a long value that an error can show: each entry needs at least one character."""
     if type(value) in (str, bytes):
         return value[: _SHOWN + 1]  # type: ignore[index]
     if type(value) is list and depth:
@@ -82,14 +82,14 @@ def _lone_surrogate(value: str) -> bool:
 
 
 def instance(name: str, value: object, kind: type[T]) -> T:
-    """Return a value of a class of taxel's; refuse any other, by name."""
+    """Return a value of the given class; refuse any other."""
     if not isinstance(value, kind):
         raise ProblemError(f"{name} is {shown(value)}: must be a taxel.{kind.__name__}")
     return value
 
 
 def several(name: str, values: object) -> list[Any]:
-    """Return a list of what an iterable gives; refuse what is none, by name."""
+    """Return the entries of an iterable as a list; refuse any other value."""
     _refuse_repeated(name, values)
     try:
         sized = hasattr(values, "__len__")
@@ -102,22 +102,22 @@ def several(name: str, values: object) -> list[Any]:
 
 
 def callback(name: str, value: T) -> T:
-    """Return a function to be called; refuse what is none, by name."""
+    """Return a callable; refuse any other value."""
     if not callable(value):
         raise ProblemError(f"{name} is {shown(value)}: must be a function")
     return value
 
 
 def mapping(name: str, value: object) -> dict[str, Any]:
-    """Return values by name; refuse what is no mapping."""
+    """Return a mapping as a dict; refuse any other value."""
     if not isinstance(value, Mapping):
         raise ProblemError(f"{name} is {shown(value)}: must be values by name")
     return {text(f"a name in {name}", key): entry for key, entry in value.items()}
 
 
-#: So deep lists may lie in lists: more than NumPy's dimensions.
+#: The greatest depth of nested lists, above NumPy's limit of dimensions.
 DEPTH = 65
-#: Classes that most arguments are of, which have no unit and hold nothing else: to ask them would take longest of all.
+#: The most frequent classes of arguments, which have no unit and no entries; they skip the slow inspection.
 _PLAIN: frozenset[type[Any]] = frozenset(
     {bool, int, float, str, type(None), np.float64, np.float32, np.int64, np.bool_}
 )
@@ -126,7 +126,7 @@ _PLAIN: frozenset[type[Any]] = frozenset(
 def bare(name: str, values: Any, unit: str | None = None) -> Any:
     """Return plain numbers: quantities (of neo, quantities, pint, astropy ...) are converted to `unit` or refused.
 
-    Without a `unit`, one that has no dimension passes. What holds no quantity comes back as it is.
+    Without a `unit`, a dimensionless quantity passes. A value without quantities is returned unchanged.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
             _refuse_masked(name, level)
         if any(map(_has_unit, kinds)):
             return _converted(name, values, unit)
-        # A list that holds itself twice would double at each level: each list is entered once a level.
+        # A list that contains itself twice would double the work at each level, so each list is visited once a level.
         nested = {id(value): value for value in level if _is_nested(value)} if any(map(_may_nest, kinds)) else {}
         for value in nested.values():
             _refuse_repeated(name, value)
@@ -153,14 +153,14 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
 
 
 def _refuse_masked(name: str, values: list[Any]) -> None:
-    """Refuse masked entries, behind which NumPy would give whatever value lies there."""
+    """Refuse masked entries, for which NumPy would return the arbitrary value below the mask."""
     for value in values:
         if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
             raise ProblemError(f"{name} is {shown(value)}: must have no masked entry")
 
 
 def _has_unit(kind: type[Any]) -> bool:
-    """Return whether values of a class have a unit; `dimensions` is Brian's word."""
+    """Return whether values of a class have a unit; Brian's attribute for it is `dimensions`."""
     return kind not in _PLAIN and any(hasattr(kind, word) for word in ("units", "unit", "dimensions"))
 
 
@@ -186,7 +186,8 @@ def _converted(name: str, values: Any, unit: str | None) -> Any:
         convert = values.rescale if hasattr(values, "rescale") else values.to
         in_unit = convert(unit or "dimensionless")
         plain = np.asarray(in_unit.magnitude if hasattr(in_unit, "magnitude") else in_unit.value, np.float64)
-        # 7 ms in s and back is 7.000000000000001 ms; whole numbers stay whole, so that stamps stay stamps.
+        # 7 ms in s and back is 7.000000000000001 ms; such values are rounded to whole numbers, so that stamps are
+        # restored.
         rounded = np.rint(plain)
         return np.where(np.abs(plain - rounded) <= 1e-15 * np.abs(plain), rounded, plain)
     except Exception:  # each library has errors of its own for units that do not fit
@@ -195,12 +196,12 @@ def _converted(name: str, values: Any, unit: str | None) -> Any:
 
 
 def _one(values: NDArray[np.float64]) -> object:
-    """Return the number that an array without dimensions holds; another stays what it is."""
+    """Return the number in a 0-dimensional array; return any other array unchanged."""
     return values.item() if values.ndim == 0 else values
 
 
 def number(name: str, value: object, unit: str | None = None) -> float:
-    """Return a float, of a quantity the one in `unit`; refuse what is none, by name."""
+    """Return a float, for a quantity its value in `unit`; refuse any other value."""
     if _has_unit(type(value)):
         value = _one(bare(name, value, unit))
     if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | float | np.integer | np.floating):
@@ -214,7 +215,7 @@ def number(name: str, value: object, unit: str | None = None) -> float:
 def finite(
     name: str, value: object, unit: str | None = None, *, least: float = -math.inf, most: float = math.inf
 ) -> float:
-    """Return a finite float from `least` to `most`; refuse any other, by name."""
+    """Return a finite float from `least` to `most`; refuse any other value."""
     real = number(name, value, unit)
     if not (math.isfinite(real) and least <= real <= most):
         low, high = math.isfinite(least), math.isfinite(most)
@@ -224,7 +225,7 @@ def finite(
 
 
 def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1, unit: str | None = None) -> int:
-    """Return a whole number within limits, of a quantity the one in `unit`; a float without a fraction will do."""
+    """Return a whole number within limits, for a quantity its value in `unit`; a float with an integer value passes."""
     if _has_unit(type(value)):
         value = _one(bare(name, value, unit))
     real = isinstance(value, float | np.floating) and float(value).is_integer()
@@ -236,14 +237,14 @@ def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1
 
 
 def flag(name: str, value: object) -> bool:
-    """Return a boolean; refuse what is none, by name."""
+    """Return a boolean; refuse any other value."""
     if not isinstance(value, bool | np.bool_):
         raise ProblemError(f"{name} is {shown(value)}: must be True or False")
     return bool(value)
 
 
 def text(name: str, value: object, among: Collection[str] = ()) -> str:
-    """Return a text, one of a closed list where there is one."""
+    """Return a text; if `among` is given, one of its entries."""
     if not isinstance(value, str) or (among and value not in among):
         expected = f"one of {', '.join(map(repr, among))}" if among else "a text"
         raise ProblemError(f"{name} is {shown(value)}: must be {expected}")
@@ -253,11 +254,11 @@ def text(name: str, value: object, among: Collection[str] = ()) -> str:
 
 
 def path(name: str, value: object) -> str:
-    """Return a file's name; refuse what cannot be one (a number would be an open file to Python)."""
+    """Return a path; refuse any other value (Python would read a number as the descriptor of an open file)."""
     plain = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     try:
         encoded = os.fsencode(plain) if isinstance(plain, str) else b""
-    except UnicodeEncodeError:  # half of a surrogate pair, which no file's name holds
+    except UnicodeEncodeError:  # half of a surrogate pair, which no file name can contain
         encoded = b""
     if not isinstance(plain, str) or not encoded or b"\0" in encoded:
         raise ProblemError(f"{name} is {shown(value)}: must be a path")
@@ -265,7 +266,7 @@ def path(name: str, value: object) -> str:
 
 
 def window(unit: str, start: object, stop: object) -> tuple[float, float]:
-    """Return a stretch of time whose start does not lie after its stop; either may be infinite."""
+    """Return an interval of time whose start is not after its stop; either may be infinite."""
     first, last = number("start", start, unit), number("stop", stop, unit)
     if not first <= last:
         raise ProblemError(f"window {first} to {last} {unit}: start must not lie after stop")
@@ -273,7 +274,7 @@ def window(unit: str, start: object, stop: object) -> tuple[float, float]:
 
 
 def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
-    """Return a contiguous array of any shape; refuse what is no number, or would change its value on the way.
+    """Return a contiguous array of any shape; refuse values that are not numbers, or that the conversion would change.
 
     Quantities are converted to `unit` (`bare`).
     """
@@ -286,13 +287,13 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
         if received.dtype.kind not in "biufO":
             raise ProblemError(f"{name}: holds {received.dtype}, must hold numbers")
         with np.errstate(invalid="ignore", over="ignore"):
-            # A field of records may be contiguous (of one record) and still not aligned.
+            # A field of a single record is contiguous but may not be aligned.
             array = np.require(received, dtype, ["C", "A"]).reshape(received.shape)
     except (TypeError, ValueError, OverflowError) as error:
         raise ProblemError(f"{name}: {error}") from None
     if received.dtype != array.dtype:
         if array.dtype.kind == "f":
-            # A float may lose digits (float32) but not its value.
+            # A float may be rounded (to float32) but must not become infinite.
             changed = np.isinf(array) & ~np.isinf(received.astype(np.float64))
         else:
             changed = np.asarray(received != array)
@@ -309,13 +310,13 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
 
 
 def _refuse_repeated(name: str, values: object) -> None:
-    """Refuse an array that NumPy repeats so often that its copy would take all memory."""
+    """Refuse a broadcast array whose copy would exceed the memory limit."""
     if isinstance(values, np.ndarray) and values.size > _MOST_REPEATED and 0 in values.strides:
         raise ProblemError(f"{name} holds {values.size} values, repeated: must be at most {_MOST_REPEATED}")
 
 
 def column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
-    """Return a contiguous array of one dimension; refuse what would change its value on the way."""
+    """Return a contiguous array of one dimension; refuse values that the conversion would change."""
     array = numbers(name, values, dtype, unit)
     if array.ndim != 1:
         raise ProblemError(f"{name} has {array.ndim} dimensions: must have one")
@@ -323,12 +324,12 @@ def column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = No
 
 
 def floats(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.float64]:
-    """Return a contiguous float64 array of one dimension; refuse what is none, by name."""
+    """Return a contiguous float64 array of one dimension; refuse any other value."""
     return column(name, values, np.float64, unit)
 
 
 def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
-    """Return a mask over all rows, or numbers of rows, as an index; refuse what is neither, by name."""
+    """Return a mask over all rows, or row numbers, as an index; refuse any other value."""
     try:
         index = np.asarray(bare(name, chosen))
     except ValueError:
@@ -345,11 +346,11 @@ def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
 
 
 def nth(what: str, chosen: SupportsIndex, length: int) -> int:
-    """Return the place that a number chooses, counted from the end where it is below 0.
+    """Return the index for a number, which counts from the end if it is negative.
 
     Raises
     ------
-    IndexError : there is no such place
+    IndexError : the number is out of range
     """
     n = operator.index(chosen)
     if not -length <= n < length:
@@ -358,7 +359,7 @@ def nth(what: str, chosen: SupportsIndex, length: int) -> int:
 
 
 def fields(records: object, required: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of a record array's fields; refuse one that lacks a field."""
+    """Return the names of a record array's fields; refuse an array without a required field."""
     names = getattr(getattr(records, "dtype", None), "names", None) or ()
     missing = [name for name in required if name not in names]
     if missing:
@@ -367,7 +368,7 @@ def fields(records: object, required: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def parameters(values: Mapping[str, object]) -> str:
-    """Return parameters as JSON for the compiled part, which checks them; JSON has no NaN, so those end here."""
+    """Return parameters as JSON for the compiled part, which checks them; NaN is refused here, as JSON has none."""
     left = _MOST
 
     def plain(name: str, value: object, depth: int) -> object:

@@ -1,4 +1,4 @@
-"""A noun's columns: read-only arrays, which need not be copied to be read."""
+"""Columns of the data classes: read-only arrays, which can be shared without a copy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Columns", "frozen", "own", "own_column", "own_numbers"]
 
 
 class Columns:
-    """Keep arrays read-only where they are copied or come out of a pickle, which NumPy does not."""
+    """Keep arrays read-only after a copy or unpickling, which make NumPy's arrays writable."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for value in state.values():
@@ -23,23 +23,23 @@ class Columns:
 
 
 def frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """Return an array of our own, read-only from now on."""
+    """Make one of our own arrays read-only and return it."""
     array.setflags(write=False)
     return array
 
 
 def own_column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
-    """Return a noun's column (see `column`): read-only, and copied once where it lies in memory of the caller's."""
+    """Return a read-only column (see `column`), copied if it shares memory with a caller's writable array."""
     return own(column(name, values, dtype, unit), values)
 
 
 def own_numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
-    """As `own_column`, of any shape (see `numbers`)."""
+    """Return a read-only array of any shape (see `numbers`), copied as by `own_column`."""
     return own(numbers(name, values, dtype, unit), values)
 
 
 def own(array: NDArray[Any], source: ArrayLike) -> NDArray[Any]:
-    """Return an array made from `source`, read-only: a copy where it shares memory that the caller can still change."""
+    """Return an array made from `source`, read-only; copy it if it shares memory that the caller can change."""
     if isinstance(source, np.ndarray):
         shared = array is source or np.may_share_memory(array, source)
     else:
@@ -48,7 +48,7 @@ def own(array: NDArray[Any], source: ArrayLike) -> NDArray[Any]:
 
 
 def _unchangeable(array: object) -> bool:
-    """Tell whether all that an array is a view of is read-only: of NumPy's own memory, or of the compiled part's."""
+    """Return whether every array below a view is read-only, down to memory of NumPy or of the compiled part."""
     while isinstance(array, np.ndarray):
         if array.flags.writeable:
             return False

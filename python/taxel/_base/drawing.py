@@ -1,4 +1,4 @@
-"""The one way from a noun to its plot: a hook, so that nothing below the plots imports them."""
+"""The hook by which a data class calls its plot, so that only `taxel` itself imports `taxel.plot`."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _load: Callable[[], ModuleType] | None = None
 
 
 def draw_by(load: Callable[[], ModuleType]) -> None:
-    """Set the function that gives the module of plots; it is called with the first plot, as matplotlib loads slowly."""
-    global _load  # noqa: PLW0603  the hook, which `taxel` itself fills once
+    """Set the function that imports the module of plots; it is called at the first plot, as matplotlib loads slowly."""
+    global _load  # noqa: PLW0603  the hook, which `taxel` itself sets once
     _load = load
 
 
 def draw(name: str, *arguments: Any) -> Any:
-    """Return what a function of the module of plots draws.
+    """Call a function of the module of plots and return its result.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Files are written whole or not at all, and never over another unasked."""
+"""Writes files atomically, and overwrites existing files only on request."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["try_whole", "whole_file", "write_whole"]
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object], *, overwrite: bool = False) -> Path:
-    """Write a file beside its place, then move it there.
+    """Write a temporary file in the same folder, then move it to `path`.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
-    """Give a place beside the file to write to; move what is there to `path` when the block ends without an error.
+    """Yield a temporary path in the same folder; move the file to `path` if the block ends without an error.
 
     Raises
     ------
@@ -56,7 +56,8 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     overwrite = flag("overwrite", overwrite)
     if not overwrite and os.path.lexists(place):
         raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
-    # Moving another file there asks the folder alone; what somebody protected stays, from the superuser too.
+    # A rename checks the permissions of the folder only; a write-protected file is refused here, also for the
+    # superuser.
     if place.exists() and not (place.stat().st_mode & 0o222 and os.access(place, os.W_OK)):
         raise PermissionError(errno.EACCES, "is write-protected", str(place))
     if not place.parent.is_dir():
@@ -73,7 +74,7 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
         if overwrite:
             os.replace(name, place)
         else:
-            # A link, unlike a rename, fails where somebody made the file meanwhile.
+            # A link, unlike a rename, fails if another process has created the file meanwhile.
             os.link(name, place)
             os.unlink(name)
     except BaseException as error:
@@ -84,11 +85,11 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
 
 
 class _Enough(Exception):  # noqa: N818  no error
-    """What a try ends with."""
+    """Ends a test of whether a file can be written."""
 
 
 def try_whole(path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-    """Try whether a file could be written, before the work whose result it is to hold; leave nothing behind.
+    """Check that a file can be written, before the work whose result it will hold; leave no file behind.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Reads a .h5 in a process of its own, run by its path (`taxel._base.h5_file`): it knows nothing of taxel.
+"""Reads a .h5 in a child process, which is run by the path of this file (`taxel._base.h5_file`) without taxel.
 
-It answers in lines of JSON on its standard output: first that it runs, then what the file holds; then, for each order
-on its standard input, a line for each piece that it has read into the shared memory, and one when it is done.
+It writes lines of JSON to its standard output: first that it runs, then the contents of the file; then, for each
+request on its standard input, a line for each piece that it has read into the shared memory, and one at the end.
 """
 
 import json
@@ -9,15 +9,15 @@ import mmap
 import sys
 from typing import Any
 
-#: What is read at once, bytes: a line is said after each.
+#: Bytes that are read at once; a line is written after each such piece.
 PIECE = 4 << 20
 
 
 def main() -> None:
-    """Answer orders until there are no more."""
+    """Answer requests until there are no more."""
     path, memory = sys.argv[1], int(sys.argv[2])
     sys.path[:] = json.loads(sys.stdin.readline())
-    import h5py  # noqa: PLC0415  where it lies was read just now
+    import h5py  # noqa: PLC0415  its path was read just now
 
     send(running=True)
     try:
@@ -29,7 +29,7 @@ def main() -> None:
                     send(done=str(h5[order["name"]].asstr()[()]))
                 else:
                     read(h5[order["name"]], memory, order["at"], order["size"])
-    # What h5py raises on damage is no closed list.
+    # The errors that h5py raises on damage are not documented.
     except BaseException as error:
         send(error=(str(error).splitlines() or [""])[0][:200], kind=type(error).__name__)
 
@@ -40,7 +40,7 @@ def send(**message: Any) -> None:
 
 
 def whole(value: Any) -> int | None:
-    """Return a whole number; None of anything else."""
+    """Return a whole number; None for any other value."""
     try:
         return int(value)
     except (TypeError, ValueError):
@@ -48,7 +48,7 @@ def whole(value: Any) -> int | None:
 
 
 def entries(h5: Any, h5py: Any) -> dict[str, Any]:
-    """Return what each entry of the root is: its kind of numbers ("text", "" of a group) and its shape."""
+    """Return the dtype ("text", or "" for a group) and the shape of each entry of the root."""
     described = {}
     for name in h5:
         data = h5[name]
@@ -62,7 +62,7 @@ def entries(h5: Any, h5py: Any) -> dict[str, Any]:
 
 
 def read(data: Any, memory: int, at: int, size: int) -> None:
-    """Read a data set into the shared memory, from a byte on."""
+    """Read a data set into the shared memory, beginning at a byte offset."""
     import numpy as np  # noqa: PLC0415  h5py has loaded it
 
     if size:
@@ -71,7 +71,7 @@ def read(data: Any, memory: int, at: int, size: int) -> None:
             if data.ndim == 0:
                 array[()] = data[()]
             else:
-                # A piece is never less than the file's own, which is unpacked whole.
+                # A piece is at least one chunk of the file, as chunks are unpacked whole.
                 rows = max(1, PIECE // max(1, size // len(data)), (data.chunks or (1,))[0])
                 for k in range(0, len(data), rows):
                     part = np.s_[k : k + rows]

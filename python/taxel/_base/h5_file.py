@@ -1,4 +1,4 @@
-"""A .h5, read by a child process: a damaged one can keep the HDF5 library where no signal reaches it."""
+"""Reads a .h5 by a child process: with a damaged file the HDF5 library can hang and ignore signals."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from taxel._core import FormatError
 __all__ = ["Entry", "H5File"]
 
 _CHILD = Path(__file__).with_name("h5_child.py")
-#: How long the child may be silent, s; and how long it may take to begin, which loads libraries.
+#: The longest time between two lines of the child, s; and the longest time for its start, which loads libraries.
 PATIENCE_S, BEGIN_S = 10.0, 120.0
 
 
@@ -35,7 +35,7 @@ class Entry:
     Parameters
     ----------
     dtype : str
-        Its numbers, as NumPy writes them; "text", or "" of a group.
+        NumPy's name of the dtype; "text", or "" for a group.
     shape : tuple of int
     """
 
@@ -49,7 +49,7 @@ class Entry:
 
 
 class H5File:
-    """Open a .h5, as a context; a child process reads it and is ended with it.
+    """Open a .h5 as a context manager; a child process reads it and ends with the context.
 
     Parameters
     ----------
@@ -58,19 +58,19 @@ class H5File:
     Attributes
     ----------
     attributes : dict from str to int or None
-        Those of the root; None of one that is no whole number.
+        Attributes of the root; None for one that is not a whole number.
     entries : dict from str to Entry
-        Those of the root.
+        Entries of the root.
 
     Raises
     ------
-    FormatError : no whole HDF5 file, or one at which the library hangs or ends
+    FormatError : not a whole HDF5 file, or one at which the library hangs or crashes
     OSError : the file is not there, or cannot be read
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
-        # Python's own errors for what cannot be opened.
+        # Opening the file here raises Python's own errors.
         with self.path.open("rb"):
             pass
         self._memory = os.memfd_create("h5") if hasattr(os, "memfd_create") else _unnamed()
@@ -81,7 +81,7 @@ class H5File:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
                 pass_fds=[self._memory],
-                # Ctrl-C is for this process, which ends the child.
+                # Ctrl-C reaches this process only, which then ends the child.
                 start_new_session=True,
             )
         except BaseException:
@@ -105,7 +105,7 @@ class H5File:
 
         Raises
         ------
-        FormatError : another one, or damage
+        FormatError : the data set is not a text, or is damaged
         """
         if self.entries[name] != Entry("text", ()):
             raise FormatError(f"{self._place(name)}: must be a text")
@@ -136,7 +136,7 @@ class H5File:
             raise MemoryError(str(error)) from None
         self._order({"name": name, "text": False, "at": 0, "size": size})
         self._done()
-        # The memory is used again for the next data set.
+        # The memory is reused for the next data set.
         return np.frombuffer(shared, dtype, math.prod(entry.shape)).reshape(entry.shape).copy()
 
     def _place(self, name: str) -> str:
@@ -148,17 +148,17 @@ class H5File:
             self._child.stdin.write(json.dumps(what).encode() + b"\n")
             self._child.stdin.flush()
         except BrokenPipeError:
-            # Its last answer says why.
+            # The last answer of the child has the reason.
             return
 
     def _done(self) -> Any:
-        """Return the answer to an order, once it is done."""
+        """Wait for the end of a request and return its answer."""
         while "done" not in (answer := self._answer(PATIENCE_S)):
             pass
         return answer["done"]
 
     def _answer(self, patience_s: float) -> dict[str, Any]:
-        """Return the next line that the child says."""
+        """Return the next line that the child writes."""
         assert self._child.stdout is not None  # a pipe
         while b"\n" not in self._rest:
             if not self._answers.select(patience_s):
@@ -202,6 +202,6 @@ class H5File:
 
 
 def _unnamed() -> int:
-    """Return a file without a name, where the system has no memory that is one."""
+    """Return the descriptor of an unnamed temporary file, for systems without anonymous memory files."""
     with tempfile.TemporaryFile() as file:
         return os.dup(file.fileno())

@@ -1,4 +1,4 @@
-"""Tables of text: comma-separated cells below a line of column names, with the place of whatever is wrong."""
+"""Tables of text: comma-separated cells below a line of column names; errors name file and line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from taxel._core import FormatError
 
 __all__ = ["HeaderTable", "text_of"]
 
-#: What parts cells where it is not the comma, in words.
+#: The names of other separators than the comma, for errors.
 _PARTED = {";": "semicolons", "\t": "tabs"}
 
 
@@ -23,11 +23,11 @@ class HeaderTable:
     Parameters
     ----------
     place : str
-        What errors call the file.
+        The name of the file in errors.
     header : tuple of str
-        The names of its columns, without space around them; () of a table without a line.
+        The names of its columns, stripped; () for a table without lines.
     lines : tuple of (int, tuple of str)
-        The line of each row, counted from 1, and its cells as they stand there; empty lines are no rows.
+        The line number of each row, counted from 1, and its unchanged cells; empty lines are not rows.
     """
 
     place: str
@@ -41,12 +41,12 @@ class HeaderTable:
         Parameters
         ----------
         place : str or Path
-            What errors call the file.
+            The name of the file in errors.
         lines : iterable of str
 
         Raises
         ------
-        FormatError : a column that stands there twice, a quote that does not close (names the line)
+        FormatError : a duplicate column, an unclosed quote (names the line)
 
         Examples
         --------
@@ -75,7 +75,7 @@ class HeaderTable:
     def rows(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
         """The line of each row and its cells, as many as there are columns.
 
-        Read after the header was checked: a file of another kind is named by its first line.
+        Check the header first (`has`), so that a file of another kind is reported by its first line.
 
         Raises
         ------
@@ -94,11 +94,11 @@ class HeaderTable:
         Parameters
         ----------
         wanted : names that must be there
-        others : names that may be there; any other one where it is left out
+        others : names of optional columns; default: any
 
         Raises
         ------
-        FormatError : one is missing, or stands there that may not (names it)
+        FormatError : a column is missing or not allowed (names it)
         """
         missing = [name for name in required if name not in self.header]
         if missing:
@@ -116,13 +116,13 @@ class HeaderTable:
             raise FormatError(f"{self.place}, line 1: column {shown(strange[0])}; must be {known} or some of them")
 
     def __iter__(self) -> Iterator[tuple[int, dict[str, str]]]:
-        """Give the line of each row, and its cells by the names of their columns."""
+        """Yield the line number of each row, and its cells by the names of their columns."""
         for line, cells in self.lines:
             yield line, dict(zip(self.header, self._row(line, cells), strict=True))
 
 
 def text_of(path: Path) -> list[str]:
-    """Read the lines of a text in UTF-8, with or without its mark, each with its end: a quoted cell may contain one.
+    """Read the lines of a UTF-8 text, with or without BOM, including line ends, as a quoted cell may contain one.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""What a file may hold at most: checked before memory is allocated, named in the error, listed in docs/files.md.
+"""Limits of the size of files, checked before memory is allocated; errors name them, docs/files.md lists them.
 
-Files may be damaged, or made to harm: a few bytes can claim 10^12 values. The limits lie well above what
-sensors of today record. Those of .mcap stand beside its reader (crates/taxel-live/src/recording/limits.rs).
+Files may be damaged or malicious: a few bytes can claim 10^12 values. The limits lie well above what current
+sensors record. Those of .mcap are in its reader (crates/taxel-live/src/recording/limits.rs).
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ __all__ = ["COLUMNS", "DESCRIPTION", "TAXELS", "TEXT", "TIME_US", "UNPACKED", "V
 TAXELS = 1 << 22
 #: Columns of a table of text: a time, and 256 x 256 taxels.
 COLUMNS = (1 << 16) + 1
-#: What the arrays of a file may hold, unpacked: 4 GiB.
+#: Bytes of the arrays of a file, unpacked: 4 GiB.
 UNPACKED = 1 << 32
-#: Of a text, unpacked: 1 GiB.
+#: Bytes of a text, unpacked: 1 GiB.
 TEXT = 1 << 30
-#: Of a description in JSON: 64 MiB.
+#: Bytes of a description in JSON: 64 MiB.
 DESCRIPTION = 1 << 26
-#: Of a value of a picture, which has 32 bits.
+#: The largest value of a picture, which has 32 bits.
 VALUE = float(np.finfo(np.float32).max)
-#: Of times, us, on both sides of 0: 142 years, so that ns in 64 bits hold them too.
+#: The largest absolute time, us: 142 years, so that it also fits in 64 bits as ns.
 TIME_US = 1 << 52
 
 
 def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
-    """Refuse what would unpack to more than a file may hold.
+    """Refuse data that would unpack to more than `most` bytes.
 
     Raises
     ------

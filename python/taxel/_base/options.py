@@ -17,18 +17,18 @@ _Result = TypeVar("_Result")
 
 
 def option(default: Any, about: str, *, least: float | None = None, most: float | None = None) -> Any:
-    """Return a field with its default, its text, and the range of its values."""
+    """Return a field with its default, its description, and the range of its values."""
     return field(default=default, metadata={"help": about, "min": least, "max": most})
 
 
 def about(options: Any, name: str) -> dict[str, Any]:
-    """Return the text and the range of an option, for the command line: help, min, max."""
+    """Return the description and the range of an option, for the command line: help, min, max."""
     metadata = {one.name: one.metadata for one in fields(options)}[name]
     return {key: value for key, value in metadata.items() if value is not None}
 
 
 def with_options(options: Callable[_P, _Options]) -> Callable[[Callable[[_Options], _Result]], Callable[_P, _Result]]:
-    """Let a function that is written for a dataclass of options take the fields of that dataclass."""
+    """Make a function of a dataclass of options accept the fields of that dataclass as arguments."""
 
     def decorate(work: Callable[[_Options], _Result]) -> Callable[_P, _Result]:
         def call(*arguments: _P.args, **keywords: _P.kwargs) -> _Result:
@@ -46,7 +46,7 @@ def with_options(options: Callable[_P, _Options]) -> Callable[[Callable[[_Option
 def with_fields_of(
     options: Callable[_P, _Options],
 ) -> Callable[[Callable[[_Self, _Options], None]], Callable[Concatenate[_Self, _P], None]]:
-    """Let a constructor that is written for a dataclass of options take the fields of that dataclass."""
+    """Make a constructor with a dataclass of options accept the fields of that dataclass as arguments."""
 
     def decorate(begin: Callable[[_Self, _Options], None]) -> Callable[Concatenate[_Self, _P], None]:
         def init(self: _Self, /, *arguments: _P.args, **keywords: _P.kwargs) -> None:

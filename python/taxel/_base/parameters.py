@@ -1,4 +1,4 @@
-"""What all classes with parameters share: defaults and ranges from the compiled part, JSON on the way there."""
+"""Base of all classes with parameters: defaults and ranges from the compiled part, and the JSON that it reads."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ __all__ = ["Parameters", "Value", "defaults", "described", "ranges"]
 
 @cache
 def described(kind: str) -> dict[str, Any]:
-    """Return the compiled part's description of a noun's parameters.
+    """Return the compiled part's description of the parameters of a class.
 
     ``defaults`` by name, the names that are ``required``, and the ``ranges`` of numbers by name, with their ``unit``
-    and the words of an error, ``must_be``.
+    and the text of an error, ``must_be``.
     """
     return dict(json.loads(_core.parameters(kind)))
 
 
 def defaults(kind: str) -> Any:
-    """Return a noun's defaults as attributes, for its signature; None stands for a group of parameters."""
+    """Return the defaults of a class as attributes, for its signature; None stands for a group of parameters."""
 
     def plain(value: object) -> object:
         return tuple(value) if isinstance(value, list) else None if isinstance(value, dict) else value
@@ -38,7 +38,7 @@ def defaults(kind: str) -> Any:
 
 
 def ranges(kind: str) -> dict[str, Any]:
-    """Return the ranges of a noun's parameters by name; none where it is not known."""
+    """Return the ranges of the parameters of a class by name; empty for an unknown class."""
     try:
         return dict(described(kind)["ranges"])
     except ProblemError:
@@ -46,12 +46,12 @@ def ranges(kind: str) -> dict[str, Any]:
 
 
 class Parameters:
-    """Hold the parameters of the constructor under their own names, just as they were given.
+    """Hold the parameters of the constructor, unchanged, as attributes of the same names.
 
-    A subclass has the name under which the compiled part knows it (`_kind`), and names the parameters that hold
-    parameters themselves (`_nested`). It is checked when it is made and when parameters are set.
+    A subclass defines its name in the compiled part (`_kind`), and which of its parameters are groups of parameters
+    themselves (`_nested`). Parameters are checked in the constructor and in `set_params`.
 
-    The manners are scikit-learn's, which is never imported: `get_params`, `set_params`, nested names (``neuron__tau``),
+    The interface is scikit-learn's, which is not imported: `get_params`, `set_params`, nested names (``neuron__tau``),
     tags.
     """
 
@@ -69,13 +69,13 @@ class Parameters:
 
     @classmethod
     def _stands_for(cls, name: str) -> Parameters | None:
-        """Return what None stands for in a parameter: a group with its defaults, or nothing."""
+        """Return the group of defaults that None stands for in a parameter; None if the parameter is not a group."""
         kind = cls._nested.get(name)
         return kind() if kind is not None and isinstance(described(cls._kind)["defaults"].get(name), dict) else None
 
     @classmethod
     def _from_values(cls, values: Mapping[str, Any]) -> Self:
-        """Build from plain values, as JSON holds them."""
+        """Build an instance from JSON values."""
         read = {
             name: cls._nested[name]._from_values(value) if name in cls._nested and value is not None else value
             for name, value in values.items()
@@ -83,11 +83,11 @@ class Parameters:
         return cls(**read)
 
     def _values(self) -> dict[str, Any]:
-        """Return the parameters by name, just as they are held."""
+        """Return the parameters by name, unchanged."""
         return {name: getattr(self, name) for name in self._names()}
 
     def _plain(self) -> dict[str, Any]:
-        """Return the parameters as the compiled part reads them; a group that is left out has its defaults there."""
+        """Return the parameters as the compiled part reads them, which fills in the defaults of an omitted group."""
         plain: dict[str, Any] = {}
         units = ranges(self._kind)
         for name, value in self._values().items():
@@ -107,13 +107,13 @@ class Parameters:
         _core.check_parameters(self._kind, self._json())
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return all parameters by name, just as they are held.
+        """Return all parameters by name, unchanged.
 
         Parameters
         ----------
         deep : bool
-            With those of a parameter that has parameters itself, as ``neuron__tau``; also where it is None and stands
-            for the defaults.
+            Whether to include the parameters of a group, as ``neuron__tau``; those of a group that is None are its
+            defaults.
         """
         values = self._values()
         if flag("deep", deep):
@@ -124,13 +124,13 @@ class Parameters:
         return values
 
     def set_params(self, **parameters: Any) -> Self:
-        """Set parameters by name; what is learnt already stays.
+        """Set parameters by name; results of a fit stay.
 
         Parameters
         ----------
         **parameters
-            As `get_params` lists them. A nested one (``neuron__tau``) puts a changed copy in the place of the old
-            group, so that another holder of that group keeps it as it was.
+            As `get_params` lists them. A nested one (``neuron__tau``) replaces the group by a changed copy, so that
+            another object with the same group is not affected.
 
         Returns
         -------
@@ -139,7 +139,7 @@ class Parameters:
 
         Raises
         ------
-        ProblemError : a name that is not known, or a value that makes no sense; all parameters are then as before
+        ProblemError : a name that is not known, or an invalid value; all parameters are then as before
         """
         names = self._names()
         changes: dict[str, Any] = {}
@@ -170,7 +170,7 @@ class Parameters:
         return self
 
     def __sklearn_tags__(self) -> Any:
-        # Only scikit-learn asks, so it is there already.
+        # Only scikit-learn calls this, so it is installed.
         tags = sys.modules["sklearn.utils"]
         return tags.Tags(estimator_type=None, target_tags=tags.TargetTags(required=False), input_tags=tags.InputTags())
 
@@ -181,7 +181,7 @@ class Parameters:
 
 
 class Value(Parameters):
-    """Be a value: two of a class are equal where their parameters are."""
+    """Base of classes whose instances are equal if their parameters are."""
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -192,7 +192,7 @@ class Value(Parameters):
 
 
 def _same(value: object, default: object) -> bool:
-    """Whether a parameter has its default; a list or an array may stand for the tuple."""
+    """Return whether a parameter has its default; a list or an array equals a tuple of the same values."""
     if value is default:
         return True
     if isinstance(default, tuple):

@@ -1,10 +1,10 @@
-"""What a result is computed from: the digest of every source that a module's imports lead to.
+"""The code that a result depends on: a digest of every source that a module imports, directly or not.
 
-A result still counts as long as these are the same. Followed are the modules that define what is imported, to the end;
-of each counts the syntax tree without docstrings, so comments and formatting do not. The package's private base
-(argument checks, files, limits) is left out. A module that finds files beside itself brings those along, and one that
-imports by a name that it computes brings its whole package along. Of the compiled part each name that is used counts
-with the digest of the Rust room that binds it and the rooms below.
+A result is current as long as these digests are the same. Imports are followed recursively to the modules that define
+the imported names. The digest of a module is that of its syntax tree without docstrings, so comments and formatting do
+not change it. The package's private base (argument checks, files, limits) is excluded. For a module that reads files
+in its own folder, those files are included; for one that imports by a computed name, its whole package. For each name
+of the compiled part that is used, the digest is that of the Rust module that binds it and of the modules below.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from taxel import _core
 __all__ = ["Sources", "installed_sources"]
 
 _CORE = "taxel._core"
-#: What every room needs: a change there moves no result.
+#: The private base: a change there does not change a result.
 _BASE = "taxel._base"
-#: Files beside a module that are no data of it.
+#: Files in the folder of a module that are not its data.
 _CODE = {".py", ".pyi", ".pyc", ".so", ".typed"}
 
 
@@ -33,7 +33,7 @@ class Sources:
     Parameters
     ----------
     roots : mapping of str to Path
-        By name, each package's folder, or the file of a module that stands alone.
+        By name, each package's folder, or the file of a single module.
     compiled : mapping of str to str
         The digest of each name of the compiled part.
 
@@ -49,7 +49,7 @@ class Sources:
         self._modules: dict[str, _Module | None] = {}
 
     def parts(self, *modules: str) -> dict[str, str]:
-        """Return the digest of every part that some modules' results hang on.
+        """Return the digest of every part that the results of some modules depend on.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Sources:
             done.add(name)
             if name.startswith(f"{_CORE}."):
                 compiled = self._compiled.get(name.removeprefix(f"{_CORE}."))
-                digests |= {} if compiled is None else {name: compiled}  # what is only there for types has none
+                digests |= {} if compiled is None else {name: compiled}  # names used only as types have none
             elif (module := self._module(name)) is not None:
                 digests[name] = module.digest
                 data = module.data if self._roots[name.split(".")[0]].is_dir() else []
@@ -107,7 +107,7 @@ class Sources:
     def _used(self, module: _Module) -> Iterator[str]:
         for source, name in module.imported:
             if name is None or self._is_module(f"{source}.{name}"):
-                continue  # a module: what is taken from it counts
+                continue  # a module: the names used from it are followed
             yield from self._home(source, name)
         for alias, chain in module.chains:
             source, name = module.bound[alias]
@@ -121,7 +121,7 @@ class Sources:
         return name == _CORE or self._path(name) is not None
 
     def _reached(self, module: str, chain: tuple[str, ...]) -> Iterator[str]:
-        """Find what ``module.a.b`` leads to; all of the module where it is handed on whole."""
+        """Find what ``module.a.b`` refers to; the whole module if it is used as a value itself."""
         for name in chain:
             if module != _CORE and self._is_module(f"{module}.{name}"):
                 module = f"{module}.{name}"
@@ -131,7 +131,7 @@ class Sources:
         yield from (f"{_CORE}.{name}" for name in self._compiled) if module == _CORE else (module,)
 
     def _home(self, module: str, name: str) -> Iterator[str]:
-        """Find the module that defines a name which another one gives."""
+        """Find the module that defines a name which another module re-exports."""
         if module == _CORE:
             yield f"{_CORE}.{name}"
             return
@@ -168,9 +168,9 @@ class _Module:
             ):
                 del node.body[0]
         self.digest = _digest("".join(_flat(tree)).encode())
-        #: Where each name comes from that an import binds: module, and name in it; those for types too.
+        #: The origin of each name that an import binds: module, and name in it; includes imports for types.
         self.bound: dict[str, tuple[str, str | None]] = {}
-        #: What is taken when the module runs.
+        #: The names that are imported when the module runs.
         self.imported: list[tuple[str, str | None]] = []
         for node, runs in _imports(tree):
             for alias, source, original in _names(node):
@@ -198,7 +198,7 @@ class _Module:
 
     @cached_property
     def computes_names(self) -> bool:
-        """Whether it imports by a name that it computes."""
+        """Whether it imports by a computed name."""
         calls = [node for node in ast.walk(self._tree) if isinstance(node, ast.Call)]
         called = [(getattr(call.func, "id", getattr(call.func, "attr", "")), call) for call in calls]
         return any(
@@ -208,7 +208,7 @@ class _Module:
 
     @cached_property
     def data(self) -> list[Path]:
-        """The files beside it that are no code, where it looks for files there; none below another package."""
+        """The data files in its folder, if it reads files there; none in the folders of other packages."""
         looks = any(isinstance(node, ast.Name) and node.id == "__file__" for node in ast.walk(self._tree))
         if not looks and "importlib.resources" not in {source for source, _ in self.imported}:
             return []
@@ -227,7 +227,7 @@ def _described(node: ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunc
 
 
 def _flat(value: object) -> Iterator[str]:
-    """Write a tree down, the same in every Python: what one lacks or leaves empty is left out."""
+    """Yield a syntax tree as text that is the same in every version of Python: empty fields are omitted."""
     if isinstance(value, ast.AST):
         yield f"({type(value).__name__}"
         for name, inner in ast.iter_fields(value):
@@ -243,7 +243,7 @@ def _flat(value: object) -> Iterator[str]:
 
 
 def _imports(tree: ast.Module) -> Iterator[tuple[ast.Import | ast.ImportFrom, bool]]:
-    """Find every import, and whether it happens when the module runs: else it is for types alone."""
+    """Find every import, and whether it is executed when the module runs or is for types only."""
     for_types = {
         id(inner)
         for node in ast.walk(tree)
@@ -288,12 +288,12 @@ def _digest(data: bytes) -> str:
 
 @cache
 def installed_sources(*more: str | Path) -> Sources:
-    """Return the sources of `taxel` as it is installed.
+    """Return the sources of the installed `taxel`.
 
     Parameters
     ----------
     *more : str or Path
-        Packages beside it whose imports are followed, by name; files of modules that stand alone.
+        Further packages whose imports are followed, by name; files of single modules.
     """
     files = {file.stem: file for file in more if isinstance(file, Path)}
     packages = {name: find_spec(name) for name in ("taxel", *(name for name in more if isinstance(name, str)))}

@@ -1,4 +1,4 @@
-"""Events or frames to spikes, live or whole: the same spikes either way."""
+"""Encoders: events or frames to spikes, with the same result for a stream as for a whole recording."""
 
 from taxel.encode._encoder import Encoder as Encoder
 from taxel.encode._encoder import EncoderStream as EncoderStream
@@ -15,5 +15,5 @@ from taxel.encode.skin import Afferents as Afferents
 from taxel.encode.skin import Skin as Skin
 from taxel.encode.threshold_izhikevich import ThresholdIzhikevich as ThresholdIzhikevich
 
-# The lines above are the registry: an encoder is one of them.
+# The imports above are the registry of encoders.
 __all__ = [name for name, kind in sorted(globals().items()) if isinstance(kind, type)]

@@ -1,4 +1,4 @@
-"""What all encoders have in common."""
+"""The base class of all encoders, and the encoding of a stream."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ __all__ = ["Encoder", "EncoderStream"]
 class Encoder(Value):
     """Turn events or frames into spike trains; the common part of all encoders.
 
-    An encoder holds its parameters under their own names and nothing else. Two encoders are equal where their
-    parameters are.
+    An encoder holds its parameters as attributes and has no other state. Two encoders are equal if their parameters
+    are.
 
     Examples
     --------
@@ -57,7 +57,7 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : a parameter that makes no sense
+        ProblemError : an invalid parameter
 
         Examples
         --------
@@ -69,7 +69,7 @@ class Encoder(Value):
 
     @staticmethod
     def from_json(text: str) -> Encoder:
-        """Return the encoder that the JSON names; a parameter that is left out has its default.
+        """Return the encoder that the JSON describes; an omitted parameter has its default.
 
         Parameters
         ----------
@@ -82,7 +82,7 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : no JSON, an unknown name or parameter, or a value that makes no sense
+        ProblemError : not JSON, an unknown name or parameter, or an invalid value
 
         Examples
         --------
@@ -95,7 +95,7 @@ class Encoder(Value):
         return Encoder._by_name[values.pop("name")]._from_values(values)
 
     def trains(self, array: Array) -> int:
-        """Return the number of trains that the encoder gives for an array; a signed train counts once.
+        """Return the number of trains that the encoder returns for an array; a signed train counts once.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : no array, or a parameter that makes no sense
+        ProblemError : no array, or an invalid parameter
 
         Examples
         --------
@@ -124,11 +124,11 @@ class Encoder(Value):
 
     @property
     def latency_ms(self) -> float:
-        """How much later than the touch itself a spike comes, ms: what the encoder's own rule costs."""
+        """The delay of a spike after the touch that the encoder's rule itself causes, ms."""
         return _core.encoder_about(self._json(), Array(1, 1)._parts())[2]
 
     def with_tare(self, tare: Tare) -> Self:
-        """Return the same encoder with this tare; an encoder that has no parameter `tare` stays as it is.
+        """Return the same encoder with this tare; an encoder without a parameter `tare` is returned unchanged.
 
         Parameters
         ----------
@@ -160,15 +160,15 @@ class Encoder(Value):
         Parameters
         ----------
         x : Events, Frames or Recording
-            Events need their intensities: they are read as held values. One up to 0.1 s behind another (datagrams that
-            overtook each other) counts as of that later time, as in a stream. Channels are the existing taxels, in the
-            order of their index.
+            Events need intensities, which are read as held values. An event up to 0.1 s behind an earlier one in the
+            sequence (reordered datagrams) is assigned the later time, as in a stream. Channels are the existing taxels,
+            in the order of their index.
 
         Returns
         -------
         SpikeTrains
-            The window begins with the first stamp; it ends the latency (and, of events, one period) after the last,
-            with the last values held until then.
+            The window begins at the first stamp; it ends the latency (and, for events, one period) after the last one,
+            and the last values are held until then.
 
         Raises
         ------
@@ -187,7 +187,7 @@ class Encoder(Value):
         return SpikeTrains._from_parts(_core.encode_frames(self._json(), _frames(x)._parts()))
 
     def fit(self, recordings: object = None, targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
-        """Return the encoder itself, which learns nothing; a pipeline of scikit-learn's calls `fit` of each step.
+        """Return the encoder itself, which learns nothing; a scikit-learn pipeline calls `fit` of each step.
 
         Parameters
         ----------
@@ -210,7 +210,7 @@ class Encoder(Value):
         Returns
         -------
         list of SpikeTrains
-            One a recording, in ms from where its time counts.
+            One a recording, in ms from time 0 of the recording.
 
         Raises
         ------
@@ -226,12 +226,12 @@ class Encoder(Value):
         return [trains.split_by_sign() if trains.signed else trains for trains in encoded]
 
     def stream(self, array: Array | None = None) -> EncoderStream:
-        """Begin to encode pieces: the same spikes as of the whole, wherever it is cut.
+        """Return an encoder of pieces, whose spikes equal those of the whole recording however it is cut.
 
         Parameters
         ----------
         array : Array, optional
-            The sensor; that of the first piece where it is left out.
+            The sensor; default: that of the first piece.
 
         Returns
         -------
@@ -239,7 +239,7 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : no array, or a parameter that makes no sense
+        ProblemError : no array, or an invalid parameter
 
         Examples
         --------
@@ -251,21 +251,21 @@ class Encoder(Value):
 
 
 class EncoderStream:
-    """Encode events or frames piece by piece, as `Encoder.stream` begins it.
+    """Encode events or frames piece by piece; `Encoder.stream` returns one.
 
-    Every call returns the spikes that became certain by it, with the window from where the last call ended. A stamp of
-    events is over when a later one comes, `advance` moves time on or `finish` ends it.
+    Every call returns the spikes that it made final; their window begins at the end of the window before. A stamp of
+    events is complete when a later stamp arrives, or after `advance` or `finish`.
 
     Parameters
     ----------
     encoder : Encoder
         Later changes of its parameters have no effect.
     array : Array, optional
-        The sensor; that of the first piece where it is left out.
+        The sensor; default: that of the first piece.
 
     Raises
     ------
-    ProblemError : no encoder, no array, or a parameter that makes no sense
+    ProblemError : no encoder, no array, or an invalid parameter
 
     Examples
     --------
@@ -289,13 +289,13 @@ class EncoderStream:
 
     @property
     def late(self) -> int:
-        """How many events came more than 0.1 s behind the stream's time, and count as of that time."""
+        """The number of events more than 0.1 s behind the stream's time, which are assigned the stream's time."""
         return 0 if self._core is None else self._core.late
 
     def push(self, x: Events | Frames) -> SpikeTrains:
-        """Encode the next events or frames; a stream reads either events or frames, never both.
+        """Encode the next events or frames; a stream accepts either events or frames, never both.
 
-        An event behind the stream's time counts as of that time.
+        An event behind the stream's time is assigned the stream's time.
 
         Parameters
         ----------
@@ -305,7 +305,7 @@ class EncoderStream:
         Returns
         -------
         SpikeTrains
-            The spikes that became certain, in ms from where the stream's time counts.
+            The spikes that became final, in ms from time 0 of the stream.
 
         Raises
         ------
@@ -324,7 +324,7 @@ class EncoderStream:
         return SpikeTrains._from_parts(self._begin(frames.array).push_frames(frames._parts()))
 
     def advance(self, t_us: int) -> SpikeTrains:
-        """Move the stream's time on: no event before `t_us` will be pushed any more.
+        """Advance the stream's time: no event before `t_us` will be pushed any more.
 
         Parameters
         ----------
@@ -334,7 +334,7 @@ class EncoderStream:
         Returns
         -------
         SpikeTrains
-            The spikes that became certain.
+            The spikes that became final.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What encoders that read the taxels' rest have in common."""
+"""The base class of encoders that subtract the rest of the taxels."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ __all__ = ["Tared"]
 
 
 class Tared(Encoder):
-    """Turn what stands above the taxels' rest into spikes: an encoder with the parameter `tare`.
+    """Encode the values above the rest of the taxels; the base class of encoders with the parameter `tare`.
 
-    A rest belongs to a board and a day, so a saved readout has none and is given one. A rest in seconds is measured at
-    each recording's own beginning, so that recordings of several boards can be encoded alike.
+    A rest is valid for one board on one day, so a saved readout has none and must be given one. If `tare` is a number
+    of seconds, the rest is measured at the beginning of each recording, so that recordings of several boards can be
+    encoded together.
     """
 
     tare: Tare | float | None
@@ -33,13 +34,13 @@ class Tared(Encoder):
     def _json(self) -> str:
         if not self._is_rest():
             return super()._json()
-        # The tare's JSON as text: to parse that of thousands of taxels only to write it again costs time.
+        # The tare's JSON is inserted as text, as parsing and writing that of thousands of taxels is slow.
         rest = self.tare.to_json()  # type: ignore[union-attr]
         others = {name: value for name, value in self._plain().items() if name != "tare"}
         return f'{parameters(others)[:-1]}, "tare": {rest}}}'
 
     def _is_rest(self) -> bool:
-        """Return whether `tare` is a rest; a number of seconds is checked to be one."""
+        """Return whether `tare` is a `Tare`; otherwise check that it is a valid number of seconds."""
         if self.tare is None or isinstance(self.tare, Tare):
             return self.tare is not None
         if isinstance(self.tare, bool) or not isinstance(self.tare, int | float | np.integer | np.floating):
@@ -51,7 +52,7 @@ class Tared(Encoder):
         return {name: value for name, value in super()._plain().items() if name not in rest} | rest
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
-        """Return the spikes of a whole recording, as `Encoder.encode`; a tare in seconds is that of its beginning.
+        """Return the spikes of a whole recording; a tare in seconds is measured at its beginning.
 
         Parameters
         ----------
@@ -64,7 +65,7 @@ class Tared(Encoder):
 
         Raises
         ------
-        ProblemError : as `Encoder.encode`; no tare, another array's, or one that is more than half of the recording
+        ProblemError : as `Encoder.encode`; no tare, another array's, or one longer than half of the recording
         """
         if self.tare is None or self._is_rest():
             return super().encode(x)

@@ -16,27 +16,27 @@ _DEFAULT = defaults("change_events")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ChangeEvents(Encoder):
-    """Give each change of a taxel since its last event, in units of the noise floor; +-(2^bits - 1) at most.
+    """Encode each change of a taxel since its last event, in units of the noise floor; +-(2^bits - 1) at most.
 
-    One signed train a taxel. The first sample is the first previous value and gives no spike. Reckoned in float32.
+    One signed train a taxel. The first sample is the first reference value and causes no spike. Computed in float32.
 
     Parameters
     ----------
     noise_floor : float, in the sensor's unit, above 0
-        The smallest change that counts; theta_0 of equation 5.7. 3 ticks in the board's fast presets.
+        The smallest change that causes an event; theta_0 of equation 5.7. 3 ticks in the board's fast presets.
     bits : int, from 1 to 10
-        Bits an event (figure 5.7); 1 tells rise from fall.
+        Bits an event (figure 5.7); 1 is the polarity only.
     previous : {"last_sent", "last_sample"}
-        What a sample is compared with: the value at the last event, or the last sample, as 4.3 words it.
+        The value with which a sample is compared: that of the last event, or the last sample, as in section 4.3.
     rounding : {"truncate", "floor"}
-        "truncate": towards zero, and an event only where the change is above the noise floor. "floor": 5.7 as printed,
-        by which any fall, however small, is -1.
+        "truncate": towards zero, with an event only if the change is above the noise floor. "floor": 5.7 as printed, by
+        which any fall, however small, is -1.
     period_ms : float, ms, whole us
-        How often events are sampled; the step of the wire's stamps loses nothing.
+        Sampling period of events; the step of the wire's stamps is lossless.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----

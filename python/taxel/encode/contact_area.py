@@ -1,4 +1,4 @@
-"""How many taxels are loaded."""
+"""Encoder of the contact area: the number of loaded taxels."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _DEFAULT = defaults("contact_area")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ContactArea(Tared):
-    """Give a spike where the number of loaded taxels rises through levels, and where it falls below them.
+    """Fire when the number of loaded taxels rises to a level, and when it falls below the level.
 
-    A taxel is loaded while its held value stands above its tared rest by the noise floor and half a tick; it counts if
-    one of its 8 neighbours is loaded too. A taxel without a value, in the tare or since, is unloaded. The number is
-    counted once a stamp, after the last event that carries it; spikes have the stamp's time. Spikes do not depend on
-    the place of a touch, so what is learnt at one place holds at others.
+    A taxel is loaded while its held value exceeds its rest by the noise floor and half a tick; it counts if one of its
+    8 neighbours is loaded too. A taxel without a value, in the tare or since, is unloaded. The number is computed once
+    a stamp, after the last event with it, and spikes have the time of the stamp. Spikes do not depend on the position
+    of a touch, so weights that are learnt at one position apply to others.
 
-    Trains, unsigned: rises through each level, then falls below each; ten by default.
+    Trains are unsigned: rises to each level, then falls below each; ten by default.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ class ContactArea(Tared):
     levels : sequence of int, ascending
         Numbers of taxels.
     tare : Tare, or float, s, optional
-        The taxels' rest, or how long each recording begins with it. It belongs to a board and a day, so a saved readout
-        has none; without it nothing is encoded.
+        The taxels' rest, or the duration of rest at the beginning of each recording. It is valid for one board on one
+        day, so a saved readout has none; encoding requires one.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense; encoding without a tare, or with another array's
+    ProblemError : an invalid parameter; encoding without a tare, or with another array's
 
     Examples
     --------
@@ -59,7 +59,7 @@ class ContactArea(Tared):
 
     @property
     def above(self) -> float:
-        """What a loaded taxel reads above its rest at least, in the sensor's unit: the noise floor and half a tick.
+        """The least value above its rest at which a taxel is loaded, in the sensor's unit: noise floor and half a tick.
 
         Examples
         --------

@@ -16,42 +16,42 @@ _DEFAULT = defaults("fa1")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class FA1(Encoder):
-    """Integrate each taxel's change of compressed pressure; fire with its sign where that passes a moving threshold.
+    """Integrate each taxel's change of compressed pressure; fire with its sign when it crosses an adaptive threshold.
 
-    Exactly equations 5.1 to 5.5 (and 5.7 where `bits` are more than one), with polarity; the constants are those of
-    Table 5.3. One signed train a taxel. It begins as if the first sample had always been. Reckoned in float64; pressure
+    Exactly equations 5.1 to 5.5 (and 5.7 for more than one bit), with polarity; the constants are those of Table 5.3.
+    One signed train a taxel. The initial state is the steady state of the first sample. Computed in float64; pressure
     below 0 counts as 0.
 
     Parameters
     ----------
     alpha : float, above 0, at most 4
-        Power of the compression 5.1.
+        Exponent of the compression 5.1.
     a : float, 1/ms, 0 or more
         A spike raises the threshold by ``period_ms * a * theta_0``.
     b : float, 0 or more
-        A quiet sample lowers it by ``b * theta_0``.
+        A sample without a spike lowers it by ``b * theta_0``.
     decay : {"sample", "ms"}
-        Whether `b` counts by the sample, as 5.5 is printed, or by the ms (``b * period_ms * theta_0`` a sample).
+        Whether `b` applies a sample, as 5.5 is printed, or a ms (``b * period_ms * theta_0`` a sample).
     theta_0 : float, 0 or more, optional
-        The baseline threshold, in compressed units; Table 5.3 prints 0, by which every change fires.
+        The baseline threshold, in compressed units; with the 0 of Table 5.3 every change fires.
     range : float, in the sensor's unit, above 0, optional
-        The largest pressure, instead: ``theta_0 = range ** alpha / 1024``. 150 (ticks of the 5.2 kHz preset's ramp)
-        where neither is given.
+        Instead of `theta_0`, the largest pressure: ``theta_0 = range ** alpha / 1024``. 150 (ticks of the 5.2 kHz
+        preset's ramp) if neither is given.
     bits : int, from 1 to 10
-        Of a spike's value, by 5.7: U in units of `theta_0`, towards zero, from 1 to 2^bits - 1 with its sign. When it
-        fires stays that of 5.4.
+        Bits of a spike's value, by 5.7: U in units of `theta_0`, rounded towards zero, from 1 to 2^bits - 1 with its
+        sign. The condition for a spike remains 5.4.
     period_ms : float, ms, whole us
-        T, the sampling period of events and of frames; frames must come at it, give or take half.
+        T, the sampling period of events and of frames; frames must arrive at this period within one half.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    Thesis 5.4.2. The choices that it leaves open stand on the page *Readings*. One spike's rise of the threshold takes
-    ``period_ms * a / b`` samples to decay (0.4 s at 1 ms, 1.6 s at 2 ms), so what came seconds before still counts:
-    touches in one long recording give fewer spikes than the same touches one by one.
+    Thesis 5.4.2. The page *Readings* lists the choices that the thesis leaves open. The rise of the threshold by one
+    spike takes ``period_ms * a / b`` samples to decay (0.4 s at 1 ms, 1.6 s at 2 ms), so spikes of the last seconds
+    still have an effect: touches in one long recording cause fewer spikes than the same touches in separate recordings.
 
     Examples
     --------

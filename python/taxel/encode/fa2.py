@@ -15,33 +15,33 @@ _DEFAULT = defaults("fa2")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class FA2(Encoder):
-    """Fire where pressure on a taxel moves fast: a spike a cycle at 200 to 250 Hz, none while it is held (Pacini).
+    """Fire while the pressure on a taxel changes fast: a spike a cycle at 200 to 250 Hz, none for constant pressure.
 
-    Spikes have no sign; one train a taxel. It begins as if the first sample had always been. A value that a state of
-    version 2 repaired is no change.
+    The model of a Pacinian afferent. Spikes have no sign; one train a taxel. The initial state is the steady state of
+    the first sample. A value that a state of version 2 repaired is not a change.
 
     Parameters
     ----------
     range : float, in the sensor's unit, above 0
         The largest pressure; 150 ticks is the ramp of the board's 5.2 kHz preset.
     threshold : float, above 0
-        Where it begins to fire, a share of `range`.
+        Threshold of firing, a share of `range`.
     corner_ms : float, ms, above 0
         The time constant of the two high passes.
     membrane_ms : float, ms, above 0
         The membrane's time constant.
     jump : float, above 0
-        By how much a spike raises the threshold, a share of `range`.
+        Increase of the threshold by a spike, a share of `range`.
     recovery_ms : float, ms, above 0
-        The time constant with which it sinks again.
+        Time constant with which the increase decays.
     refractory_ms : float, ms, 0 or more
-        How long after a spike none can come.
+        Absolute refractory time after a spike.
     period_ms : float, ms, whole us, at most 1
-        How often events are sampled; frames must come at it, give or take half.
+        Sampling period of events; frames must arrive at this period within one half.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
@@ -50,12 +50,12 @@ class FA2(Encoder):
 
         u = L_membrane(H_corner(H_corner(x)))
 
-    and the threshold of `SA1`. So thresholds fall by 12 dB an octave up to the best frequency, as those of the channel
-    that it carries do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). `corner_ms`, `membrane_ms`, `jump` and
-    `recovery_ms` are fitted by us to a threshold of one spike a cycle that is least between 200 and 250 Hz.
-    `threshold` is what a sensor allows: a step of one tick in 150 stays below it; a finger is far more sensitive.
-    Thresholds at periods of 0.05 to 0.2 ms agree within 5 % of each other; at periods above 0.5 ms no
-    best frequency is left.
+    and the threshold of `SA1`. Thresholds therefore fall by 12 dB an octave up to the best frequency, as those of the
+    Pacinian channel do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). `corner_ms`, `membrane_ms`, `jump` and
+    `recovery_ms` are fitted by us to a threshold of one spike a cycle that is least between 200 and 250 Hz. `threshold`
+    is limited by the sensor: a step of one tick in 150 stays below it; a finger is far more sensitive. Thresholds at
+    periods of 0.05 to 0.2 ms agree within 5 % of each other; at periods above 0.5 ms there is no best frequency any
+    more.
 
     Examples
     --------

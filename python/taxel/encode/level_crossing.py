@@ -1,4 +1,4 @@
-"""Plain crossings of levels."""
+"""Encoder of level crossings."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ _RANGE = defaults("running_range")
 
 @dataclass(eq=False, repr=False)
 class RunningRange(Value):
-    """Put levels on each channel's own range, y = (x - low) / (high - low), against drift and unknown gain.
+    """Apply levels to each channel's own range, y = (x - low) / (high - low), against drift and unknown gain.
 
     Parameters
     ----------
     low, high : float, percent, from 0 to 100
-        The percentiles (linear between ranks) of the past window that read 0 and 1.
+        The percentiles of the past window that become 0 and 1 (linear between ranks).
     window_s : float, s, whole us
-        How long the window is; its samples stay in memory.
+        Length of the window; its samples are kept in memory.
     renew_s : float, s, whole us
-        How often the percentiles are renewed, counted from the end of the first window.
+        Interval at which the percentiles are recomputed, from the end of the first window on.
     first_window : {"silent", "itself"}
-        Until the first window is full: no spike; or, for recordings, the first window read by its own percentiles,
-        whose spikes then come late by up to the window.
+        Before the first window is full there are no spikes; or, for recordings, the first window is encoded by its own
+        percentiles, so that its spikes are late by up to the window.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense, when an encoder with this range is made
+    ProblemError : an invalid parameter, when an encoder with this range is made
 
     Notes
     -----
@@ -59,33 +59,34 @@ _DEFAULT = defaults("level_crossing")
 
 @dataclass(eq=False, repr=False)
 class LevelCrossing(Encoder):
-    """Give a spike where a taxel comes to a level (+1) and where it falls below the level's release (-1).
+    """Fire when a taxel reaches a level (+1) and when it falls below the release of the level (-1).
 
-    Trains: ``taxel * len(levels) + level``, signed; with `tonic_ms` one more a taxel behind them. It begins settled:
-    the first sample makes no crossing. Values and levels are compared in float32.
+    Trains: ``taxel * len(levels) + level``, signed; with `tonic_ms` one more a taxel after them. The first sample is
+    not a crossing. Values and levels are compared in float32.
 
     Parameters
     ----------
     levels : sequence of float, ascending
         In the sensor's unit, or in shares of the running range.
     release_share : float, above 0, at most 1, optional
-        Release as a share of each level; 1 where neither release is given: plain crossings.
+        Release as a share of each level; 1 if neither release is given (no hysteresis).
     release_by : float, 0 or more, optional
-        Release as a distance below each level, instead.
+        Instead of `release_share`, release as a distance below each level.
     hold_ms : float, ms, 0 or more, whole us
-        How long a crossing must last; its spike comes after that time, so this is the latency.
+        Time that a crossing must last; its spike is delayed by it, so this is the latency.
     tonic_ms : float, ms, whole us, optional
-        Adds tonic spikes, the slowly adapting part: one at the crossing, then one every `tonic_ms` while above.
+        Adds tonic spikes, the slowly adapting part: one at the crossing, then one every `tonic_ms` while above the
+        level.
     tonic_level : float, one of `levels`, optional
-        While above which tonic spikes come; the first level where it is left out.
+        The level above which tonic spikes occur; default: the first level.
     running_range : RunningRange, optional
-        Levels on the channel's running range.
+        Applies the levels to the channel's running range.
     period_ms : float, ms, whole us
-        How often events are sampled; the step of the wire's stamps loses nothing.
+        Sampling period of events; the step of the wire's stamps is lossless.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""How large a touch is, how hard, and where its centre has gone since it began."""
+"""Encoder of the moments of a touch: contact area, total, peak, and displacement of the centre."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ _DEFAULT = defaults("moments")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Moments(Tared):
-    """Give a spike where area, total, peak and the way of the centre of a touch pass levels that stand in equal ratios.
+    """Fire when the area, total, peak or displacement of the centre of a touch crosses levels in geometric steps.
 
-    Of the taxels that count as `ContactArea` counts them: how many (area), the sum and the largest of their values
-    above rest (total, peak), and how far their centre, weighted by these values, has moved to the right and downwards
-    since the present touch began. A touch begins where area rises above 0 and ends where it is 0; between touches all
-    are 0. A level of the displacement stands on both sides of 0 and is passed outwards. Nothing here depends on where
-    on the array the touch began, so what is learnt at one place holds at others.
+    The moments of the loaded taxels (as in `ContactArea`) are their number (area), the sum and the largest of their
+    values above rest (total, peak), and the displacement to the right and downwards of their centre, weighted by these
+    values, since the present touch began. A touch begins when area rises above 0 and ends when it is 0; between touches
+    all moments are 0. Each level of the displacement applies on both sides of 0. The moments do not depend on the
+    position of the touch on the array, so weights that are learnt at one position apply to others.
 
-    Trains, unsigned, one a level in the order area, total, peak, x right, x left, y down, y up, each from its least
-    level on: first where each level is reached, then where each is left, then (with `tonic_ms`) one that fires while
-    beyond. It begins settled: the first sample makes no crossing. Reckoned in float64.
+    Trains are unsigned, one a level in the order area, total, peak, x right, x left, y down, y up, levels ascending:
+    first the trains of levels reached, then those of levels left, then (with `tonic_ms`) those that fire while beyond
+    the level. The first sample is not a crossing. Computed in float64.
 
     Parameters
     ----------
     noise_floor : float, in the sensor's unit (ticks), 0 or more
         That of the board; 3 in its fast presets.
     levels : int, from 1 to 1000
-        Levels a moment, for a displacement on each side of 0.
+        Number of levels of each moment, for a displacement on each side of 0.
     area : (float, float), taxels, above 0, optional
-        Least and largest level; None leaves the moment out.
+        Least and largest level; None excludes the moment.
     total, peak : (float, float), in the sensor's unit, above 0, optional
-        The same of the sum and of the largest value above rest.
+        The same for the sum and for the largest value above rest.
     displacement_mm : (float, float), mm, above 0, optional
-        The same of the centre's way, for x and for y.
+        The same for the displacement of the centre, for x and for y.
     tonic_ms : float, ms, whole us, optional
-        While beyond a level: a spike when it is reached, then one every `tonic_ms`. None for crossings alone.
+        Adds tonic spikes: one when a level is reached, then one every `tonic_ms` while beyond it. None: crossings only.
     period_ms : float, ms, whole us
-        How often events are sampled; the step of the wire's stamps loses nothing.
+        Sampling period of events; the step of the wire's stamps is lossless.
     tare : Tare, or float, s, optional
-        The taxels' rest, or how long each recording begins with it. It belongs to a board and a day, so a saved readout
-        has none; without it nothing is encoded.
+        The taxels' rest, or the duration of rest at the beginning of each recording. It is valid for one board on one
+        day, so a saved readout has none; encoding requires one.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense; encoding without a tare, or with another array's
+    ProblemError : an invalid parameter; encoding without a tare, or with another array's
 
     Examples
     --------

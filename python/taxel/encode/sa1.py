@@ -1,4 +1,4 @@
-"""The SA-1 afferent: how hard is pressed, as long as it is."""
+"""The SA-1 afferent: the strength of a sustained pressure."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ _DEFAULT = defaults("sa1")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class SA1(Tared):
-    """Fire while a taxel is pressed: fastest when it is pressed anew, ever more slowly as that lasts (Merkel).
+    """Fire while a taxel is pressed: fastest at the onset of pressure, then with a slowly falling rate (Merkel).
 
-    Spikes have no sign; one train a taxel. It begins as if the first sample had always been.
+    Spikes have no sign; one train a taxel. The initial state is the steady state of the first sample.
 
     Parameters
     ----------
     range : float, in the sensor's unit, above 0
         The largest pressure; 150 ticks is the ramp of the board's 5.2 kHz preset.
     threshold : float, above 0
-        Where it begins to fire, a share of `range`.
+        Threshold of firing, a share of `range`.
     onset : float, 0 or more
-        How much more a pressure counts while it is new.
+        Additional gain of a new pressure.
     onset_ms : float, ms, above 0
-        How long it counts as new.
+        Time constant with which that gain decays.
     loss : float, from 0 to 1
-        Which share of a pressure that lasts is lost in the end.
+        The share of a constant pressure that adaptation removes in the end.
     loss_ms : float, ms, above 0
-        How long that takes.
+        Time constant of that adaptation.
     membrane_ms : float, ms, above 0
         The membrane's time constant.
     jump : float, above 0
-        By how much a spike raises the threshold, a share of `range`.
+        Increase of the threshold by a spike, a share of `range`.
     recovery_ms : float, ms, above 0
-        The time constant with which it sinks again.
+        Time constant with which the increase decays.
     refractory_ms : float, ms, 0 or more
-        How long after a spike none can come.
+        Absolute refractory time after a spike.
     period_ms : float, ms, whole us
-        How often events are sampled; frames must come at it, give or take half.
+        Sampling period of events; frames must arrive at this period within one half.
     tare : Tare, or float, s, optional
-        The taxels' rest, or how long each recording begins with it: pressure is what stands above it (0 where a rest is
-        not known). Without one it counts from 0. It belongs to a board and a day, so a saved readout has none.
+        The taxels' rest, or the duration of rest at the beginning of each recording: pressure is the value above it (0
+        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has none.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense; encoding with another array's tare
+    ProblemError : an invalid parameter; encoding with another array's tare
 
     Notes
     -----
@@ -60,17 +60,17 @@ class SA1(Tared):
         spike where u >= threshold + a, and none came for refractory_ms;  a += jump at it
         da/dt = -a / recovery_ms
 
-    Between samples x is a straight line, and the moment within a sample counts: so with periods of 0.1 to 2 ms rates
-    agree within 2 % of each other. A spike bears the time of its sample, at most one a sample.
+    Between samples x is interpolated linearly, and the time of a crossing within a sample is used: with periods of 0.1
+    to 2 ms rates agree within 2 % of each other. A spike has the time of its sample; there is at most one a sample.
 
     The threshold is that of Kobayashi, Tsubota and Shinomoto (2009), Front. Comput. Neurosci. 3:9, with one time
-    constant; `refractory_ms` is theirs. By it the rate grows in a straight line with pressure, as SA-1's does
+    constant; `refractory_ms` is theirs. With it the rate grows linearly with pressure, as SA-1's does
     (Vega-Bermudez and Johnson 1999, J. Neurophysiol. 81:2701). `onset_ms` is the slower inactivation in the generator
     of Gerling et al. (2018), PLoS Comput. Biol. 14:e1006264, figure 2. The others are fitted by us: `loss` to a rate
     that falls by 38 % in the first 12 s of holding (Burgess et al. 1983, J. Neurosci. 3:2652, mean of 21 fibres);
     `onset`, `membrane_ms` and `recovery_ms` to a threshold of one spike a cycle that is least near 5 Hz; `jump` to
-    some 200 spikes/s where half of `range` is newly pressed; `threshold` to what stands out of a noise of 3 ticks in
-    150.
+    some 200 spikes/s at the onset of half of `range`; `threshold` to the least pressure that exceeds a noise of 3 ticks
+    in 150.
 
     Examples
     --------

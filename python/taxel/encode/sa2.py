@@ -1,4 +1,4 @@
-"""The SA-2 afferent: a held load, steadily."""
+"""The SA-2 afferent: steady firing under a sustained load."""
 
 from __future__ import annotations
 
@@ -16,48 +16,49 @@ _DEFAULT = defaults("sa2")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class SA2(Tared):
-    """Fire while a taxel is loaded, steadily, hardly faster when it is loaded anew (Ruffini).
+    """Fire steadily while a taxel is loaded, hardly faster at the onset of the load (Ruffini).
 
-    It feels the stretch of skin above all, which an array of pressure does not have: what is here is its answer to
-    load. Spikes have no sign; one train a taxel. It begins as if the first sample had always been.
+    SA-2 afferents respond mainly to stretch of the skin, which a pressure array does not measure; this is a model of
+    their response to load. Spikes have no sign; one train a taxel. The initial state is the steady state of the first
+    sample.
 
     Parameters
     ----------
     range : float, in the sensor's unit, above 0
         The largest pressure; 150 ticks is the ramp of the board's 5.2 kHz preset.
     threshold : float, above 0
-        Where it begins to fire, a share of `range`.
+        Threshold of firing, a share of `range`.
     onset : float, 0 or more
-        How much more a pressure counts while it is new.
+        Additional gain of a new pressure.
     onset_ms : float, ms, above 0
-        How long it counts as new.
+        Time constant with which that gain decays.
     loss : float, from 0 to 1
-        Which share of a pressure that lasts is lost in the end.
+        The share of a constant pressure that adaptation removes in the end.
     loss_ms : float, ms, above 0
-        How long that takes.
+        Time constant of that adaptation.
     membrane_ms : float, ms, above 0
         The membrane's time constant.
     jump : float, above 0
-        By how much a spike raises the threshold, a share of `range`.
+        Increase of the threshold by a spike, a share of `range`.
     recovery_ms : float, ms, above 0
-        The time constant with which it sinks again.
+        Time constant with which the increase decays.
     refractory_ms : float, ms, 0 or more
-        How long after a spike none can come.
+        Absolute refractory time after a spike.
     period_ms : float, ms, whole us
-        How often events are sampled; frames must come at it, give or take half.
+        Sampling period of events; frames must arrive at this period within one half.
     tare : Tare, or float, s, optional
-        The taxels' rest, or how long each recording begins with it: pressure is what stands above it (0 where a rest is
-        not known). Without one it counts from 0. It belongs to a board and a day, so a saved readout has none.
+        The taxels' rest, or the duration of rest at the beginning of each recording: pressure is the value above it (0
+        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has none.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense; encoding with another array's tare
+    ProblemError : an invalid parameter; encoding with another array's tare
 
     Notes
     -----
     The equations are those of `SA1`. It is four times less sensitive than SA-1 (Table 1 of Weiss et al. 2009,
-    J. Neurophysiol. 101:1033). That it answers more steadily and with less of an onset has no number there: `onset` and
-    `loss` are less than half of SA-1's, our choice.
+    J. Neurophysiol. 101:1033). That source has no number for its steadier response and smaller onset: that `onset` and
+    `loss` are less than half of SA-1's is our choice.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A skin: afferents of all four types, each in a place of its own, on one array."""
+"""A skin: afferents of all four types at random positions on one array."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ KINDS = ("SA-1", "FA-1", "SA-2", "FA-2")
 
 @dataclass(frozen=True, eq=False)
 class Afferents:
-    """Hold the type and the place of the afferent behind each train of a `Skin`.
+    """Hold the type and the position of the afferent of each train of a `Skin`.
 
     Parameters
     ----------
@@ -75,40 +75,40 @@ class Afferents:
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Skin(Tared):
-    """Give an array the afferents of a fingertip: all four types in places that a seed draws, each with a field.
+    """Encode with the afferents of a fingertip: all four types at random positions, each with a receptive field.
 
-    Trains have no sign, as a nerve's spikes have none: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to
-    the last; `afferents` returns the type and place of each. Each type is the encoder of its name with its defaults and
-    this `range`; FA-1's threshold decays by the ms.
+    Trains are unsigned, like the spikes of a nerve: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to the
+    last; `afferents` returns the type and position of each. Each type is the encoder of that name with its defaults and
+    this `range`; FA-1's threshold decays a ms (`decay="ms"`).
 
     Parameters
     ----------
     sa1_per_cm2, fa1_per_cm2, sa2_per_cm2, fa2_per_cm2 : float, 0 or more
-        How many of each type a cm^2 of taxels bears; 0 leaves a type out.
+        Density of each type, afferents per cm^2 of taxels; 0 excludes a type.
     sa1_field_mm2, fa1_field_mm2, sa2_field_mm2, fa2_field_mm2 : float, mm^2, above 0
-        The field of one of each type: a disc, within which it feels the mean of the taxels, weighed by a Gaussian whose
-        second standard deviation is the edge. Where no taxel's middle lies in it, the taxel beneath.
+        Area of the receptive field of each type: a disc, whose taxels are averaged with Gaussian weights; its edge is
+        at two standard deviations. If no centre of a taxel lies in it, the field is the taxel at its position.
     range : float, in the sensor's unit, above 0
         The largest pressure; 150 ticks is the ramp of the board's 5.2 kHz preset.
     seed : int, 0 or more
-        What draws the places.
+        Seed of the positions.
     period_ms : float, ms, whole us, at most 1
-        How often events are sampled; frames must come at it, give or take half.
+        Sampling period of events; frames must arrive at this period within one half.
     tare : Tare, or float, s, optional
-        The taxels' rest, or how long each recording begins with it: pressure is what stands above it (0 where a rest is
-        not known). Without one it counts from 0. It belongs to a board and a day, so a saved readout has none.
+        The taxels' rest, or the duration of rest at the beginning of each recording: pressure is the value above it (0
+        if a rest is unknown). Default: a rest of 0. It is valid for one board on one day, so a saved readout has none.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense, or more than a million afferents on the array
+    ProblemError : an invalid parameter, or more than a million afferents on the array
 
     Notes
     -----
-    70, 140 and 25 a cm^2 of SA-1, FA-1 and FA-2, and for SA-2 what these leave of 241 in all: Johansson and Vallbo
-    (1979), J. Physiol. 286:283, in the numbers of Saal et al. (2017), PNAS 114:E5693. Fields: medians of 11.0 mm^2
+    Densities are 70, 140 and 25 a cm^2 of SA-1, FA-1 and FA-2, and for SA-2 the rest of 241 in total: Johansson and
+    Vallbo (1979), J. Physiol. 286:283, as cited by Saal et al. (2017), PNAS 114:E5693. Fields are medians of 11.0 mm^2
     (SA-1) and 12.6 (FA-1), some 5 times (SA-2) and 10 times (FA-2) as large (Johansson and Vallbo 1980, Brain Res.
-    184:353). Their shape is our choice. On an array as coarse as the thesis' (2.67 mm) several afferents stand on each
-    taxel.
+    184:353). Their shape is our choice. On an array as coarse as the thesis' (2.67 mm) each taxel has several
+    afferents.
 
     Examples
     --------
@@ -137,12 +137,12 @@ class Skin(Tared):
     tare: Tare | float | None = _DEFAULT.tare
 
     def afferents(self, array: Array) -> Afferents:
-        """Return the type and the place of each train's afferent on an array.
+        """Return the type and the position of each train's afferent on an array.
 
         Parameters
         ----------
         array : Array
-            The sensor; its pitch gives the cm^2 that it covers.
+            The sensor; its pitch determines its area in cm^2.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""A threshold and a pair of phasic Izhikevich neurons."""
+"""Encoder of a threshold and a pair of phasic Izhikevich neurons."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _DEFAULT = defaults("threshold_izhikevich")
 
 @dataclass(eq=False, repr=False)
 class ThresholdIzhikevich(Encoder):
-    """Let two Izhikevich neurons a level fire where a taxel came to it (+1) and where it left it (-1).
+    """Fire two Izhikevich neurons a level: one when a taxel reaches the level (+1), one when it leaves it (-1).
 
     The input of one neuron is the thresholded signal, that of the other its inverse; each fires once for each step of
-    its input, and chatter within some 10 ms vanishes. Trains: ``taxel * len(levels) + level``, signed.
+    its input, and repeated crossings within some 10 ms are suppressed. Trains: ``taxel * len(levels) + level``, signed.
 
     Parameters
     ----------
@@ -30,20 +30,20 @@ class ThresholdIzhikevich(Encoder):
         Which published parameter set: a = 0.005, I = 0.6 (6.5.1, latency 15.8 ms) or a = 0.02, I = 0.5 (3.4.3, latency
         20.2 ms); b = 0.25, c = -65 mV, d = 6 in both.
     begin : {"settled", "rest"}
-        As if the first sample had always been; or at rest without input, where all that is on at the first sample, and
-        the OFF neuron of each idle channel, fires once.
+        The steady state of the first sample; or rest without input, from which the ON neuron of each active channel and
+        the OFF neuron of each idle channel fire once.
     period_ms : float, ms, whole us
-        How often events are sampled.
+        Sampling period of events.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
     Thesis 3.4.3 and 6.5.1; Izhikevich (2003), IEEE Trans. Neural Networks 14:1569. Forward Euler in float64, both
     equations from the old state, in steps of 0.1 ms that count from the first sample: the step is part of the
-    definition, as the latency depends on it. A spike has the time of its step's end.
+    definition, as the latency depends on it. A spike has the time at the end of its step.
 
     Examples
     --------

@@ -31,9 +31,9 @@ class Format:
     about : str
         What the recordings are, in one line.
     files : function
-        Takes a folder or a file; gives the files of this format in it, in order; none where there are none.
+        Returns the files of this format in a folder, or the file itself, in order; empty if there are none.
     trials : function
-        Takes a folder or a file; gives its trials one after the other.
+        Yields the trials of a folder or a file.
     """
 
     about: str
@@ -42,12 +42,12 @@ class Format:
 
 
 def _of(name: str) -> Format:
-    """Return the format of a module: its first line, `files` and `trials`."""
+    """Return the format that a module defines: the first line of its docstring, `files` and `trials`."""
     module = import_module(f"taxel.formats.{name}")
     return Format((module.__doc__ or "").split("\n", maxsplit=1)[0], module.files, module.trials)
 
 
-#: Every format by name, in the order in which a folder is tried: a new one is a module of that name, and a name here.
+#: Every format by name, in the order in which they are tried on a folder. A new format is a module and a name here.
 FORMATS = {
     name: _of(name)
     for name in (
@@ -64,15 +64,15 @@ FORMATS = {
 }
 
 
-def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # noqa: A002  the word of the field
-    """Read the trials of a file or a folder, one after the other.
+def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # noqa: A002  the usual name
+    """Yield the trials of a file or a folder.
 
     Parameters
     ----------
     path : str or Path
         A file, or a folder of files of one format.
     format : str, optional
-        One of `FORMATS`; found by the files' names and first bytes where it is left out.
+        One of `FORMATS`; default: recognised by the files' names and first bytes.
 
     Yields
     ------
@@ -80,9 +80,9 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
 
     Raises
     ------
-    FormatError : no format, or several, or a file that does not hold what it should (names file and line)
-    ProblemError : a format that is none
-    FileNotFoundError : nothing is there
+    FormatError : no format or several formats match, or a file breaks its format (names file and line)
+    ProblemError : an unknown format
+    FileNotFoundError : no such file or folder
 
     Examples
     --------

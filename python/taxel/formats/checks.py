@@ -1,4 +1,4 @@
-"""Checks that readers of files share: the size of a sensor, the range of times, times that ascend."""
+"""Checks that readers of files share: the size of a sensor, the range and the order of times."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["ascending_us", "sensor", "table", "whole_us"]
 
 
 def sensor(place: str, array: Array) -> Array:
-    """Return a sensor that a file describes, unless it is too large.
+    """Return the sensor that a file describes, if it is within the limits.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def sensor(place: str, array: Array) -> Array:
 
 
 def table(place: Path | str, held: Events | Frames) -> Events | Frames:
-    """Return events or pictures of a file, unless their sensor is too large or their times are out of all reason.
+    """Return events or pictures of a file, if their sensor and their times are within the limits.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""novel emed plates: the ``.lst`` export, a page a picture, kPa on 64 x 95 sensors or other sizes.
+"""novel emed plates: the ``.lst`` export, one page a picture, kPa on 64 x 95 sensors or other sizes.
 
-Each page has a head, the numbers of the columns that are printed, a line a row with its number first, and margins: the
-last column and the last line, ``Force``, are the forces of row and column in N, not sensors. What is not printed was
-not loaded. Pages without a picture's number are summaries and are left out.
+Each page has a head, the numbers of the printed columns, a line a row that begins with its number, and margins: the
+last column and the last line, ``Force``, are the forces of row and column in N, not sensors. Rows and columns that are
+not printed were not loaded. Pages without a picture's number are summaries and are skipped.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _HEAD = {
     "period": re.compile(rf"Time/picture:\s*{_NUMBER}\s*ms"),
 }
 _PICTURE = re.compile(r"Pict-No\.:\s*(\d{1,9})\b")
-#: Force in N over the sum of cells times their area in cm2, by the unit of the cells.
+#: The force in N of a cell of value 1 and area 1 cm2, by the unit of the cells.
 _NEWTON = {"kPa": 0.1, "N/cm2": 1.0}
 
 
@@ -53,10 +53,10 @@ def _is_export(path: Path) -> bool:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the step of one file, or of all in a folder, one after the other.
+    """Yield the step of a file, or of all files in a folder.
 
-    Picture 1 is at 0 us. The file does not say its unit: it is the one in which the cells make the forces that the file
-    states, and where a page's cells do not make its force, that page is wrong.
+    Picture 1 is at 0 us. The file does not state its unit: it is the one in which the cells sum to the forces that the
+    file states. A page whose cells do not sum to its force is an error.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
     Raises
     ------
-    FormatError : a file that does not hold what it should (names file and line)
+    FormatError : a file that breaks the format (names file and line)
     """
     place = Path(arguments.path("path", path))
     paths = files(place)
@@ -81,7 +81,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
 @dataclass(frozen=True)
 class _Page:
-    """One picture: its number, the line that says so, the printed rectangle, the force that the page states."""
+    """One picture: its number, the line of that number, the printed rectangle, the force that the page states."""
 
     number: int
     line: int
@@ -111,7 +111,7 @@ def _read(file: Path) -> Trial:
     values = np.zeros((len(pages), *shape), np.float32)
     for picture, page in zip(values, pages, strict=True):
         picture[np.ix_(page.rows, page.columns)] = page.values
-    # An aspect other than 1 would show in the two sizes: areas hold all the same.
+    # Taxels that are not square have two sizes; the pitch of equal area is used.
     array = Array(*shape, pitch_mm=10 * float(np.sqrt(size[0] * size[1])), name="emed plate")
     return Trial(
         name=file.stem,
@@ -125,7 +125,7 @@ def _read(file: Path) -> Trial:
 
 
 def _head(file: Path, content: Sequence[str]) -> tuple[tuple[int, int], tuple[float, float], float]:
-    """Return rows and columns, the size of a sensor in cm, and the time a picture in ms."""
+    """Return rows and columns, the size of a sensor in cm, and the time between pictures in ms."""
     first = next((k for k, line in enumerate(content) if _PICTURE.search(line)), len(content))
     head = "\n".join(content[: first + 1])
     matches = {name: pattern.search(head) for name, pattern in _HEAD.items()}
@@ -137,7 +137,7 @@ def _head(file: Path, content: Sequence[str]) -> tuple[tuple[int, int], tuple[fl
     for name, numbers in values.items():
         if min(numbers) <= 0:
             raise FormatError(f"{file.name}, line {first + 1}: before it a {name} of 0; must be as '{expected[name]}'")
-    # Columns come first: the rows that are printed reach beyond the first number.
+    # The columns are named first, so the printed rows begin after the first number.
     columns, rows = (int(n) for n in values["matrix"])
     if max(rows, columns) > 65_535:
         raise FormatError(f"{file.name}: a matrix of {columns} x {rows}; at most 65535 a side")
@@ -147,7 +147,7 @@ def _head(file: Path, content: Sequence[str]) -> tuple[tuple[int, int], tuple[fl
 
 def _page(file: Path, content: Sequence[str], begin: int, end: int, shape: tuple[int, int]) -> _Page:
     match = _PICTURE.search(content[begin])
-    assert match is not None  # it was found by this
+    assert match is not None  # the page was found by this pattern
     head = next((k for k in range(begin + 1, end) if content[k].strip()), end)
     names = content[head].split() if head < end else []
     if len(names) < 2 or names[-1] != _MARGIN:
@@ -181,7 +181,7 @@ def _page(file: Path, content: Sequence[str], begin: int, end: int, shape: tuple
 def _places(
     file: Path, line: int, what: str, numbers: NDArray[np.float64], most: int, *, step: int
 ) -> NDArray[np.int64]:
-    """Return numbers from 1 as indices; they ascend and lie on the plate."""
+    """Convert numbers that count from 1 to indices; they must ascend and lie on the plate."""
     wrong = (numbers != np.rint(numbers)) | (numbers < 1) | (numbers > most)
     wrong |= np.diff(numbers, prepend=0) <= 0
     if wrong.any():
@@ -193,7 +193,7 @@ def _places(
 
 
 def _unit(file: Path, pages: Sequence[_Page], area_cm2: float) -> str:
-    """Return the unit in which the cells make the forces that the pages state.
+    """Return the unit in which the cells sum to the forces that the pages state.
 
     Cells and forces are rounded to hundredths; a page that agrees with neither unit is damaged.
     """

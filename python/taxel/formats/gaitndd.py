@@ -1,7 +1,7 @@
 """One force-sensitive channel a foot, five minutes of walking (PhysioNet, Gait in Neurodegenerative Disease 1.0.0).
 
 A person is ``NAME.hea`` (WFDB header), ``NAME.let`` and ``NAME.rit`` (left and right, WFDB format 212) and ``NAME.ts``,
-the authors' step times. Numbers are raw: not N, and they drift.
+the authors' step times. Values are raw counts, not N, and they drift.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from taxel.frames import Frames
 
 __all__ = ["files", "format_212", "step_times", "trials"]
 
-#: What format 212 stores where there is no valid sample.
+#: The value that format 212 stores for an invalid sample.
 NO_SAMPLE = -2048
 
 _TS_COLUMNS = [
@@ -40,9 +40,9 @@ def files(path: Path) -> list[Path]:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the left and the right channel of one person, or of all in a folder, one after the other.
+    """Yield the left and the right channel of one person, or of all in a folder.
 
-    The right channel has no step times of its own, so its trial has no truth. Samples that are not valid are left out.
+    The right channel has no step times of its own, so its trial has no reference events. Invalid samples are skipped.
 
     Yields
     ------
@@ -50,7 +50,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
     Raises
     ------
-    FormatError : a file that does not hold what it should (names file and line or byte)
+    FormatError : a file that breaks the format (names file and line or byte)
     """
     place = Path(arguments.path("path", path))
     paths = files(place)
@@ -126,7 +126,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     Parameters
     ----------
     path : Path
-        ``NAME.ts``: 13 columns; the first is the left heel strike that ends the row's left stride (measured: its
+        ``NAME.ts``: 13 columns; the first is the left heel strike that ends the row's left stride (verified: its
         differences are the strides), and the foot-off lies one left swing before it.
 
     Returns
@@ -136,7 +136,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
 
     Raises
     ------
-    FormatError : a line that has not 13 numbers, or times that do not ascend (names file and line)
+    FormatError : a line without 13 numbers, or times that do not ascend (names file and line)
     """
     path = Path(arguments.path("path", path))
     rows = [line.split() for line in text.lines(path)]
@@ -153,7 +153,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
 
 
 def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
-    """Return the rate, samples, and of each signal: file, samples, first value, checksum."""
+    """Return the rate, the number of samples, and file, first value and checksum of each signal."""
     rows = [(k, line.split()) for k, line in enumerate(text.lines(path), start=1) if line.strip() and line[0] != "#"]
     if not rows or len(rows[0][1]) < 4:
         raise FormatError(f"{path.name}, line 1: must hold name, signals, rate and samples")
@@ -192,7 +192,7 @@ def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.
     expected = NO_SAMPLE if first == -32768 else first
     if values[0] != expected:
         raise FormatError(f"{path.name}: first value {values[0]}; the header says {first}")
-    # The header's sum takes a sample that is not valid as -32768.
+    # In the header's checksum an invalid sample counts as -32768.
     total = int(np.where(values == NO_SAMPLE, -32768, values).sum(dtype=np.int64))
     if checksum not in {_int16(total), _int16(int(values.sum(dtype=np.int64)))}:
         raise FormatError(f"{path.name}: samples sum to {_int16(total)} (16 bits); the header says {checksum}")

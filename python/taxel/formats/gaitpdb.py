@@ -1,7 +1,7 @@
 """Eight force sensors under each foot while walking (PhysioNet, Gait in Parkinson's Disease 1.0.0).
 
 A file ``GaCo02_01.txt`` (or ``.txt.gz``) has no header and 19 columns: time in s, 8 sensors of the left foot, 8 of the
-right, the two totals, all in N. ``Co`` in the name is a healthy person, ``Pt`` a patient.
+right, the two totals, all in N. ``Co`` in the name marks a healthy person, ``Pt`` a patient.
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ def files(path: Path) -> list[Path]:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the left and the right foot of one walk, or of all in a folder, one after the other.
+    """Yield the left and the right foot of one walk, or of all in a folder.
 
-    Truth is that of ``events.csv`` where the folder has it for that person, else reckoned by `contacts` (same rule).
+    Reference events are those of ``events.csv`` if the folder has it for that person, else computed by `contacts` (by
+    the same rule).
 
     Yields
     ------
@@ -51,7 +52,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
     Raises
     ------
-    FormatError : a file that does not hold what it should (names file, line and column)
+    FormatError : a file that breaks the format (names file, line and column)
     """
     place = Path(arguments.path("path", path))
     paths = files(place)
@@ -114,7 +115,7 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     array([[30, 90]])
     """
     total = arguments.floats("total", total)
-    # +1 above 50, -1 below 25, 0 between: the state is the last one that is not 0.
+    # +1 above 50 N, -1 below 25 N, 0 between: the state is the last value other than 0.
     state = (total > 50).astype(np.int64) - (total < 25)
     last = np.maximum.accumulate(np.where(state != 0, np.arange(len(total)), -1))
     loaded = (last >= 0) & (state[last] > 0)

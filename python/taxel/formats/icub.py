@@ -1,7 +1,7 @@
 """Grasps of an iCub hand, 60 taxels on five fingers, one object a file (icub_grasp_dataset).
 
-A file ``OBJECT.csv.gz`` (or ``.csv``) holds grasps, slice by slice: trial, slice, nine joint angles, the largest of
-each finger, and twelve taxels a finger, thumb to little finger. The source gives no times and no rate.
+A file ``OBJECT.csv.gz`` (or ``.csv``) holds grasps, one time slice a row: trial, slice, nine joint angles, the largest
+value of each finger, and twelve taxels a finger, thumb to little finger. The source has neither times nor a rate.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ def _begins_so(path: Path) -> bool:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the grasps of one object's file, or of all in a folder, one after the other.
+    """Yield the grasps of one object's file, or of all in a folder.
 
-    Pictures are 5 x 12 (fingers by rows), 255 less the raw value, so that they rise with pressure. Their times count
-    slices: 0, 1, 2 ... us, for want of any.
+    Pictures are 5 x 12 (fingers by rows), 255 less the raw value, so that they rise with pressure. As the file has no
+    times, the time of a picture is the number of its slice in us: 0, 1, 2 ...
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
     Raises
     ------
-    FormatError : a file that does not hold what it should (names file and line)
+    FormatError : a file that breaks the format (names file and line)
     """
     place = Path(arguments.path("path", path))
     paths = files(place)

@@ -1,7 +1,8 @@
 """Moticon OpenGo insoles, 16 sensors a foot: the text export.
 
-Lines of ``#``, the last of them the column names (tabs), then a row a frame: time in s; of each foot 16 pressures in
-N/cm2, accelerations, rates, total force in N, centre of pressure; then the markers of the maker's step finder.
+Lines with ``#``, of which the last has the column names (separated by tabs), then a row a frame: time in s; for each
+foot 16 pressures in N/cm2, accelerations, rates, total force in N, centre of pressure; then the markers of the
+manufacturer's step detection.
 """
 
 from __future__ import annotations
@@ -46,20 +47,20 @@ def _is_export(path: Path) -> bool:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the left and the right foot of one recording, or of all in a folder, one after the other.
+    """Yield the left and the right foot of one recording, or of all in a folder.
 
-    A row whose cells are empty for a foot is missing for that foot: its time jumps there. Truth is that of
-    ``steps.csv`` (from the maker's reports) where the folder has it, else the markers in the file; it is complete from
-    the first marker of a foot to the last.
+    A row whose cells are empty for a foot is missing for that foot, so its times jump there. Reference events are those
+    of ``steps.csv`` (from the manufacturer's reports) if the folder has it, else the markers in the file; they are
+    complete from the first marker of a foot to the last.
 
     Yields
     ------
     Trial
-        ``series["total"]`` is the maker's total force in N.
+        ``series["total"]`` is the manufacturer's total force in N.
 
     Raises
     ------
-    FormatError : a file that does not hold what it should (names file, line and column)
+    FormatError : a file that breaks the format (names file, line and column)
     """
     place = Path(arguments.path("path", path))
     paths = files(place)

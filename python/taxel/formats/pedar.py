@@ -1,7 +1,7 @@
 """novel pedar insoles: the ``.asc`` export, usually 2 x 99 sensors in kPa.
 
 Some header lines, one of column names (``time[secs]``, then the sensors' numbers, left insole first), then a row a
-frame. The frame rate stands in the header only.
+frame. Only the header has the frame rate.
 """
 
 from __future__ import annotations
@@ -38,9 +38,10 @@ def _is_export(path: Path) -> bool:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the left and the right insole of one recording, or of all in a folder, one after the other.
+    """Yield the left and the right insole of one recording, or of all in a folder.
 
-    The recording has no truth: contact and foot-off are where the foot's sum passes 10 % of its largest.
+    The recording has no reference events: contact and foot-off are the times at which the sum of the foot crosses 10 %
+    of its maximum.
 
     Yields
     ------
@@ -48,7 +49,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
     Raises
     ------
-    FormatError : a file that does not hold what it should (names file, line and column)
+    FormatError : a file that breaks the format (names file, line and column)
     """
     place = Path(arguments.path("path", path))
     paths = files(place)
@@ -111,7 +112,7 @@ def _read(file: Path) -> Iterator[Trial]:
 
 
 def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Find stances: from the first sample of 10 % of the largest sum to the next one below.
+    """Find stances: from the first sample of at least 10 % of the largest sum to the next one below.
 
     Parameters
     ----------
@@ -120,7 +121,7 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     Returns
     -------
     int64, shape (stances, 2)
-        Stances that the recording's ends cut are left out.
+        Stances that begin or end outside the recording are excluded.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """A footscan-type plate, one barefoot footfall a trial (jiku-data, SpeedPP2DS; J. Biomech. 41:1987, 2008).
 
 A file ``subjNNN.h5`` holds one person: data sets ``imgNNN``, rows x columns x frames, 500 frames a second, heel at the
-low rows. Values are counts; no unit is known. The file's rows are interpolated, three from two: that is undone here.
+low rows. Values are counts of unknown unit. The file's rows are interpolated, three from two; the reader reverts this.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from taxel.frames import Frames
 
 __all__ = ["COLUMN_MM", "FRAME_US", "ROW_MM", "events", "files", "sensor_rows", "trials"]
 
-#: Between frames, us.
+#: Time between frames, us.
 FRAME_US = 2000
-#: Sensors along the walk and across it, mm: the usual footscan plate, inferred from the three rows made of two.
+#: Pitch of the sensors along the walk and across it, mm: that of the usual footscan plate, inferred from the
+#: interpolation of three rows from two.
 ROW_MM, COLUMN_MM = 7.62, 5.08
 
 _SOURCE = (
@@ -44,10 +45,11 @@ def files(path: Path) -> list[Path]:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the footfalls of one person's file, or of all in a folder, one after the other.
+    """Yield the footfalls of one person's file, or of all in a folder.
 
     Pictures are of the plate's own sensors (7.62 mm along the walk, 5.08 mm across), from the first frame to the one
-    after foot-off. Truth is that of ``events.csv`` where the folder has it, else reckoned by `events` (same rules).
+    after foot-off. Reference events are those of ``events.csv`` if the folder has it, else computed by `events` (by the
+    same rules).
 
     Parameters
     ----------
@@ -59,7 +61,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
 
     Raises
     ------
-    FormatError : a file that does not hold what it should
+    FormatError : a file that breaks the format
     """
     place = Path(arguments.path("path", path))
     paths = files(place)
@@ -116,7 +118,7 @@ def _trial(
 
 
 def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Undo the interpolation of the rows: three image rows were made of every two sensor rows.
+    """Revert the interpolation of the rows: three image rows were made of every two sensor rows.
 
     Parameters
     ----------
@@ -125,18 +127,18 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     Returns
     -------
     int32, shape (sensor rows, columns, frames), counts
-        Right to within 1 count; begins with the row at which the footprint's box was cut.
+        Accurate to 1 count; begins with the first row of the footprint's bounding box.
 
     Raises
     ------
     FormatError : the rows were not made three from two
-    ProblemError : no counts of rows x columns x frames, or none above 0
+    ProblemError : not counts of shape (rows, columns, frames), or no count above 0
 
     Notes
     -----
-    With S the sensors and s the row where the box begins: image[s + 3k] = S[2k] exactly, and the two rows after it lie
-    on the straight line to S[2k+1] and from there to S[2k+2], cut down to whole counts. The phase is that of the three
-    under which the fewest cells break |3 (b - c) - (a - d)| <= 3. It looks at the whole trial: part of reading it.
+    With S the sensors and s the first row of the box: image[s + 3k] = S[2k] exactly, and the two rows after it are
+    linearly interpolated to S[2k+1] and from there to S[2k+2], rounded down to whole counts. The phase is the one of
+    three under which the fewest cells violate |3 (b - c) - (a - d)| <= 3, over the whole trial.
     """
     y = _loaded(image)
     rows = y.shape[0]
@@ -168,19 +170,19 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
     Parameters
     ----------
     image : int, shape (rows, columns, frames), counts
-        As it is in the file.
+        The image of the file, unchanged.
 
     Returns
     -------
     dict of int
         ``contact``: the first frame with any load; ``foot_off``: the frame after the last; ``heel_off``: the frame
         after the last in which the first 30 % of the rows ever loaded carry at least 5 % of their own largest sum;
-        ``p5``, ``p10``: the first frame with 5 %, 10 % of the largest sum, ``peak_sum``; ``flicker``: 1 where a frame
-        between is wholly unloaded.
+        ``p5``, ``p10``: the first frame with 5 %, 10 % of the largest sum, ``peak_sum``; ``flicker``: 1 if a frame in
+        between has no load at all.
 
     Raises
     ------
-    ProblemError : no counts of rows x columns x frames, or none above 0
+    ProblemError : not counts of shape (rows, columns, frames), or no count above 0
     """
     image = _loaded(image)
     total = image.sum(axis=(0, 1), dtype=np.int64)

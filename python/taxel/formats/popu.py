@@ -1,7 +1,7 @@
 """Pictures of people lying on a mat of 64 x 27 taxels, no movement (PoPu).
 
-A file ``*.npz`` holds ``readings``, uint8, poses x snapshots x rows x columns, and ``pose``, their names: left, prone,
-right and supine, a number and a variant (``supine3_1``), and the empty mat.
+A file ``*.npz`` holds ``readings``, uint8, poses x snapshots x rows x columns, and ``pose``, the names of the poses:
+left, prone, right or supine with a number and a variant (``supine3_1``), and the empty mat.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def _holds_poses(path: Path) -> bool:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the poses of a file, or of all in a folder, one after the other.
+    """Yield the poses of a file, or of all in a folder.
 
     Parameters
     ----------
@@ -44,12 +44,12 @@ def trials(path: str | Path) -> Iterator[Trial]:
     Yields
     ------
     Trial
-        Its pictures are snapshots of the same lying person; their times count them, 0, 1, 2 ... us, for want of any.
-        `about` has the posture, the pose (without its variant) and the variant.
+        Its pictures are snapshots of the same lying person; as the file has no times, the time of a picture is its
+        number in us: 0, 1, 2 ... `about` has the posture, the pose (without its variant) and the variant.
 
     Raises
     ------
-    FormatError : a file that does not hold what it should
+    FormatError : a file that breaks the format
     """
     place = Path(arguments.path("path", path))
     paths = files(place)

@@ -1,8 +1,8 @@
 """Tekscan F-Scan insoles and I-Scan sheets: the ASCII export of a movie (``.asf``, ``.csv``, ``.txt``).
 
 Header lines ``KEY value``, then after ``ASCII_DATA @@`` for each frame a line ``Frame 7`` (I-Scan: with its time and
-the sum of its cells) and a line of cells a row, separated by commas, ``B`` where no cell is; ``@@`` ends the file. Unit
-and spacings stand in the header only.
+the sum of its cells) and a line of cells a row, separated by commas, ``B`` for a cell that does not exist; ``@@`` ends
+the file. Only the header has the unit and the spacings.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _LENGTHS_MM = {
     **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetres"), 10.0),
     **dict.fromkeys(("in", "inch", "inches"), 25.4),
 }
-#: How Tekscan spells the units that have a spelling here; any other stays as it is.
+#: Tekscan's names of units, and ours; any other name is not changed.
 _UNITS = {"kpa": "kPa", "raw": "counts"}
 _KEY = re.compile(r"([A-Z][A-Z0-9_]*)[ \t]+(\S.*?)\s*")
 _FRAME = re.compile(r"Frame\s+(\d+)\s*(?:,\s*([^,\s]*)\s*,.*?)?")
@@ -54,11 +54,11 @@ def _is_export(path: Path) -> bool:
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
-    """Read the movie of one file, or of all in a folder, one after the other.
+    """Yield the movie of one file, or of all in a folder.
 
-    Cells that do not exist (``B``) read 0. Times are those that the frames state; where they do not, frame 1 is at 0
-    us, and a missing frame makes the time jump. The pitch is the square root of the two spacings' product, so that
-    areas hold where rows and columns are spaced differently.
+    Cells that do not exist (``B``) read 0. Times are those that the frames state; if they state none, frame 1 is at 0
+    us, and times jump at a missing frame. The pitch is the square root of the product of the two spacings, so that
+    areas are correct if rows and columns are spaced differently.
 
     Parameters
     ----------
@@ -68,11 +68,11 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     Trial
         `about` has the header, and the spacings as ``row_spacing_mm`` and ``column_spacing_mm``;
-        ``series["raw_sum"]`` is the sum that each frame of an I-Scan file states; raw cells must make it.
+        ``series["raw_sum"]`` is the sum that each frame of an I-Scan file states, which must equal that of raw cells.
 
     Raises
     ------
-    FormatError : a file that does not hold what it should (names file, line and cell)
+    FormatError : a file that breaks the format (names file, line and cell)
     """
     place = Path(arguments.path("path", path))
     paths = files(place)
@@ -152,7 +152,7 @@ class _Header:
         self._lines: dict[str, int] = {}
         for k, line in enumerate(lines, start=1):
             match = _KEY.fullmatch(line.rstrip(", \t"))
-            # Lines of comment are free: a key that comes again is one of them, or one is.
+            # Comment lines are free text, so a repeated key may be part of a comment.
             if match and match[1] in self.values and match[1] in _NEEDED and match[2] != self.values[match[1]]:
                 raise FormatError(f"{file.name}, line {k}: {match[1]} is said a second time, and differently")
             if match:
@@ -197,7 +197,7 @@ _NEEDED = {"DATA_TYPE", "ROWS", "COLS", "ROW_SPACING", "COL_SPACING", "SECONDS_P
 
 
 def _frames(file: Path, content: Sequence[str], begin: int, rows: int) -> tuple[list[int], list[int], list[str]]:
-    """Return each frame's number, the index of its line, and the time that it states ("" where none)."""
+    """Return each frame's number, the index of its line, and the time that it states ("" if none)."""
     numbers: list[int] = []
     places: list[int] = []
     stated: list[str] = []
@@ -230,7 +230,7 @@ def _frames(file: Path, content: Sequence[str], begin: int, rows: int) -> tuple[
 def _times(
     file: Path, numbers: Sequence[int], period: float, places: Sequence[int], stated: Sequence[str]
 ) -> NDArray[np.int64]:
-    """Return the frames' times, us: those that they state, where all do, else from their numbers.
+    """Return the frames' times, us: those that they state if all do, else times computed from their numbers.
 
     The two differ: a movie of 0.1 s a frame states steps of 0.1 and 0.11 s.
     """
@@ -252,10 +252,10 @@ def _times(
 
 
 def _cells(file: Path, lines: Sequence[str], first_line: int, columns: int) -> NDArray[np.str_]:
-    """Return the cells of one frame as they stand there, shape (rows, columns)."""
+    """Return the text of the cells of one frame, shape (rows, columns)."""
     rows = [[cell.strip() for cell in line.split(",")] for line in lines]
     for k, row in enumerate(rows):
-        # A spreadsheet that saves it again fills rows up to the widest line, which may be a frame's.
+        # A spreadsheet that saves the file pads all lines to the widest one, which may be that of a frame.
         while len(row) > columns and not row[-1]:
             row.pop()
         if len(row) != columns:
@@ -270,7 +270,7 @@ def _numbers(file: Path, cells: NDArray[np.str_], there: NDArray[np.bool_], firs
         if (np.abs(values) <= VALUE).all():
             return values
     except ValueError:
-        pass  # the slow way below says where
+        pass  # the slow path below names the cell
     return np.array(
         [text.number(cells[row, c], file, first_line + int(row), f"cell {c + 1}") for row, c in np.argwhere(there)]
     )

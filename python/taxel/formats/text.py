@@ -1,4 +1,4 @@
-"""Text files of instruments: lines, cells and numbers, with the place of whatever is wrong."""
+"""Text files of instruments: lines, cells and numbers; errors name file, line and column."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
 
 def lines(path: Path) -> list[str]:
-    """Read the lines of a text file, packed by gzip or not, without their ends.
+    """Read the lines of a text file, compressed by gzip or not, without line ends.
 
-    UTF-8 with or without its mark; where the bytes are not UTF-8, Latin-1, as instruments of the 1990s write.
+    The text is UTF-8 with or without BOM, or else Latin-1, which instruments of the 1990s write.
 
     Raises
     ------
@@ -63,18 +63,18 @@ def number(cell: str, path: Path, line: int, what: str) -> float:
         else:
             problem = f"is {shown(text)}, not a number" if text else "is empty, not a number"
         raise FormatError(f"{path.name}, line {line}: {what} {problem}") from None
-    # Pictures hold 32 bits.
+    # Values of pictures have 32 bits.
     if not abs(value) <= VALUE or "_" in text:
         raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number")
     return value
 
 
 def numbers(rows: Sequence[Sequence[str]], path: Path, first_line: int, names: Sequence[str]) -> NDArray[np.float64]:
-    """Read a block of numbers whose columns are called `names`; `first_line` is the file's line of the first row.
+    """Read a block of numbers with columns `names`; `first_line` is the line number of its first row.
 
     Raises
     ------
-    FormatError : a row of another length, or a cell that is no number (names file, line and column)
+    FormatError : a row of another length, or a cell that is not a number (names file, line and column)
     """
     columns = len(names)
     for k, row in enumerate(rows):
@@ -85,7 +85,7 @@ def numbers(rows: Sequence[Sequence[str]], path: Path, first_line: int, names: S
         if (np.abs(values) <= VALUE).all():
             return values
     except ValueError:
-        pass  # the slow way below says where
+        pass  # the slow path below names the cell
     return np.array(
         [[number(c, path, first_line + k, n) for c, n in zip(row, names, strict=True)] for k, row in enumerate(rows)]
     ).reshape(len(rows), columns)

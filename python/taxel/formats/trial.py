@@ -1,4 +1,4 @@
-"""A trial: what one sensor recorded once, and when things happened."""
+"""A trial: one recording of one sensor, with reference times."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from taxel.frames import Frames
 
 __all__ = ["MARGIN_US", "Trial"]
 
-#: Loaders count what is said from so long before the first reference event to so long after the last, us.
+#: Readers score detections from this time before the first reference event to this time after the last one, us.
 MARGIN_US = 100_000
 
 
@@ -23,33 +23,34 @@ MARGIN_US = 100_000
 class Trial:
     """Hold one recording of a published data set: its pictures or events, its subject, and reference times.
 
-    `taxel.open` makes a `Recording` of it; a `taxel.detect.Example` has labels and no subject, group or condition.
+    `taxel.open` returns it as a `Recording`; a `taxel.detect.Example` has labels and no subject, group or condition.
 
     Parameters
     ----------
     name : str
-        "subj003/17", "GaCo02_01 left": no two trials of a folder share it.
+        "subj003/17", "GaCo02_01 left": unique among the trials of a folder.
     person : str
     recorded : Frames or Events
-        Pictures that are missing in the file are missing here too: their times jump.
+        Pictures that are missing in the file are missing here too, so that times jump.
     truth : mapping from event to int64, shape (events,), us
-        Ascending; "contact", "heel_off", "foot_off" where the recording knows them.
+        Ascending; "contact", "heel_off", "foot_off", as far as the data set has them.
     source : str
-        Where the truth comes from, in one sentence; it stands beside every figure. "" where there is none.
+        The origin of the reference times, in one sentence, which every figure states. "" without reference times.
     foot : str
-        "left", "right", or "" where the recording does not say.
+        "left", "right", or "" if unknown.
     group : str
         "healthy", "patient", or "".
     scored : (int, int), us, optional
-        Within it the truth is complete; outside nothing may be counted as false. All of it where it is left out.
+        The interval in which reference times are complete; detections outside it are never counted as false. Default:
+        the whole trial.
     series : mapping from name to float64, shape (pictures,) or (events,), in the file's unit
-        Further columns of the file, such as the total force that the maker computed.
+        Further columns of the file, such as the total force computed by the manufacturer.
     about : mapping
-        What else is known: condition, speed, age ...
+        Other information: condition, speed, age ...
 
     Raises
     ------
-    ProblemError : truth that does not ascend, or a column of another length than the recording
+    ProblemError : reference times that do not ascend, or a column of another length than the recording
 
     Examples
     --------

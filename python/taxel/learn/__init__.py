@@ -1,4 +1,4 @@
-"""Weights from examples, in scikit-learn's manners: parameters in the constructor, `fit`, results end in `_`."""
+"""Learners with scikit-learn's interface: parameters in the constructor, `fit`, names of results end in `_`."""
 
 from taxel.learn.certificate import check_certificate as check_certificate
 from taxel.learn.chronotron import Chronotron as Chronotron
@@ -21,5 +21,5 @@ from taxel.learn.span import SPAN as SPAN
 from taxel.learn.stdp import STDP as STDP
 from taxel.learn.tempotron import Tempotron as Tempotron
 
-# The lines above are the registry: a learner is one of them.
+# The imports above are the registry of learners.
 __all__ = [name for name, held in sorted(globals().items()) if callable(held)]

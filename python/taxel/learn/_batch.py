@@ -24,18 +24,18 @@ class BatchLearner(SpikeLearner):
     """Learn spike times from all examples at once; the results of the compiled part end in ``_``."""
 
     weights_: NDArray[np.float64] = field(init=False)
-    #: Further results by name, which the compiled part reads again in `predict`.
+    #: Names of further results, which the compiled part reads in `predict`.
     _said: dict[str, Any] = field(init=False)
 
     def fit(self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> Self:
-        """Learn when to fire.
+        """Learn weights that fire the neuron at the targets and nowhere else.
 
         Parameters
         ----------
         patterns : sequence of SpikeTrains
             The same trains in each; signed ones split into ON and OFF. Of any length: a whole recording is a pattern.
         targets : sequence of float sequences, ms
-            When the learner shall fire, one list a pattern, ascending; an empty one teaches silence.
+            Target spike times, one list a pattern, ascending; empty for a pattern without spikes.
 
         Returns
         -------
@@ -44,7 +44,7 @@ class BatchLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
         self.weights_, learnt = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
@@ -54,7 +54,7 @@ class BatchLearner(SpikeLearner):
         return self
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
-        """Return when the learner fires, one array a pattern, ms.
+        """Return the learner's output spikes, one array a pattern, ms.
 
         Parameters
         ----------
@@ -67,13 +67,13 @@ class BatchLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         return self._fired(patterns, {})
 
     def _fired(self, patterns: Sequence[SpikeTrains], instead: dict[str, Any]) -> list[NDArray[np.float64]]:
-        """Return the output spikes; `instead` replaces what was learnt, by name."""
+        """Return the output spikes; `instead` replaces learnt attributes by name."""
         weights = self._fitted()
         learnt = json.dumps(self._said | instead)
         trains = [

@@ -23,15 +23,15 @@ __all__ = ["AfterSpike", "EpochLearner", "Updates", "keep"]
 AfterSpike = Literal["subtract", "membrane", "reset"]
 Updates = Literal["batch", "pattern"]
 
-#: Defaults of all rules.
+#: The defaults of all rules.
 _DEFAULT = defaults("inst")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class EpochLearner(SpikeLearner):
-    """Learn spike times by epochs: present each pattern, compare the output spikes with the targets, correct.
+    """Learn spike times in epochs: present each pattern, compare its output spikes with the targets, change weights.
 
-    Defaults are the published values of a rule; `INST`, of which all were published, documents each parameter.
+    Defaults are the published values of a rule. `INST`, whose values were all published, documents each parameter.
     """
 
     eta: float | None
@@ -55,7 +55,7 @@ class EpochLearner(SpikeLearner):
     status_: Literal["right", "epochs", "stopped"] = field(init=False)
     neuron_: Neuron | None = field(init=False)
 
-    #: Entries of `right_` before the first epoch.
+    #: Number of entries of `right_` before the first epoch.
     _LOOKS_BEFORE_THE_FIRST = 1
 
     def _plain(self) -> dict[str, Any]:
@@ -76,11 +76,11 @@ class EpochLearner(SpikeLearner):
         patterns : sequence of SpikeTrains
             The same trains in each; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
-            When the neuron shall fire, one list a pattern; an empty one teaches silence.
+            Target spike times, one list a pattern; empty for a pattern without spikes.
         start : float64, shape (trains,), mV, optional
-            First weights, instead of drawn ones.
+            Initial weights, instead of random ones.
         progress : function of (epochs done, share of patterns right), optional
-            Called after each epoch; what it raises ends the training.
+            Called after each epoch; an exception that it raises ends the training.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class EpochLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns, targets or first weights that make no sense (names pattern and target)
+        ProblemError : invalid patterns, targets or first weights (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         trains, times = examples(patterns, targets)
@@ -114,7 +114,7 @@ class EpochLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         rule, weights = self._json(), self._fitted()
@@ -124,7 +124,7 @@ class EpochLearner(SpikeLearner):
     def change(
         self, weights: ArrayLike, pattern: SpikeTrains, targets: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the change of the weights by one presentation, over the learning rate, and its output spikes.
+        """Return the change of the weights by one presentation, divided by the learning rate, and its output spikes.
 
         Parameters
         ----------
@@ -139,7 +139,7 @@ class EpochLearner(SpikeLearner):
 
         Raises
         ------
-        ProblemError : weights, a pattern or targets that make no sense
+        ProblemError : invalid weights, pattern or targets
         """
         trains = instance("pattern", pattern, SpikeTrains)._parts()
         change, spikes = _core.change_rival(
@@ -165,7 +165,7 @@ class EpochLearner(SpikeLearner):
 
 
 def keep(learner: Any, trained: tuple[Any, ...]) -> None:
-    """Set the results on the learner, then raise the exception of a Ctrl-C that came meanwhile."""
+    """Set the results on the learner, then raise the KeyboardInterrupt of a Ctrl-C during the fit."""
     weights, right, best_epoch, status, interrupt = trained
     learner.weights_, learner.right_ = weights, right
     learner.best_epoch_, learner.status_ = best_epoch, status

@@ -14,6 +14,6 @@ __all__ = ["examples"]
 
 
 def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[float64]]]:
-    """Return patterns and targets for the compiled part; refuse other types, by name."""
+    """Return patterns and targets as the compiled part reads them; refuse other types."""
     trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))]
     return trains, [floats(f"targets of pattern {p}", t, "ms") for p, t in enumerate(several("targets", targets))]

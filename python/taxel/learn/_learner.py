@@ -23,10 +23,10 @@ _DEFAULT = defaults("matching")
 
 
 class Learner(Parameters):
-    """Learn weights; results end in ``_``."""
+    """Learn weights; names of results end in ``_``."""
 
     def _fitted(self) -> NDArray[float64]:
-        """Return the weights; refuse where there are none yet."""
+        """Return the weights; raise NotFittedError before `fit`."""
         weights = getattr(self, "weights_", None)
         if weights is None:
             raise NotFittedError(f"{type(self).__name__}: not fitted yet, call fit first")
@@ -34,7 +34,7 @@ class Learner(Parameters):
 
 
 class SpikeLearner(Learner, ABC):
-    """Learn when to fire."""
+    """Learn spike times."""
 
     @abstractmethod
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
@@ -49,18 +49,18 @@ class SpikeLearner(Learner, ABC):
         ----------
         patterns : sequence of SpikeTrains
         targets : sequence of float sequences, ms
-            When the neuron shall fire, one list a pattern.
+            Target spike times, one list a pattern.
         window_ms : float, ms, 0 or more
-            How far a spike may lie from its target.
+            Largest distance of a spike from its target.
 
         Returns
         -------
         float, 0 to 1
-            F1 over all patterns, as `taxel.metrics.f1` has it.
+            F1 over all patterns, as in `taxel.metrics.f1`.
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense
+        ProblemError : invalid patterns or targets
         NotFittedError : before `fit`
         """
         _, target_times = examples(patterns, targets)

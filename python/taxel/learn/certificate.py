@@ -13,26 +13,27 @@ __all__ = ["check_certificate"]
 def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin: bool = True) -> bool:
     """Check a proof of infeasibility against the stated rows, in plain NumPy.
 
-    Every solution w has ``row @ w == limit`` at a target and ``<= limit`` else. So ``g @ w <= multipliers @ limits``,
-    where g is the sum of the rows, each times its multiplier. If even the least that ``g @ w`` can be within the bounds
-    is larger, beyond all rounding, there is no solution.
+    Every solution w satisfies ``row @ w == limit`` at a target and ``<= limit`` elsewhere. It follows that
+    ``g @ w <= multipliers @ limits``, where g is the sum of the rows, each times its multiplier. If the minimum of
+    ``g @ w`` within the bounds is larger, by more than any rounding error, there is no solution.
 
-    In continuous time a margin is above 0. Rows that cancel without it, one of silence among them, therefore prove it
-    for every margin: a pattern that shall fire where another one, the same up to there, shall be silent.
+    In continuous time a margin is above 0. Rows that cancel without a margin, at least one of silence among them,
+    therefore prove infeasibility for every margin. An example is a target in one pattern at a time at which another
+    pattern with the same inputs up to then requires silence.
 
     Parameters
     ----------
     problem : ConeXProblem
-        What was to be solved (`ConeX.problem_`).
+        The problem (`ConeX.problem_`).
     certificate : Certificate
         The proof (`ConeX.certificate_`).
     margin : bool
-        False: with margin and slope 0 in the rows, so that the proof holds for every margin.
+        Whether rows have their margin and slope; false sets both to 0, so that the proof holds for every margin.
 
     Returns
     -------
     bool
-        Whether it is one.
+        Whether the certificate is a proof.
 
     Raises
     ------

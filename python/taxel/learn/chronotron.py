@@ -16,24 +16,24 @@ _DEFAULT = defaults("chronotron")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Chronotron(EpochLearner):
-    """Learn spike times as a Chronotron: down a distance between spike trains ("E"), or by synaptic currents ("I").
+    """Learn spike times as a Chronotron: by descent of a spike train distance ("E"), or by synaptic currents ("I").
 
     Parameters
     ----------
     eta : float, above 0
         Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
     initial : (float, float), mV
-        First weights are drawn evenly between these two.
+        Range of the initial weights, which are drawn uniformly.
     epochs : int, 1 or more
-        Epochs at most.
+        Largest number of epochs.
     updates : {"batch", "pattern"}
-        Whether weights change once an epoch, or after each pattern in an order drawn anew.
+        Whether weights change once an epoch, or after each pattern in random order.
     tau, tau_s : float, ms, above 0
-        Membrane and synapse, as in `INST`; 15 and `tau` / 4 where left out (‡).
+        Membrane and synapse, as in `INST`; default: 15 and `tau` / 4 (‡).
     theta_0 : float, mV, above 0
         Threshold; has no default.
     after_spike : {"subtract", "membrane", "reset"}, optional
-        As in `INST`; "subtract" for E-learning, "membrane" for I-learning, where left out.
+        As in `INST`; default: "subtract" for E-learning, "membrane" for I-learning.
     step_ms, within_ms : float, ms, above 0
     until_right : bool
     seed : int, 0 or more
@@ -42,10 +42,10 @@ class Chronotron(EpochLearner):
     rule : {"E", "I"}
         E-learning or I-learning.
     tau_q : float, ms, above 0, optional
-        E-learning: a move over `dt` costs ``(dt / tau_q)**2 / 2``, to add or to remove a spike 1; `tau` where left
-        out (‡).
+        E-learning: moving a spike by `dt` costs ``(dt / tau_q)**2 / 2``, adding or removing one costs 1; default: `tau`
+        (‡).
     gamma_r : float, ms, above 0, optional
-        E-learning: weight of the moves; `tau_q` where left out (‡).
+        E-learning: weight of the moves; default: `tau_q` (‡).
 
     Attributes
     ----------
@@ -54,22 +54,21 @@ class Chronotron(EpochLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    E-learning splits the way from the output train to the targets into spikes added, removed and moved, at
-    least cost (ties: remove, add, move), and ``change`` is the sum over added targets of ``L(t)``, less that over
-    removed spikes, plus ``gamma_r / tau_q**2`` times the sum over moves of ``(t - target) L(t)``; `L` is the
-    potential that an input makes. A late spike raises weights. Read in public codes (Tempotrons.jl 8329a17, whose
-    defaults are marked (‡), and nircaf/Chronotron 7781434), as was the reset.
+    E-learning transforms the output train into the targets by adding, removing and moving spikes at least cost (ties:
+    remove, add, move), and ``change`` is the sum over added targets of ``L(t)``, less that over removed spikes, plus
+    ``gamma_r / tau_q**2`` times the sum over moves of ``(t - target) L(t)``; `L` is the potential of an input. A late
+    spike raises weights. The rule and the reset follow public code (Tempotrons.jl 8329a17, whose defaults are marked
+    (‡), and nircaf/Chronotron 7781434).
 
     I-learning: ``change`` is the current ``exp(-s/tau_s)`` of earlier inputs at the targets, less that at output
-    spikes, with the sign of the weight. That changes go by the current was read in the paper's abstract; the sign is
-    a reading of ours.
+    spikes, with the sign of the weight. The use of the current follows the paper's abstract; the sign is our reading.
 
     Florian, PLoS ONE 7(8), e40233, 2012. Learning rates, thresholds, first weights and epochs behind its loads .22
-    and .02 could not be read: the caller gives them. Figure 7 trains one target at 100 ms for 400 epochs.
+    and .02 were not accessible, so the caller sets them. Figure 7 trains one target at 100 ms for 400 epochs.
 
     Examples
     --------

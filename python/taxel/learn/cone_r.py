@@ -1,4 +1,4 @@
-"""CONE-R: the best weights where no weights satisfy all targets and all silence."""
+"""CONE-R: the best weights when no weights satisfy all targets and all silence."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ __all__ = ["ConeR", "ConeRProblem"]
 
 
 _DEFAULT = defaults("cone_r")
-#: Trains with spikes that can be weighed: 1.6 GB of curvature, and half a minute a step.
+#: The most trains with spikes in a fit: their Hessian needs 1.6 GB, and a step half a minute.
 _MOST_TRAINS = 10_000
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ConeR(SpikeLearner):
-    """Learn weights by CONE-R: minimise norms, missed lift behind targets, missed targets and broken silence.
+    """Learn weights by CONE-R: minimise norms, lack of potential after targets, missed targets and violated silence.
 
     The defaults are those of Tables 6.1 and 6.2. The neuron runs on a grid, as 6.13 is a sum over grid points; targets
     keep their true times.
@@ -38,32 +38,32 @@ class ConeR(SpikeLearner):
     Parameters
     ----------
     neuron : Neuron, optional
-        The neuron to be trained; ``Neuron()`` where it is left out. Whatever its `time`, it is trained on the grid of
-        its `step_ms`, which is also the step of the silent rows.
+        The neuron to be trained; default: ``Neuron()``. Whatever its `time`, it is trained on the grid of its
+        `step_ms`, which is also the step of the silent rows.
     kappa : float, above 0
-        The potential that B aims at behind a target, in thresholds.
+        The potential after a target that the term B requires, in thresholds.
     delta_t_ms : float, ms, 0 or more, optional
-        Delay of that after the target; ``0.1 * tau`` where left out.
+        Delay of that potential after the target; default: ``0.1 * tau``.
     lambdas : five floats, 0 or more
-        Shares of l1, l2, B, C, D in the objective; only their ratios matter.
+        Weights of l1, l2, B, C, D in the objective; only their ratios matter.
     lb, ub : float, or float sequence of shape (trains,), mV
         Least and largest weight, for all synapses or one a synapse. All normalisers are computed at
         ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``, synapse by synapse.
     divide_b_by : {"B_max", "targets"}
-        B over its largest value, as printed, or over the number of targets.
+        Divisor of B: its largest value, as printed, or the number of targets.
     norm : {"norm", "square"}
         The l2 term as printed, or squared.
     margin : float, mV, 0 or more
-        How far below the threshold silence shall stay.
+        Distance below the threshold that silence requires.
     horizon : float, ms, optional
-        Where silent rows end; the later of the pattern's stop and its last target + `tau` where left out.
+        End of the silent rows; default: the later of the pattern's stop and its last target + `tau`.
     tolerance : float, from 1e-10 to 0.1
         The proven relative gap at which a fit counts as solved.
     engine : {"native", "cone solver"}
-        "native": Newton steps on the few rows near threshold; where their result cannot be proven, the cone solver goes
-        on from it. "cone solver": row generation around Clarabel from the start, slower by far.
+        "native": Newton steps on the few rows near threshold; if their result cannot be proven, the cone solver
+        continues from it. "cone solver": row generation around Clarabel from the start, much slower.
     max_seconds : float, s, above 0, optional
-        After so long a fit ends with the best so far, and what is proven of it.
+        Time limit of a fit, which then ends with the best weights so far and their proven gap.
 
     Attributes
     ----------
@@ -73,9 +73,9 @@ class ConeR(SpikeLearner):
     parts_ : dict of float
         Its terms "l1", "l2", "B", "C", "D", weighted and normalised: their sum is the objective.
     gap_ : float
-        How far, relative to it, the objective can lie above the least one: a proven bound.
+        A proven bound of the distance of the objective from its minimum, relative to the objective.
     status_ : {"solved", "stopped"}
-        "stopped": the gap is above `tolerance`, as `max_seconds` or Ctrl-C ended the fit, or nothing closed it.
+        "stopped": the gap is above `tolerance`, as `max_seconds` or Ctrl-C ended the fit, or neither engine closed it.
     engine_ : {"native", "cone solver"}
         Which engine found these weights: "cone solver" also where the native engine's result could not be proven.
     rounds_, rows_ : int
@@ -83,24 +83,24 @@ class ConeR(SpikeLearner):
     silent_rows_ : int
         Rows of 6.13.
     unreachable_ : list of (pattern, target)
-        Targets that no weights within the bounds bring to the threshold; the rest is fitted.
+        Targets at which no weights within the bounds reach the threshold; the other targets are fitted.
     refires_ : int
         Output spikes on the training patterns within `tau` of another one, with no target between.
     neuron_ : Neuron
-        The neuron that the weights are for: a copy with ``time="grid"``.
+        The trained neuron: a copy with ``time="grid"``.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
     Thesis 6.3.3, equations 6.12 to 6.14. Solved by a proximal augmented Lagrangian with semismooth Newton steps, in
-    which only rows near threshold are ever written out, or by row generation around the cone solver Clarabel. The gap
-    is computed apart from either, over all rows. A target that the optimum meets is met to 1e-12 mV, within which a
-    neuron fires (both at `theta_0` 0.3 mV, in proportion elsewhere), and a silent row that it touches stays 1e-9 of
-    `theta_0` below its limit, as far as the objective stays within the tolerance. Choices that the thesis leaves open
-    stand on the page *Readings*.
+    which only rows near threshold are computed, or by row generation around the cone solver Clarabel. The gap is
+    computed independently of both, over all rows. A target that the optimum meets is met to 1e-12 mV, the tolerance
+    within which a neuron fires (both for a `theta_0` of 0.3 mV, else in proportion), and an active silent row stays
+    1e-9 of `theta_0` below its limit, as far as the objective stays within the tolerance. The page *Readings* lists the
+    choices that the thesis leaves open.
 
     Examples
     --------
@@ -158,10 +158,10 @@ class ConeR(SpikeLearner):
         patterns : sequence of SpikeTrains
             The same trains in each; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
-            When the neuron shall fire, one list a pattern; an empty one teaches silence.
+            Target spike times, one list a pattern; empty for a pattern without spikes.
         start : ConeR, or float64 of shape (trains,), mV, optional
-            A similar fit (other `lambdas`, other `kappa`), or its weights: the closer, the quicker. The result is the
-            same. Of a fit to the same rows the multipliers help as well.
+            A similar fit (other `lambdas`, other `kappa`), or its weights, as the starting point; it changes the run
+            time, not the result. The multipliers of a fit to the same rows are used too.
         progress : function of (round, rows, objective, gap), optional
             Called after each round.
 
@@ -172,18 +172,19 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
 
         Warns
         -----
-        UserWarning : targets out of reach; a neuron that fires again and again after its own spikes; a gap left open
+        UserWarning : unreachable targets; a neuron that fires repeatedly after its own spikes; a gap above the
+        tolerance
         """
         self.prepare(patterns, targets).fit(self, start=start, progress=progress)
         return self
 
     def prepare(self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> ConeRProblem:
-        """Lay out the rows of these examples, to be fitted with many `lambdas`, `kappa`, bounds and divisors.
+        """Compute the rows of these examples, for fits with different `lambdas`, `kappa`, bounds and divisors.
 
         Parameters
         ----------
@@ -197,7 +198,7 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target), or more than 10 000 trains
+        ProblemError : invalid patterns or targets (names pattern and target), or more than 10 000 trains
             with spikes
         """
         return ConeRProblem(self, patterns, targets)
@@ -216,7 +217,7 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         return predicted(self, patterns)
@@ -236,7 +237,7 @@ class ConeRProblem:
     Parameters
     ----------
     cone : ConeR
-        The learner whose neuron, margin and horizon state the rows.
+        The learner whose neuron, margin and horizon define the rows.
     patterns : sequence of SpikeTrains
     targets : sequence of float sequences, ms
         As in `ConeR.fit`.
@@ -244,7 +245,7 @@ class ConeRProblem:
     Attributes
     ----------
     silent_rows : int
-        Rows that demand silence.
+        Number of rows that require silence.
 
     Raises
     ------
@@ -271,7 +272,7 @@ class ConeRProblem:
         self.silent_rows: int = self._problem.silent_rows
 
     def _handed(self, cone: ConeR) -> tuple[str, NDArray[np.float64]]:
-        """Return a learner's parameters for the trains that are weighed, and the largest weights of the others."""
+        """Return a learner's parameters for the trains in the fit, and the largest weights of the others."""
         if self._counted is None:
             return cone._json(), np.zeros(0)
         cone._check()
@@ -306,7 +307,7 @@ class ConeRProblem:
         Parameters
         ----------
         cone : ConeR
-            May differ from the one that laid out the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `norm`,
+            May differ from the learner of the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `norm`,
             `tolerance`, `engine` and `max_seconds`.
         start : ConeR, or float64 of shape (trains,), mV, optional
         progress : function of (round, rows, objective, gap), optional
@@ -352,7 +353,7 @@ class ConeRProblem:
 
 
 def _weighed(name: str, count: int, what: str) -> None:
-    """Refuse more trains than can be weighed."""
+    """Refuse more trains than a fit can have."""
     if count > _MOST_TRAINS:
         raise ProblemError(
             f"{name}: {count} {what}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
@@ -361,9 +362,9 @@ def _weighed(name: str, count: int, what: str) -> None:
 
 
 def _counted(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] | None:
-    """Return the trains with a spike in some pattern, or with bounds away from 0; None where these are all trains.
+    """Return the trains with a spike in some pattern, or with bounds that exclude 0; None if these are all trains.
 
-    The weight of any other is 0 whatever else is learnt, and of a whole array's trains nearly all are such.
+    The weight of any other train is 0 in every solution, and nearly all trains of a whole array are of this kind.
     """
     if len({len(parts[1]) for parts in trains}) != 1:
         return None

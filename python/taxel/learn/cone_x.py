@@ -28,11 +28,11 @@ class Row(NamedTuple):
     Parameters
     ----------
     kind : {"target", "silence", "slope"}
-        The potential at a target equals the threshold (6.9a); it stays below at a time (6.9b); it comes up to a target
-        from below.
+        The potential at a target equals the threshold (6.9a); it stays below the threshold at a time (6.9b); it reaches
+        a target from below.
     pattern : int, 0 or more
     at : int, 0 or more, or float, ms
-        The number of the target in its pattern; of a row of silence, its time.
+        The number of the target in its pattern; the time of a row of silence.
 
     Examples
     --------
@@ -54,12 +54,11 @@ class Certificate:
     rows : list of Row
     multipliers : float64, shape (rows,), of any sign at targets, else 0 or more
     gap : float, mV
-        By how much the bounds fail what the rows demand.
+        The difference between the requirement of the rows and the most that the bounds allow.
     at_all : bool
-        Whether it also holds with margin and slope 0 in its rows: then the problem is impossible at all, not only with
-        this margin.
+        Whether it also holds with margin and slope 0 in its rows: then the problem is infeasible for every margin.
     text : str
-        Which patterns, which targets, which silences conflict.
+        Description of the conflicting patterns, targets and silences.
 
     Examples
     --------
@@ -82,14 +81,14 @@ class Certificate:
 
 
 class Margin(NamedTuple):
-    """Hold how far below the threshold silence stays.
+    """Hold the distance below the threshold that silence keeps.
 
     Parameters
     ----------
     mv : float, mV
-        Away from targets.
+        Distance away from targets.
     slope : float, mV/ms
-        How steeply that falls to 0 at a target; 0 on the grid, where nothing tapers.
+        Slope with which the distance falls to 0 at a target; 0 on the grid, where it is constant.
     """
 
     mv: float
@@ -101,7 +100,7 @@ _DEFAULT = defaults("cone_x")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ConeX(SpikeLearner):
-    """Learn weights by CONE-X: exact at every target, silent elsewhere, with the least norms and missed lift.
+    """Learn weights by CONE-X: exact at every target, silent elsewhere, with least norms and lack of potential.
 
     In continuous time (the default) silence holds at every instant. On the grid it is the thesis' problem 6.11, which
     requires silence at 1 ms points only: most such weights fire early or once more between them.
@@ -109,36 +108,35 @@ class ConeX(SpikeLearner):
     Parameters
     ----------
     neuron : Neuron, optional
-        The neuron to be trained; ``Neuron()`` where it is left out. With its ``time="grid"`` its `step_ms` is also the
-        step of the silent rows.
+        The neuron to be trained; default: ``Neuron()``. With ``time="grid"`` its `step_ms` is also the step of the
+        silent rows.
     kappa : float, above 0
-        The potential that B aims at behind a target, in thresholds.
+        The potential after a target that the term B requires, in thresholds.
     delta_t_ms : float, ms, 0 or more, optional
-        Delay of that after the target; ``0.1 * tau`` where left out.
+        Delay of that potential after the target; default: ``0.1 * tau``.
     lambdas : three floats, 0 or more
-        Shares of l1, l2, B in the objective; only their ratios matter. All 0: any weights will do.
+        Weights of l1, l2, B in the objective; only their ratios matter. All 0: any feasible weights.
     lb, ub : float or float64 of shape (trains,), mV
         Least and largest weight, finite. All normalisers are computed at ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``.
     divide_b_by : {"B_max", "targets"}
-        B over its largest value, as printed, or over the number of targets.
+        Divisor of B: its largest value, as printed, or the number of targets.
     norm : {"norm", "square"}
         The l2 term as printed, or squared.
     margin : float, mV, 0 or more, optional
-        How far below the threshold silence shall stay; where left out ``theta_0 / 300`` (1e-3 by default) in
-        continuous time, 0 on the grid. Where neither it nor `slope` is given and no weights keep it, in continuous time
-        a tenth, a hundredth and a thousandth of both are tried (`problem_.margin` is the last), so that
-        "infeasible" holds for any margin (``certificate_.at_all``); with one that is given it holds for that one. On
-        the grid the best weights touch the threshold at many points, and a neuron that is run on the grid fires where
-        it is touched: ask for 1e-9 or more.
+        Distance below the threshold that silence requires; default: ``theta_0 / 300`` (1e-3 mV for the default neuron)
+        in continuous time, 0 on the grid. If neither it nor `slope` is given and no weights keep it, in continuous time
+        a tenth, a hundredth and a thousandth of both are tried (`problem_.margin` is the last one), so that
+        "infeasible" holds for any margin (``certificate_.at_all``); a given margin is used as it is. On the grid the
+        best weights reach the threshold at many points, and a neuron on the grid fires there: set 1e-9 or more.
     slope : float, mV/ms, 0 or more, optional
-        How steeply that margin falls to 0 at a target, and how much steeper than the threshold the potential comes up
-        there; ``theta_0 / 300`` a ms where left out. Continuous time only.
+        Slope with which that margin falls to 0 at a target, and by which the potential rises more steeply than the
+        threshold there; default: ``theta_0 / 300`` a ms. Continuous time only.
     horizon : float or float64 of shape (patterns,), ms, optional
-        Where silence ends; the later of a pattern's stop and its last target + `tau` where left out.
+        End of the required silence; default: the later of a pattern's stop and its last target + `tau`.
     tolerance : float, from 1e-12 to 0.1
         The proven relative gap at which the search ends.
     max_seconds : float, s, above 0, optional
-        After so long a fit ends with the best so far.
+        Time limit of a fit, which then ends with the best weights so far.
 
     Attributes
     ----------
@@ -146,47 +144,48 @@ class ConeX(SpikeLearner):
         "solved": silence keeps at least half its margin, and the neuron, run on the patterns, fires within 1e-6 ms of
         every target and nowhere else (on the grid: every target row is met to 1e-12 mV, in proportion where theta_0 is
         not 0.3 mV). Unless the search ended early (`reason_`), no weights that keep the whole margin have an objective
-        smaller by more than `tolerance` of it, or by more than 1e-10 of what B is without weights. "infeasible":
+        smaller by more than `tolerance` of it, or by more than 1e-10 of the value of B for zero weights. "infeasible":
         `certificate_` proves it. "stopped": neither is known.
     weights_ : float64, shape (trains,), mV
-        The best so far where stopped; NaN where infeasible.
+        The best so far if stopped; NaN if infeasible.
     objective_ : float
-        6.11 at these weights; infinite where infeasible.
+        6.11 at these weights; infinite if infeasible.
     parts_ : dict
         Its terms: l1, l2, B.
     gap_ : float
-        How far, relative to it, the objective can lie above the least one over all weights that keep the whole margin:
-        a proven bound, independent of the engine. (In continuous time these weights keep `margin_`, a little less.)
+        A proven bound of the distance of the objective from its minimum over all weights that keep the whole margin,
+        relative to the objective and independent of the engine. (In continuous time these weights keep `margin_`, which
+        is slightly smaller.)
     margin_ : Margin
         The margin that holds, at least half of that of the problem (`problem_.margin`); on the grid, as `mv`, the least
         threshold - potential over the silent points.
     reason_ : str or None
-        Where stopped: the row that is violated or the spike that is wrong, with its pattern and time. Where solved:
-        None, or why `gap_` is above `tolerance`: `max_seconds` or Ctrl-C ended the search, or rounding did.
+        If stopped: the violated row or the wrong spike, with its pattern and time. If solved: None, or why `gap_` is
+        above `tolerance`: the search was ended by `max_seconds`, Ctrl-C or rounding.
     violation_ : float, mV
-        How far the worst row is broken: targets missed, silence with half its margin.
+        The largest violation of a row: of a target, or of silence with half its margin.
     engine_ : {"native", "cone solver"}
-        Which engine closed the gap: taxel's own, or row generation around Clarabel where the own one did not.
+        The engine that closed the gap: taxel's own, or row generation around Clarabel if the own one did not.
     certificate_ : Certificate or None
-        The proof, where infeasible.
+        The proof, if infeasible.
     problem_ : ConeXProblem
-        The problem, which states its rows one by one.
+        The problem, which returns its rows one by one.
     rounds_ : int
         Rounds of row generation.
     held_ : list of (Row, float)
-        The rows that bind, with their multipliers.
+        The active rows, with their multipliers.
     neuron_ : Neuron
-        The neuron that the weights are for.
+        The trained neuron.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    Thesis 6.3.2, equations 6.9 to 6.11. Silence is priced over all patterns by recursion; what binds goes to a dual
-    active set (Goldfarb and Idnani 1983), which also gives the proof. Cost: about 2.5 `trains` steps of O(rows^2).
-    Choices that the thesis leaves open stand on the page *Readings*.
+    Thesis 6.3.2, equations 6.9 to 6.11. Violations of silence are found over all patterns by recursion; the violated
+    rows go to a dual active-set method (Goldfarb and Idnani 1983), which also returns the proof. Cost: about 2.5
+    `trains` steps of O(rows^2). The page *Readings* lists the choices that the thesis leaves open.
 
     Examples
     --------
@@ -237,19 +236,19 @@ class ConeX(SpikeLearner):
         start: ConeX | None = None,
         progress: Callable[[int, int, int, float], object] | None = None,
     ) -> Self:
-        """Find the weights, or the proof that there are none.
+        """Find the weights, or a proof that there are none.
 
         Parameters
         ----------
         patterns : sequence of SpikeTrains
             The same trains in each; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
-            When the neuron shall fire, one list a pattern; an empty one teaches silence.
+            Target spike times, one list a pattern; empty for a pattern without spikes.
         start : ConeX, optional
-            An earlier fit of a similar problem: its rows and multipliers are where this one begins. The result is the
-            same; in continuous time but for the share of the margin that is left open (`margin_`).
+            An earlier fit of a similar problem, whose active rows and multipliers are the starting point. The result is
+            the same; in continuous time `margin_` may differ.
         progress : function of (round, rows, broken, objective), optional
-            Called after each round; `broken` counts the stretches of time in which silence is broken.
+            Called after each round; `broken` is the number of intervals in which silence is violated.
 
         Returns
         -------
@@ -258,7 +257,7 @@ class ConeX(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         if progress is not None:
@@ -306,19 +305,19 @@ class ConeX(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         return predicted(self, patterns)
 
 
 class ConeXProblem:
-    """State the rows of a problem one by one, by pattern and time; never all of them at once.
+    """Return the rows of a problem one by one, by pattern and time; never all of them at once.
 
     Parameters
     ----------
     cone : ConeX
-        The learner whose parameters state the problem.
+        The learner whose parameters define the problem.
     patterns : sequence of SpikeTrains
     targets : sequence of float sequences, ms
         As in `ConeX.fit`.
@@ -329,7 +328,7 @@ class ConeXProblem:
     targets : list of float64, ms
         One array a pattern.
     margin : Margin
-        How far below the threshold its rows keep silence.
+        The distance below the threshold that its rows of silence require.
 
     Raises
     ------
@@ -369,13 +368,13 @@ class ConeXProblem:
         self._with_margin(state["margin"])
 
     def row(self, row: Row | tuple[str, int, float], *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
-        """State a row by its name: ``coefficients @ w == limit`` at a target, ``<= limit`` else.
+        """Return the row of this name: ``coefficients @ w == limit`` at a target, else ``<= limit``.
 
         Parameters
         ----------
         row : Row, or (kind, pattern, at)
         margin : bool
-            False: with margin and slope 0.
+            Whether the row has its margin and slope; false sets both to 0.
 
         Returns
         -------
@@ -397,7 +396,7 @@ class ConeXProblem:
         return self._problem.row(name, flag("margin", margin))
 
     def target(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
-        """State the row of a target (6.9a): the coefficients of the potential there, which equals the threshold.
+        """Return the row of a target (6.9a): the coefficients of the potential, which must equal the threshold.
 
         Parameters
         ----------
@@ -415,14 +414,14 @@ class ConeXProblem:
         return self.row(("target", pattern, whole("target", target, 0)))
 
     def silence(self, pattern: int, t: float, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
-        """State the row of silence at a time (6.9b): coefficients of the potential, and its limit.
+        """Return the row of silence at a time (6.9b): coefficients of the potential, and its limit.
 
         Parameters
         ----------
         pattern : int, 0 or more
         t : float, ms
         margin : bool
-            False: with margin 0.
+            Whether the limit has its margin; false sets it to 0.
 
         Returns
         -------
@@ -444,13 +443,13 @@ class ConeXProblem:
         return self.row(("silence", pattern, t), margin=margin)
 
     def slope(self, pattern: int, target: int, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
-        """State the row of the slope at a target, where the potential rises to the threshold (continuous time only).
+        """Return the row of the slope at a target, where the potential rises to the threshold (continuous time only).
 
         Parameters
         ----------
         pattern, target : int, 0 or more
         margin : bool
-            False: with slope 0.
+            Whether the limit has its slope; false sets it to 0.
 
         Returns
         -------
@@ -466,7 +465,7 @@ class ConeXProblem:
         return self.row(("slope", pattern, whole("target", target, 0)), margin=margin)
 
     def behind(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
-        """State the row of B behind a target (6.10): the coefficients of the potential, and the value that it aims at.
+        """Return the row of B after a target (6.10): the coefficients of the potential, and the required value.
 
         Parameters
         ----------

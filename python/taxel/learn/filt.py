@@ -41,14 +41,14 @@ class FILT(INST):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    An input counts, `s` ms before a spike, by ``eps_0 (C_m exp(-s/tau) - C_s exp(-s/tau_s))``, and after it by
-    ``eps_0 (C_m - C_s) exp(s/tau_q)``, with ``C = tau / (tau + tau_q)``. Values marked (†) were read in the paper:
-    Gardner and Grüning, "Supervised learning in spiking neural networks for precise temporal encoding", PLoS ONE
-    11(8), e0161335, 2016.
+    The contribution of an input `s` ms before a spike is ``eps_0 (C_m exp(-s/tau) - C_s exp(-s/tau_s))``, and after it
+    ``eps_0 (C_m - C_s) exp(s/tau_q)``, with ``C = tau / (tau + tau_q)``. Values marked (†) are from the paper: Gardner
+    and Grüning, "Supervised learning in spiking neural networks for precise temporal encoding", PLoS ONE 11(8),
+    e0161335, 2016.
 
     Examples
     --------

@@ -22,11 +22,11 @@ class FP(EpochLearner):
     eta : float, above 0
         Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
     initial : (float, float), mV
-        First weights are drawn evenly between these two.
+        Range of the initial weights, which are drawn uniformly.
     epochs : int, 1 or more
-        Epochs at most.
+        Largest number of epochs.
     updates : {"batch", "pattern"}
-        Whether weights change once an epoch, or after each pattern in an order drawn anew.
+        Whether weights change once an epoch, or after each pattern in random order.
     tau, tau_s : float, ms, above 0
         Membrane and synapse, as in `INST`; neither has a default.
     theta_0 : float, mV, above 0
@@ -39,7 +39,7 @@ class FP(EpochLearner):
     max_seconds : float, s, above 0, optional
         As in `INST`, from `step_ms` on.
     window_ms : float, ms, above 0
-        How far from its target an output spike may lie; has no default.
+        Largest distance of an output spike from its target; has no default.
 
     Attributes
     ----------
@@ -48,16 +48,15 @@ class FP(EpochLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    An output spike outside every target's window, or a second one in it, lowers by the potential that each
-    input makes at its time; a target whose window ends without a spike raises by the potential at the window's end.
-    With `after_spike` "reset" inputs before the last output spike count for nothing. Memmesheimer, Rubin, Ölveczky
-    and Sompolinsky, Neuron 82:925, 2014: that only the first error counts was read in Gardner and Grüning (2016);
-    where an error is corrected is a reading of ours, and the paper's constants could not be read: the caller gives
-    them.
+    An output spike outside every target's window, or a second one in a window, lowers each weight by the potential of
+    its inputs at that time; a target whose window ends without a spike raises it by the potential at the window's end.
+    With `after_spike` "reset" inputs before the last output spike have no effect. Memmesheimer, Rubin, Ölveczky and
+    Sompolinsky, Neuron 82:925, 2014. The use of only the first error follows Gardner and Grüning (2016); the time at
+    which an error is corrected is our reading. The paper's constants were not accessible, so the caller sets them.
 
     Examples
     --------

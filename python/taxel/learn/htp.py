@@ -15,18 +15,18 @@ _DEFAULT = defaults("htp")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class HTP(EpochLearner):
-    """Learn spike times by HTP: output spikes are forced at the targets, and a perceptron mends what is broken.
+    """Learn spike times by HTP: output spikes are forced at the targets, and a perceptron corrects violated rows.
 
     Parameters
     ----------
     eta : float, above 0
         Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
     initial : (float, float), mV
-        First weights are drawn evenly between these two.
+        Range of the initial weights, which are drawn uniformly.
     epochs : int, 1 or more
-        Epochs at most.
+        Largest number of epochs.
     updates : {"batch", "pattern"}
-        Whether weights change once an epoch, or after each pattern in an order drawn anew.
+        Whether weights change once an epoch, or after each pattern in random order.
     tau, tau_s : float, ms, above 0
         Membrane and synapse, as in `INST`; neither has a default.
     theta_0 : float, mV, above 0
@@ -39,7 +39,7 @@ class HTP(EpochLearner):
     max_seconds : float, s, above 0, optional
         As in `INST`, from `step_ms` on.
     window_ms : float, ms, 0 or more
-        How long before a target the potential may reach the threshold; has no default.
+        Time before a target in which the potential may reach the threshold; has no default.
 
     Attributes
     ----------
@@ -48,17 +48,17 @@ class HTP(EpochLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    The potential, with resets at the targets, shall reach the threshold at each target and stay below it at every
-    other grid point, but for the last `window_ms` before a target. A missed target raises by the potential that each
-    input makes there; every stretch above the threshold lowers by that at its peak. With `after_spike` "reset" and no
-    window these are the rows of `ConeX` without bounds, refractory time and threshold rise. Memmesheimer, Rubin,
-    Ölveczky and Sompolinsky, Neuron 82:925, 2014: the forced spikes were read in Gardner and Grüning (2016); which
-    rows are corrected, and where, is a reading of ours, and the paper's constants could not be read: the caller gives
-    them.
+    The potential, with resets at the targets, must reach the threshold at each target and stay below it at every other
+    grid point, except in the last `window_ms` before a target. A missed target raises each weight by the potential of
+    its inputs at the target; every interval above the threshold lowers it by that at the peak. With `after_spike`
+    "reset" and no window these are the rows of `ConeX` without bounds, refractory time and threshold rise.
+    Memmesheimer, Rubin, Ölveczky and Sompolinsky, Neuron 82:925, 2014. The forced spikes follow Gardner and Grüning
+    (2016); which rows are corrected, and at which times, is our reading. The paper's constants were not accessible, so
+    the caller sets them.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""CONE-R as data arrives: a sliding window of patterns."""
+"""Online CONE-R: a sliding window of patterns."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _DEFAULT = defaults("online_cone_r")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class OnlineConeR(ConeR):
-    """Learn weights by CONE-R as patterns arrive: each is added to a sliding window, which the oldest leaves.
+    """Learn weights by CONE-R online: each new pattern is added to a sliding window, and the oldest is removed.
 
-    After each pattern the weights are those of a fit to the whole window, to the same proven gap, in a fraction of its
-    time: rows are laid out once, and the solver starts from the fit before.
+    After each pattern the weights are those of a fit to the whole window, with the same proven gap, in a fraction of
+    the time: the rows of a pattern are computed once, and the solver starts from the previous fit.
 
     Parameters
     ----------
@@ -46,24 +46,24 @@ class OnlineConeR(ConeR):
     max_seconds : float, s, above 0, optional
         All up to here as in `ConeR`.
     window : int, 1 or more
-        How many patterns the window holds.
+        Largest number of patterns in the window.
 
     Attributes
     ----------
     patterns_ : int
-        How many patterns the window holds now.
+        Current number of patterns in the window.
     weights_, objective_, parts_, gap_, status_, engine_, rounds_, rows_, silent_rows_, unreachable_, neuron_
-        Of the last fit, as in `ConeR`; patterns are counted from the oldest in the window.
+        Results of the last fit, as in `ConeR`; patterns are counted from the oldest in the window.
     refires_ : int
-        On the newest pattern alone.
+        As in `ConeR`, for the newest pattern only.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    The thesis names it as a limit of CONE that it cannot learn on line, and suggests a sliding window (chapter 6).
+    The thesis names the lack of online learning as a limit of CONE, and suggests a sliding window (chapter 6).
 
     Examples
     --------
@@ -82,7 +82,7 @@ class OnlineConeR(ConeR):
 
     patterns_: int = field(init=False)
 
-    #: Parameters and patterns of the window, from which a copy or a pickle is built.
+    #: Parameters and patterns of the window, from which a copy or a pickle is restored.
     _begun: str = field(init=False)
     _held: deque[tuple[Any, Any]] = field(init=False)
     _stream: _core.OnlineConeR = field(init=False)
@@ -95,7 +95,7 @@ class OnlineConeR(ConeR):
         pattern : SpikeTrains
             The same trains as in all patterns before.
         targets : float sequence, ms
-            When the neuron shall fire; an empty one teaches silence.
+            Target spike times; empty for a pattern without spikes.
 
         Returns
         -------
@@ -104,9 +104,9 @@ class OnlineConeR(ConeR):
 
         Raises
         ------
-        ProblemError : a pattern or targets that make no sense (names them, counted from the first that ever came); the
-            window is then as before
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the pattern is in the window, the weights are the
+        ProblemError : an invalid pattern or invalid targets (names them, counted from the first pattern ever added);
+        the window is then unchanged KeyboardInterrupt : Ctrl-C, within a fraction of a second; the pattern is in the
+        window, the weights are the
             best so far
 
         Warns
@@ -127,7 +127,7 @@ class OnlineConeR(ConeR):
         start: ConeR | ArrayLike | None = None,
         progress: Callable[[int, int, float, float], object] | None = None,
     ) -> Self:
-        """Empty the window, add these patterns (the last of them stay), and fit once.
+        """Empty the window, add the last of these patterns that it can hold, and fit once.
 
         Parameters
         ----------
@@ -136,7 +136,7 @@ class OnlineConeR(ConeR):
             As in `ConeR.fit`.
         start : ConeR, or float64 of shape (trains,), mV, refused
         progress : function, refused
-            A window starts from its own last fit, and reports no rounds.
+            A window starts from its own last fit, and does not report rounds.
 
         Returns
         -------
@@ -145,7 +145,7 @@ class OnlineConeR(ConeR):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         """
         if start is not None:
             raise ProblemError("start: a window starts from its own last fit")

@@ -15,27 +15,27 @@ _DEFAULT = defaults("psd")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class PSD(EpochLearner):
-    """Learn spike times by PSD: inputs count by the current that they make at targets less that at output spikes.
+    """Learn spike times by PSD: weights change by the current of inputs at targets less that at output spikes.
 
     Parameters
     ----------
     eta : float, above 0
         Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
     initial : (float, float), mV
-        First weights are drawn evenly between these two.
+        Range of the initial weights, which are drawn uniformly.
     epochs : int, 1 or more
-        Epochs at most.
+        Largest number of epochs.
     updates : {"batch", "pattern"}
-        Whether weights change once an epoch, or after each pattern in an order drawn anew.
+        Whether weights change once an epoch, or after each pattern in random order.
     tau : float, ms, above 0
         Membrane (‡).
     tau_s : float, ms, above 0 and below `tau`, optional
-        Where given, the neuron is that of `INST`, driven by a current ``exp(-s/tau_s)`` whose potential peaks at 1 mV,
-        and the rule's current serves the rule alone.
+        If given, the neuron is that of `INST`, driven by a current ``exp(-s/tau_s)`` whose potential has a peak of 1
+        mV, and the current of `tau_1` and `tau_2` is used by the rule only.
     theta_0 : float, mV, above 0
         Threshold; has no default.
     after_spike : {"subtract", "membrane", "reset"}
-        As in `INST`; leaky integrate and fire ("membrane") was used.
+        As in `INST`; the paper used leaky integrate and fire ("membrane").
     step_ms, within_ms : float, ms, above 0
     until_right : bool
     seed : int, 0 or more
@@ -45,7 +45,7 @@ class PSD(EpochLearner):
         Slow and fast time constant of the current ``V0 (exp(-s/tau_1) - exp(-s/tau_2))``, peak 1, which the membrane
         filters once more, over 1 MOhm (‡).
     refractory : float, ms, 0 or more
-        How long the membrane stays at 0 after a spike; with "membrane" alone.
+        Time at which the membrane stays at 0 after a spike; with "membrane" only.
 
     Attributes
     ----------
@@ -54,14 +54,14 @@ class PSD(EpochLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
     ``change`` is the sum over targets of the current of earlier inputs, less the same over output spikes: Yu,
-    Tang, Tan and Li, PLoS ONE 8(11), e78318, 2013. Values marked (‡), and the step, were read in public MATLAB code
-    of the field (Zyj061/SNN_Sparse_temporal_coding, cf813da), not in the paper, whose protocol and criterion could
-    not be read: the rest the caller gives.
+    Tang, Tan and Li, PLoS ONE 8(11), e78318, 2013. Values marked (‡), and the step, are from public MATLAB code
+    (Zyj061/SNN_Sparse_temporal_coding, cf813da), not from the paper, whose protocol and criterion were not accessible;
+    the caller sets the other parameters.
 
     Examples
     --------

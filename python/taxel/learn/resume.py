@@ -22,28 +22,28 @@ class ReSuMe(EpochLearner):
     eta : float, above 0
         Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
     initial : (float, float), mV
-        First weights are drawn evenly between these two.
+        Range of the initial weights, which are drawn uniformly.
     epochs : int, 1 or more
-        Epochs at most.
+        Largest number of epochs.
     updates : {"batch", "pattern"}
-        Whether weights change once an epoch, or after each pattern in an order drawn anew.
+        Whether weights change once an epoch, or after each pattern in random order.
     tau, tau_s : float, ms, above 0
         Membrane and synapse, as in `INST`; neither has a default.
     theta_0 : float, mV, above 0
         Threshold; has no default.
     after_spike : {"subtract", "membrane", "reset"}
-        As in `INST`; leaky integrate and fire ("membrane") was used.
+        As in `INST`; the paper used leaky integrate and fire ("membrane").
     step_ms, within_ms : float, ms, above 0
     until_right : bool
     seed : int, 0 or more
     max_seconds : float, s, above 0, optional
         As in `INST`, from `step_ms` on.
     a : float, 0 or more
-        Added at every synapse for each spike, with or without an input (‡).
+        Change of every weight for each spike, with or without inputs (‡).
     amplitude : float, above 0
         Height of the window (‡).
     tau_w : float, ms, above 0, optional
-        Time constant of the window; `tau` where left out (‡).
+        Time constant of the window; default: `tau` (‡).
 
     Attributes
     ----------
@@ -52,14 +52,14 @@ class ReSuMe(EpochLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
     ``change`` is the sum over targets of ``a + sum of amplitude * exp(-(t - t_ij) / tau_w)`` over earlier
     inputs, less the same over output spikes: equation 2.10 of Ponulak and Kasiński, Neural Computation 22:467, 2010,
     as the public code Tempotrons.jl (8329a17) cites it; values marked (‡) are that code's defaults. The paper's own
-    constants, protocol and epochs could not be read: the caller gives them. Its load .04 was measured by Florian
+    constants, protocol and epochs were not accessible, so the caller sets them. Its load .04 was measured by Florian
     (2012), not by its authors.
 
     Examples

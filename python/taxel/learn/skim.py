@@ -23,63 +23,62 @@ _DEFAULT = defaults("skim")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class SKIM(BatchLearner):
-    """Learn by SKIM: least squares from filtered inputs to a pulse at each target, then a threshold on the output.
+    """Learn by SKIM: least squares from filtered inputs to a pulse at each target, and a threshold on the output.
 
     Parameters
     ----------
     tau : float, ms, above 0
         Time constant of the kernel; 15, 70 and 190 are those of Tables 6.1 and 6.2.
     kernel : {"alpha", "double_exponential", "exponential"}
-        As in `taxel.Neuron`; the thesis takes "alpha" (6.5.4).
+        As in `taxel.Neuron`; the thesis uses "alpha" (6.5.4).
     tau_s : float, ms, above 0 and below `tau`, optional
-        Second time constant of "double_exponential"; ``tau / 4`` where left out.
+        Second time constant of "double_exponential"; default: ``tau / 4``.
     step_ms : float, ms, above 0
         Time between rows; 1 as the thesis samples.
     pulse_ms : float, ms, above 0
-        How long the wanted output is 1 from a target on; 10 steps of 1 ms (†).
+        Duration for which the target output is 1 from a target on; 10 steps of 1 ms (†).
     ridge : float, 0 or more
-        Added to the sum of squares, times the squares of the weights.
+        Factor of the sum of the squared weights, which is added to the sum of squares.
     branches : int, from 1 to 100000, optional
-        A wide layer of so many dendritic branches between inputs and output, each with fixed random weights of all
-        trains and a fixed random delay. Without it every train is a branch of its own, as in 6.5.4, and its kernel is
-        not compressed.
+        Number of dendritic branches of a layer between inputs and output, each with fixed random weights of all trains
+        and a fixed random delay. Without it every train is a branch of its own, as in 6.5.4, without a nonlinearity.
     spread : float, above 0, optional
     delay_ms : float, ms, 0 or more, optional
-        Fixed weights are drawn evenly from ``-spread`` to `spread`, delays from 0 to `delay_ms`; both belong to
-        `branches`, and none was published.
+        Fixed weights are drawn uniformly from ``-spread`` to `spread`, delays from 0 to `delay_ms`; both apply to
+        `branches` only, and neither was published.
     nonlinearity : {"tanh", "none"}
-        What compresses a branch's potential; belongs to `branches`.
+        Nonlinearity of a branch's potential; applies to `branches` only.
     thresholds : sequence of float
-        Those to choose from; .1 to .9 by .1 as in 6.5.4.
+        Thresholds to choose from; .1 to .9 in steps of .1 as in 6.5.4.
     within_ms : float, ms, above 0
-        A target is found where an output spike lies within this of it; 50 as in 6.5.2.
+        Largest distance of an output spike from a target that it finds; 50 as in 6.5.2.
     seed : int, 0 or more
         Seed of the fixed weights and delays.
 
     Attributes
     ----------
     weights_ : float64, shape (branches or trains,)
-        The shortest of the least-squares solutions.
+        The least-squares solution of least norm.
     residual_ : float
-        The sum of squares that is left, ridge included.
+        The remaining sum of squares, ridge included.
     rows_ : int
         Rows of the least-squares problem.
     threshold_ : float
         The threshold with the fewest missed and false spikes on the training patterns; the lowest of several.
     scores_ : list of (threshold, found, missed, false)
-        Of each threshold, on the training patterns.
+        Counts for each threshold, on the training patterns.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
     Tapson et al., Frontiers in Neuroscience 7:153, 2013: pulses of 10 steps (†) and a kernel that is then compressed
-    were read in its Figure 3 and Table 1; its layer sizes, random weights and delays could not be read. An output
-    spike is the first row at or above the threshold after one below it (a reading of ours: the thesis only says that
-    SKIM's output needs such a step). Rows are brought to triangular form block by block, by reflections, so memory
-    does not grow with the recordings' length and no digits are lost to normal equations; the rest is solved by
+    are from its Figure 3 and Table 1; its layer sizes, random weights and delays were not accessible. An output spike
+    is the first row at or above the threshold after one below it (our reading: the thesis only states that SKIM's
+    output needs such a step). Rows are reduced to triangular form block by block by Householder reflections, so memory
+    does not grow with the length of the recordings and normal equations are avoided; the triangular system is solved by
     singular values. Cost: O(rows * weights**2).
 
     Examples
@@ -122,7 +121,7 @@ class SKIM(BatchLearner):
         patterns : sequence of SpikeTrains
             The same trains in each; signed ones split into ON and OFF. Of any length: a whole recording is a pattern.
         targets : sequence of float sequences, ms
-            When the output shall be 1, one list a pattern, ascending; an empty one teaches silence.
+            Target spike times, one list a pattern, ascending; empty for a pattern without spikes.
 
         Returns
         -------
@@ -131,7 +130,7 @@ class SKIM(BatchLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : invalid patterns or targets (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
         super().fit(patterns, targets)
@@ -139,7 +138,7 @@ class SKIM(BatchLearner):
         return self
 
     def rows(self, pattern: SpikeTrains) -> NDArray[np.float64]:
-        """Return the rows of the least-squares problem that a pattern gives, shape (times, branches or trains).
+        """Return the rows of the least-squares problem for a pattern, shape (times, branches or trains).
 
         Parameters
         ----------
@@ -152,7 +151,7 @@ class SKIM(BatchLearner):
 
         Raises
         ------
-        ProblemError : a pattern that makes no sense
+        ProblemError : an invalid pattern
         """
         trains = instance("pattern", pattern, SpikeTrains)
         count = len(trains) if self.branches is None else int(self.branches)
@@ -171,7 +170,7 @@ class SKIM(BatchLearner):
 
         Raises
         ------
-        ProblemError : a pattern that makes no sense
+        ProblemError : an invalid pattern
         NotFittedError : before `fit`
 
         Examples
@@ -183,13 +182,13 @@ class SKIM(BatchLearner):
         return _core.output_skim(self._json(), self._fitted(), instance("pattern", pattern, SpikeTrains)._parts())
 
     def predict(self, patterns: Sequence[SpikeTrains], *, threshold: float | None = None) -> list[NDArray[np.float64]]:
-        """Return when the output comes up to the threshold, one array a pattern, ms.
+        """Return the times at which the output reaches the threshold, one array a pattern, ms.
 
         Parameters
         ----------
         patterns : sequence of SpikeTrains
         threshold : float, in units of the output, at most 1 at a target, optional
-            `threshold_` where left out.
+            Default: `threshold_`.
 
         Returns
         -------
@@ -197,7 +196,7 @@ class SKIM(BatchLearner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         return self._fired(patterns, {} if threshold is None else {"threshold": number("threshold", threshold)})

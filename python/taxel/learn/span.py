@@ -22,17 +22,17 @@ class SPAN(EpochLearner):
     eta : float, above 0
         Learning rate, weight a unit of `change`; `eta`, `initial`, `epochs` and `updates` have no default.
     initial : (float, float), mV
-        First weights are drawn evenly between these two.
+        Range of the initial weights, which are drawn uniformly.
     epochs : int, 1 or more
-        Epochs at most.
+        Largest number of epochs.
     updates : {"batch", "pattern"}
-        Whether weights change once an epoch, or after each pattern in an order drawn anew.
+        Whether weights change once an epoch, or after each pattern in random order.
     tau, tau_s : float, ms, above 0
         Membrane and synapse, as in `INST`; neither has a default.
     theta_0 : float, mV, above 0
         Threshold; has no default.
     after_spike : {"subtract", "membrane", "reset"}
-        As in `INST`; leaky integrate and fire ("membrane") was used.
+        As in `INST`; the paper used leaky integrate and fire ("membrane").
     step_ms, within_ms : float, ms, above 0
     until_right : bool
     seed : int, 0 or more
@@ -48,15 +48,15 @@ class SPAN(EpochLearner):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
     With all trains filtered by ``(e / tau_a) s exp(-s / tau_a)``, the integral of input times target less output is,
     in closed form, ``change = (e/2)^2 [sum over targets of (|s| + tau_a) exp(-|s| / tau_a) - the same over output
-    spikes]``, `s` from input to spike: inputs after a spike count too. Mohemmed, Schliebs, Matsuda and Kasabov, Int J
-    Neural Syst 22:1250012, 2012 (rule and filter; the closed form is ours). The paper's constants, epochs and
-    criterion could not be read: the caller gives them.
+    spikes]``, `s` from input to spike: inputs after a spike contribute too. Mohemmed, Schliebs, Matsuda and Kasabov,
+    Int J Neural Syst 22:1250012, 2012 (rule and filter; the closed form is ours). The paper's constants, epochs and
+    criterion were not accessible, so the caller sets them.
 
     Examples
     --------

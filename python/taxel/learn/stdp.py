@@ -24,47 +24,48 @@ _DEFAULT = defaults("stdp")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class STDP(SpikeLearner):
-    """Let spike-timing-dependent plasticity shape weights from 0 to 1, until the neuron fires where a pattern repeats.
+    """Learn weights from 0 to 1 by spike-timing-dependent plasticity, until the neuron fires at a repeating pattern.
 
-    It learns without labels: neither that there is a pattern, nor when it comes, nor how long it is, is an input.
+    It learns without labels: the existence, times and length of a pattern are not inputs.
 
     Parameters
     ----------
     threshold : float, above 0
-        T, in weights. The default suits some 2000 inputs of 64 spikes/s; where too few come, the neuron never fires,
-        and then it does not learn.
+        T, in weights. The default suits some 2000 inputs of 64 spikes/s; with too few input spikes the neuron never
+        fires, and then it does not learn.
     tau_m, tau_s : float, ms, above 0
         Time constants of membrane and synapses; `tau_s` below `tau_m`.
     k1, k2 : float, 0 or more
-        Height of a spike and depth of what follows it, in thresholds.
+        Height of a spike and depth of its afterpotential, in thresholds.
     a_plus, a_minus : float, from 0 to 1
-        The most that a weight gains, and loses, at once.
+        Largest increase and largest decrease of a weight by one pair of spikes.
     tau_plus, tau_minus : float, ms, above 0
-        How far apart spikes may be to count, for gains and for losses.
+        Time constants of the increase and of the decrease with the distance of the spikes.
     initial : float, from 0 to 1
-        All weights at first.
+        Initial value of all weights.
 
     Attributes
     ----------
     weights_ : float array, shape (trains,)
     spikes_ : float array, ms
-        When the neuron fired in the last piece that it learnt from.
+        Output spikes in the last piece.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
-    Masquelier, Guyonneau and Thorpe (2008), PLoS ONE 3:e1377, whose parameters are the defaults. Since its last spike,
-    s ago, and by inputs u ago, each since then::
+    Masquelier, Guyonneau and Thorpe (2008), PLoS ONE 3:e1377, whose parameters are the defaults. The potential s after
+    the last output spike, and u after each input since then, is::
 
         p = T (k1 exp(-s/tau_m) - k2 (exp(-s/tau_m) - exp(-s/tau_s))) + sum w K (exp(-u/tau_m) - exp(-u/tau_s))
 
-    K such that one input adds its weight at most; it fires where p rises to T, which is found between inputs as well. A
-    spike changes the weight of each input that last spiked d before it by ``a_plus exp(-d/tau_plus)``; the first spike
-    that an input sends d after it by ``-a_minus exp(-d/tau_minus)``. Each pair of neighbours counts once; Hathway and
-    Goodman (2018), ReScience 4(1):6, found that other pairings do not learn. The authors' window of 7 tau is left out.
+    with K such that the peak of an input is its weight. The neuron fires when p reaches T, which is computed between
+    inputs too. A spike changes the weight of each input that last spiked d before it by ``a_plus exp(-d/tau_plus)``,
+    and of each input whose next spike is d after it by ``-a_minus exp(-d/tau_minus)``. Only nearest spikes are paired;
+    Hathway and Goodman (2018), ReScience 4(1):6, found that other pairings do not learn. The authors' window of 7 tau
+    is omitted.
 
     Examples
     --------
@@ -94,14 +95,14 @@ class STDP(SpikeLearner):
     _neuron: _core.STDP = field(init=False)
 
     def fit(self, patterns: Sequence[SpikeTrains], targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
-        """Forget what was learnt, and learn from several stretches, each begun at rest.
+        """Reset the weights, and learn from several patterns, each from the resting state.
 
         Parameters
         ----------
         patterns : sequence of SpikeTrains
             The same trains in all.
         targets : object, optional
-            Not read; pipelines of scikit-learn pass it.
+            Not used; pipelines of scikit-learn pass it.
 
         Returns
         -------
@@ -110,8 +111,8 @@ class STDP(SpikeLearner):
 
         Raises
         ------
-        ProblemError : no patterns, or one that makes no sense (names it)
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second; what was learnt until then stays
+        ProblemError : no patterns, or an invalid one (names it)
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights learnt until then stay
         """
         trains = [instance(f"pattern {p}", one, SpikeTrains) for p, one in enumerate(several("patterns", patterns))]
         if not trains:
@@ -123,7 +124,7 @@ class STDP(SpikeLearner):
         return self
 
     def partial_fit(self, piece: SpikeTrains) -> Self:
-        """Learn from the next piece of a stream, which goes on where the last piece ended.
+        """Learn from the next piece of a stream, which continues the last piece.
 
         Parameters
         ----------
@@ -157,7 +158,7 @@ class STDP(SpikeLearner):
         return self._learn(piece)
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
-        """Return when the neuron fires with the weights as they are, one array a pattern, each begun at rest; ms.
+        """Return the output spikes with the present weights, one array a pattern, each from the resting state; ms.
 
         Parameters
         ----------
@@ -170,7 +171,7 @@ class STDP(SpikeLearner):
 
         Raises
         ------
-        ProblemError : a pattern that makes no sense (names it)
+        ProblemError : an invalid pattern (names it)
         NotFittedError : before `fit` and `partial_fit`
         """
         weights = self._fitted()
@@ -190,5 +191,5 @@ class STDP(SpikeLearner):
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        # A copy goes on with the weights, from rest.
+        # A copy continues with the weights, from the resting state.
         return {name: value for name, value in vars(self).items() if name != "_neuron"}

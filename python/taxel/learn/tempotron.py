@@ -1,4 +1,4 @@
-"""Tempotron: a neuron that fires on some patterns and not on others, at whatever time."""
+"""Tempotron: a neuron that fires on some patterns, at any time, and not on others."""
 
 from __future__ import annotations
 
@@ -25,50 +25,50 @@ _DEFAULT = defaults("tempotron")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Tempotron(Learner):
-    """Learn to fire, at whatever time, on the patterns with a true label and on no other.
+    """Learn to fire, at any time, on the patterns with a true label and on no other.
 
     Parameters
     ----------
     tau, tau_s : float, ms, above 0
-        Membrane and synapse: an input of weight 1 makes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` that peaks
-        at 1. 15, and a quarter of `tau` where `tau_s` is left out (†).
+        Membrane and synapse: an input of weight 1 causes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` with a peak
+        of 1. Default: 15, and `tau` / 4 for `tau_s` (†).
     theta_0 : float, above 0
-        Threshold: weights are in its unit. At an output spike inputs are shunted: those at or after it are lost.
+        Threshold, in the unit of the weights. An output spike shunts inputs: those at or after it have no effect.
     eta : float, above 0, optional
-        Learning rate; ``3e-3 * T / (tau * trains * V0)`` where left out (†), `T` being the patterns' mean length.
+        Learning rate; default: ``3e-3 * T / (tau * trains * V0)`` (†), `T` being the patterns' mean length.
     momentum : float, 0 or more, below 1
-        How much of the last change the next one carries on, from error to error (†).
+        Share of the last change that is added to the next one, from error to error (†).
     initial_sd : float, 0 or more
-        First weights are drawn normally around 0, this wide (†).
+        Standard deviation of the initial weights, which are drawn from a normal distribution around 0 (†).
     epochs : int, 1 or more
-        Epochs at most.
+        Largest number of epochs.
     seed : int, 0 or more
-        Seed of the first weights and of the order of patterns.
+        Seed of the initial weights and of the order of patterns.
     max_seconds : float, s, above 0, optional
         Ends the training with the best weights so far.
 
     Attributes
     ----------
     weights_ : float64, shape (trains,)
-        The weights after the epoch with fewest errors; the latest of several.
+        The weights after the epoch with the fewest errors; the latest in case of a tie.
     right_ : float64, shape (epochs done,)
-        The share of patterns right as they were presented, epoch by epoch.
+        The share of patterns right at their presentation, epoch by epoch.
     epochs_, best_epoch_ : int
-        Epochs done, and the epoch after which `weights_` held.
+        Number of epochs, and the epoch after which the weights were `weights_`.
     status_ : {"right", "epochs", "stopped"}
-        An epoch had no error; all epochs were used up; Ctrl-C or `max_seconds`.
+        An epoch had no error; all epochs were run; Ctrl-C or `max_seconds` ended the training.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : an invalid parameter
 
     Notes
     -----
     Gütig and Sompolinsky, Nature Neuroscience 9:420, 2006; weights change after each wrong pattern. Values
-    marked (†) are those of its capacity runs, as read in secondary sources and public code (laboratory e89a73a,
-    Tempotrons.jl 8329a17), not in the paper. The paper's supplement adds a small constant potential, which is left
-    out here; where the potential never rises above rest, the last input's peak is corrected, as there. Peaks are
-    exact: between inputs there is one maximum at most, and its time is known. Cost of a presentation: O(1) an input.
+    marked (†) are those of its capacity runs, from secondary sources and public code (laboratory e89a73a, Tempotrons.jl
+    8329a17), not from the paper. The paper's supplement adds a small constant potential, which is omitted here; if the
+    potential never rises above rest, the peak of the last input is corrected, as there. Peaks are exact: between inputs
+    there is at most one maximum, and its time has a closed form. Cost of a presentation: O(1) an input.
 
     Examples
     --------
@@ -113,11 +113,11 @@ class Tempotron(Learner):
         patterns : sequence of SpikeTrains
             The same trains in each; signed ones split into ON and OFF.
         labels : bool, shape (patterns,), one or more
-            Whether the neuron shall fire.
+            Whether the neuron should fire.
         start : float64, shape (trains,), in thresholds of 1 mV, optional
-            First weights, instead of drawn ones.
+            Initial weights, instead of random ones.
         progress : function of (epochs done, share of patterns right), optional
-            Called after each epoch; what it raises ends the training.
+            Called after each epoch; an exception that it raises ends the training.
 
         Returns
         -------
@@ -126,7 +126,7 @@ class Tempotron(Learner):
 
         Raises
         ------
-        ProblemError : patterns, labels or first weights that make no sense
+        ProblemError : invalid patterns, labels or first weights
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
         """
         numbered = enumerate(several("patterns", patterns))
@@ -152,7 +152,7 @@ class Tempotron(Learner):
 
         Raises
         ------
-        ProblemError : patterns that make no sense
+        ProblemError : invalid patterns
         NotFittedError : before `fit`
         """
         weights = self._fitted()
@@ -166,7 +166,7 @@ class Tempotron(Learner):
         patterns : sequence of SpikeTrains
             The same trains in each.
         labels : bool, shape (patterns,), one or more
-            Whether the neuron shall fire.
+            Whether the neuron should fire.
 
         Returns
         -------
@@ -174,7 +174,7 @@ class Tempotron(Learner):
 
         Raises
         ------
-        ProblemError : patterns or labels that make no sense
+        ProblemError : invalid patterns or labels
         NotFittedError : before `fit`
         """
         fired, truth = self.predict(patterns), _labels(labels)
@@ -195,11 +195,11 @@ class Tempotron(Learner):
         potential : float, mV
         time : float, ms
         spike : float, ms
-            Infinite where the neuron does not fire.
+            Infinite if the neuron does not fire.
 
         Raises
         ------
-        ProblemError : weights or a pattern that make no sense
+        ProblemError : invalid weights or an invalid pattern
 
         Examples
         --------
@@ -211,24 +211,23 @@ class Tempotron(Learner):
         return _core.peak_tempotron(self._json(), floats("weights", weights), trains)
 
     def change(self, weights: ArrayLike, pattern: SpikeTrains, label: bool) -> NDArray[np.float64]:
-        """Return the change of the weights by one presentation, over the learning rate: 0 where the neuron is right.
+        """Return the change of the weights by one presentation, divided by the learning rate: 0 if the neuron is right.
 
         Parameters
         ----------
         weights : float64, shape (trains,), mV
         pattern : SpikeTrains
         label : bool
-            Whether the neuron shall fire.
+            Whether the neuron should fire.
 
         Returns
         -------
         float64, shape (trains,)
-            The potential that each input makes at the peak: negative where a spike is false, positive where one is
-            missed.
+            The potential of each input at the peak: negative for a false spike, positive for a missed one.
 
         Raises
         ------
-        ProblemError : weights, a pattern or a label that make no sense
+        ProblemError : invalid weights, pattern or label
         """
         trains = instance("pattern", pattern, SpikeTrains)._parts()
         return _core.change_tempotron(self._json(), floats("weights", weights), trains, flag("label", label))

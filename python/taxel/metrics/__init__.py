@@ -13,5 +13,5 @@ from taxel.metrics.van_rossum_spatial_absolute import van_rossum_spatial_absolut
 from taxel.metrics.victor_purpura import victor_purpura as victor_purpura
 from taxel.metrics.victor_purpura_multi_unit import victor_purpura_multi_unit as victor_purpura_multi_unit
 
-# The lines above are the registry: a metric is one of them.
+# The imports above are the registry of metrics.
 __all__ = [name for name, held in sorted(globals().items()) if callable(held)]

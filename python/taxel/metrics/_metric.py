@@ -1,4 +1,4 @@
-"""A metric's parameters and patterns, on their way to the compiled part."""
+"""Conversion of a metric's parameters and patterns for the compiled part."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _plain(metric: str, name: str, value: Any) -> Any:
         return ends.tolist()
     known = ranges(metric).get(name, {})
     if "infinite" in known:
-        # JSON has no number for what is not finite; where infinity makes sense, the compiled part reads its name.
+        # JSON has no infinite numbers; for parameters that may be infinite the compiled part reads the text.
         cost = number(name, value, known["unit"])
         return cost if math.isfinite(cost) else str(cost)
     plain = bare(name, value, known.get("unit") or None)

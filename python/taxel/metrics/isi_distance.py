@@ -12,16 +12,16 @@ _DEFAULT = defaults("isi_distance")
 
 
 def isi_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None = _DEFAULT.window) -> float:
-    """Return how much the intervals between spikes differ, moment by moment.
+    """Return the mean relative difference of the intervals between spikes.
 
-    The mean over the window of ``|x - y| / max(x, y)``, where x and y are the two trains' intervals at that moment.
+    The mean over the window of ``|x - y| / max(x, y)``, where x and y are the intervals of the two trains at each time.
 
     Parameters
     ----------
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
         Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
     window : (start, stop), ms
-        From when to when. Where it is left out: the widest of the patterns' own windows; lists of times have none.
+        Window of the mean; default: the widest of the patterns' own windows; lists of times have none.
 
     Returns
     -------
@@ -34,9 +34,9 @@ def isi_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None =
     Notes
     -----
     Kreuz et al. (2007), J. Neurosci. Methods 165:151. The profile is constant between spikes; its integral is exact.
-    Edges as in PySpike: before the first and after the last spike the interval is as long as up to the window's edge,
-    or as the neighbouring one if that is longer; an empty train has a spike at either edge; of spikes at the same time
-    one counts. Trains of the same intervals at other times have distance 0. Time O(n + m).
+    Edges as in PySpike: before the first and after the last spike the interval reaches to the window's edge, or is as
+    long as the neighbouring one if that is longer; an empty train has a spike at either edge; spikes at the same time
+    count once. Time O(n + m).
 
     Examples
     --------

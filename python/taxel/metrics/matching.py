@@ -24,9 +24,9 @@ class Matching(NamedTuple):
     Parameters
     ----------
     found, missed, false : int, 0 or more
-        Targets with a spike of their own, targets without, spikes without a target.
+        Number of targets with a matched spike, of targets without, and of spikes without a target.
     errors_ms : float64, shape (found,), ms
-        Spike minus target; negative is early.
+        Spike minus target; negative for an early spike.
 
     Examples
     --------
@@ -41,7 +41,7 @@ class Matching(NamedTuple):
 
     @property
     def f1(self) -> float:
-        """Twice the targets found, over targets and spikes together; 1 where there is neither."""
+        """Twice the number of targets found, divided by the number of targets and spikes; 1 without either."""
         both = 2 * self.found + self.missed + self.false
         return 2 * self.found / both if both else 1.0
 
@@ -51,15 +51,15 @@ def matching(
 ) -> Matching:
     """Match spikes with targets, pattern by pattern.
 
-    As many pairs as the window allows, one spike a target, in the order of time; of all ways to have so many the one
-    with the least sum of distances. Times are compared to the ns.
+    The matching has as many pairs as the window allows, one spike a target, in the order of time; among the matchings
+    of that size it has the least sum of distances. Times are compared with a resolution of 1 ns.
 
     Parameters
     ----------
     spikes, targets : sequence of float sequences, ms, ascending
         One list a pattern.
     window_ms : float, ms, from 0 to 3.6e6
-        How far a spike may lie from its target, either way.
+        Largest distance of a spike from its target, in either direction.
 
     Returns
     -------
@@ -67,12 +67,12 @@ def matching(
 
     Raises
     ------
-    ProblemError : not equally many patterns, times that do not ascend, or a window that makes no sense
+    ProblemError : not equally many patterns, times that do not ascend, or an invalid window
 
     Notes
     -----
-    The window is that of thesis 6.5.2, where every further spike is false here, near a target or not. The matching of
-    `taxel.detect.score` is the same.
+    The window is that of thesis 6.5.2; here every unmatched spike is false, near a target or not. `taxel.detect.score`
+    uses the same matching.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def f1(spikes: Sequence[ArrayLike], targets: Sequence[ArrayLike], *, window_ms: 
     Returns
     -------
     float, 0 to 1
-        1 where there is neither a target nor a spike.
+        1 if there is neither a target nor a spike.
 
     Raises
     ------

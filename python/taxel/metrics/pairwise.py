@@ -30,26 +30,26 @@ def pairwise(
     Parameters
     ----------
     metric : str
-        The name of one of this room's functions, as ``"victor_purpura"``.
+        The name of a function of `taxel.metrics`, such as ``"victor_purpura"``.
     a, b : sequence of SpikeTrains, sequence of float sequences (ms), or one SpikeTrains
         The patterns, equally many trains in each; or single trains, those of one SpikeTrains. Without `b` those of `a`
         are compared with each other.
     threads : int, 1 or more, optional
-        All cores where it is left out. The distances are the same.
+        Default: all cores. The distances do not depend on it.
     progress : function of (done, all), optional
-        Called now and then with the pairs done and all of them.
+        Called regularly with the number of pairs done and of all pairs.
     **parameters
-        Those of the metric.
+        Parameters of the metric.
 
     Returns
     -------
     float64, shape (patterns of `a`, patterns of `b`)
-        Entry i, j is what the metric's function gives for ``a[i]`` and ``b[j]``, within rounding. Without `b` it is
-        symmetric, and 0 on the diagonal.
+        Entry i, j is the metric of ``a[i]`` and ``b[j]``, within rounding. Without `b` the matrix is symmetric, and 0
+        on the diagonal.
 
     Raises
     ------
-    ProblemError : no such metric, parameters or patterns that make no sense (names pattern, train and spike)
+    ProblemError : no such metric, or invalid parameters or patterns (names pattern, train and spike)
     KeyboardInterrupt : Ctrl-C, within a fraction of a second
 
     Examples

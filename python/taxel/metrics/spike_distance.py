@@ -12,7 +12,7 @@ _DEFAULT = defaults("spike_distance")
 
 
 def spike_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None = _DEFAULT.window) -> float:
-    """Return how far the spikes around each moment are from their nearest ones in the other train.
+    """Return the mean distance of the spikes around each time from the nearest spikes of the other train.
 
     Distances are taken relative to the intervals between spikes and averaged over the window.
 
@@ -21,7 +21,7 @@ def spike_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
         Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
     window : (start, stop), ms
-        From when to when. Where it is left out: the widest of the patterns' own windows; lists of times have none.
+        Window of the mean; default: the widest of the patterns' own windows; lists of times have none.
 
     Returns
     -------
@@ -34,9 +34,9 @@ def spike_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None
     Notes
     -----
     Kreuz et al. (2013), J. Neurophysiol. 109:1457. The profile is linear between spikes; its integral is exact. Edges
-    as in PySpike: before the first and after the last spike the interval is as long as up to the window's edge, or as
-    the neighbouring one if that is longer; an empty train has a spike at either edge; of spikes at the same time one
-    counts. Not a metric: the triangle inequality need not hold. Time O(n + m).
+    as in PySpike: before the first and after the last spike the interval reaches to the window's edge, or is as long as
+    the neighbouring one if that is longer; an empty train has a spike at either edge; spikes at the same time count
+    once. It is not a metric: the triangle inequality need not hold. Time O(n + m).
 
     Examples
     --------

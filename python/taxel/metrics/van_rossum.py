@@ -15,7 +15,7 @@ def van_rossum(a: Pattern, b: Pattern, *, tau: float, normalisation: str = _DEFA
     """Return the Euclidean distance of two spike trains smoothed by an exponential.
 
     Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on; the squared difference is integrated over all time,
-    in closed form, and the root taken. Equal trains give exactly 0.
+    in closed form, and the root taken. The distance of equal trains is exactly 0.
 
     Parameters
     ----------
@@ -23,8 +23,8 @@ def van_rossum(a: Pattern, b: Pattern, *, tau: float, normalisation: str = _DEFA
         Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
     tau : float, ms, above 0
     normalisation : {"spike", "tau", "none"}
-        What the integral is divided by: ``tau / 2``, so that one spike more is 1, as elephant has it; `tau`, as van
-        Rossum has it, where one spike more is the root of 1/2; or nothing, the norm of 5.10, in the root of a ms.
+        Divisor of the integral: ``tau / 2``, so that the distance of one additional spike is 1, as in elephant; `tau`,
+        as in van Rossum's paper, with a distance of sqrt(1/2); or none, the norm of 5.10, in sqrt(ms).
 
     Returns
     -------
@@ -38,7 +38,7 @@ def van_rossum(a: Pattern, b: Pattern, *, tau: float, normalisation: str = _DEFA
     Notes
     -----
     van Rossum (2001), Neural Comput. 13:751; thesis 5.8 to 5.10. The sums are those of Houghton and Kreuz (2012),
-    Network 23:48, taken over the difference of the trains, so that near trains lose no digits. Time O(n + m).
+    Network 23:48, computed on the difference of the trains, so that similar trains lose no precision. Time O(n + m).
 
     Examples
     --------

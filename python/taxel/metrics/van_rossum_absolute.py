@@ -1,4 +1,4 @@
-"""The distance that thesis 5.10 prints."""
+"""The van Rossum distance as equation 5.10 of the thesis is printed."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def van_rossum_absolute(
 ) -> float:
     """Return the absolute difference of two smoothed spike trains, summed over time.
 
-    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on, as for `van_rossum`; but what is added up over time
-    is the absolute difference, as 5.10 prints it, not its square.
+    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on, as for `van_rossum`; but the absolute difference, as
+    printed in 5.10, is summed over time instead of its square.
 
     Parameters
     ----------
@@ -30,10 +30,10 @@ def van_rossum_absolute(
         Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
     tau : float, ms, above 0
     window : (start, stop), ms, optional
-        The time that counts, 0 to T in 5.10; all time where it is left out.
+        The interval of the sum, 0 to T in 5.10; default: all time.
     step_ms : float, above 0, optional
-        A sum over points so far apart, from the window's start (whole multiples where there is none), both ends
-        included; the integral over time where it is left out.
+        Step of a sum over points from the window's start (multiples of the step without a window), both ends included;
+        default: the integral over time.
 
     Returns
     -------
@@ -46,8 +46,9 @@ def van_rossum_absolute(
 
     Notes
     -----
-    *Reading*: 5.10 calls itself a Euclidean norm and prints ``sum over t of sqrt((f_a - f_b)^2)``; `van_rossum` with
-    ``normalisation="none"`` is the norm. Integral and sum are exact: between spikes the difference is one exponential.
+    *Reading*: the thesis calls 5.10 a Euclidean norm and prints ``sum over t of sqrt((f_a - f_b)^2)``; `van_rossum`
+    with ``normalisation="none"`` is the norm. Integral and sum are exact, as the difference between spikes is one
+    exponential.
 
     Examples
     --------

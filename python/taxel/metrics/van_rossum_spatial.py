@@ -26,23 +26,23 @@ def van_rossum_spatial(
 ) -> float:
     """Return the Euclidean distance of two patterns smoothed in time and over the array.
 
-    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on (5.8) and adds ``exp(-d / sigma)`` of that to the
+    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on (5.8) and adds ``exp(-d / sigma)`` times that to the
     taxel at distance d (5.11). The squared differences are integrated over all time, in closed form, and summed over
-    taxels; the root of that is the distance. Equal patterns give exactly 0.
+    taxels; the root of that is the distance. The distance of equal patterns is exactly 0.
 
     Parameters
     ----------
     a, b : SpikeTrains with one train a taxel, or several for each
-        Signed ones are split into ON and OFF. Several trains for each taxel (all of one kind, then all of the next) are
-        smoothed apart.
+        Signed ones are split into ON and OFF. If each taxel has several trains (all of one kind, then all of the next),
+        each kind is smoothed separately.
     array : Array
-        Where the taxels are; those that do not exist must not spike and do not count.
+        The positions of the taxels; those that do not exist must have no spikes and are ignored.
     tau : float, ms, above 0
         0.4 in the thesis.
     sigma : float, mm, above 0
         2 in the thesis.
     own_train : {"twice", "once"}
-        How often a train counts at its own taxel: by itself and in the sum, as 5.11 is printed, or in the sum alone.
+        How often a train counts at its own taxel: by itself and in the sum, as 5.11 is printed, or in the sum only.
     normalisation : {"spike", "tau", "none"}
         As for `van_rossum`.
 
@@ -57,8 +57,8 @@ def van_rossum_spatial(
     Notes
     -----
     Thesis 5.8 to 5.12. *Reading*: 5.12 prints ``sum over n of sqrt(g_n(a) - g_n(b))``, without time or square; this is
-    the Euclidean norm over taxels and time that its left side names. `van_rossum_spatial_absolute` is the other
-    reading. Time O(spikes x taxels); `pairwise` is much faster than that.
+    the Euclidean norm over taxels and time that its left side denotes. `van_rossum_spatial_absolute` is the other
+    reading. Time O(spikes x taxels); `pairwise` is much faster.
 
     Examples
     --------

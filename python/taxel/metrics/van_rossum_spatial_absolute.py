@@ -1,4 +1,4 @@
-"""Thesis 5.12, read as 5.10 is printed."""
+"""The spatial van Rossum distance of thesis 5.12 with the absolute difference of 5.10."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def van_rossum_spatial_absolute(
     window: tuple[float, float] | None = _DEFAULT.window,
     step_ms: float | None = _DEFAULT.step_ms,
 ) -> float:
-    """Return the absolute differences of two patterns smoothed in time and over the array, over taxels and time.
+    """Return the absolute difference of two patterns smoothed in time and space, summed over taxels and time.
 
-    Smoothing is that of `van_rossum_spatial`; what is added up is ``|g_m(a) - g_m(b)|``.
+    The smoothing is that of `van_rossum_spatial`; the summand is ``|g_m(a) - g_m(b)|``.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ __all__ = ["victor_purpura"]
 
 
 def victor_purpura(a: Pattern, b: Pattern, *, q: float) -> float:
-    """Return the cheapest way to turn spike train `a` into spike train `b`.
+    """Return the least cost of changing spike train `a` into spike train `b`.
 
     Removing or adding a spike costs 1, moving it by dt costs ``q * |dt|``: spikes over ``2 / q`` apart never match.
 
@@ -16,7 +16,7 @@ def victor_purpura(a: Pattern, b: Pattern, *, q: float) -> float:
     ----------
     a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
         Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
-    q : float, 1/ms, 0 or more; infinite: only spikes at the very same time match
+    q : float, 1/ms, 0 or more; infinite: only spikes at exactly the same time match
 
     Returns
     -------

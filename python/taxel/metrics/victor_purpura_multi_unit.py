@@ -10,16 +10,17 @@ __all__ = ["victor_purpura_multi_unit"]
 
 
 def victor_purpura_multi_unit(a: SpikeTrains, b: SpikeTrains, *, q: float, k: float) -> float:
-    """Return the cheapest way to turn pattern `a` into pattern `b`, where a spike may also change its train.
+    """Return the least cost of changing pattern `a` into pattern `b`, where a spike may also change its train.
 
-    Removing or adding a spike costs 1, moving it by dt costs ``q * |dt|``, giving it to another train costs `k`. With
-    ``k = 0`` the trains are pooled; from ``k = 2`` on they are apart, and this is `victor_purpura` summed over trains.
+    Removing or adding a spike costs 1, moving it by dt costs ``q * |dt|``, moving it to another train costs `k`. With
+    ``k = 0`` the trains are pooled; from ``k = 2`` on they are separate, and this is `victor_purpura` summed over
+    trains.
 
     Parameters
     ----------
     a, b : SpikeTrains with equally many trains
         Signed ones are split into ON and OFF, which are trains of their own.
-    q : float, 1/ms, 0 or more; infinite: only spikes at the very same time match
+    q : float, 1/ms, 0 or more; infinite: only spikes at exactly the same time match
     k : float, 0 or more
 
     Returns
@@ -35,7 +36,7 @@ def victor_purpura_multi_unit(a: SpikeTrains, b: SpikeTrains, *, q: float, k: fl
     -----
     Aronov (2003), J. Neurosci. Methods 124:175. Exact, as a matching of least cost between the spikes of both patterns,
     by shortest augmenting paths; only pairs that cost less than 2 are compared. For n spikes with p such pairs time
-    O(n (p + n log n)) at worst, about O(p) where few compete, whatever the number of trains; memory O(n).
+    O(n (p + n log n)) at worst, about O(p) with few conflicts, independent of the number of trains; memory O(n).
 
     Examples
     --------

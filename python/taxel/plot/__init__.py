@@ -1,4 +1,4 @@
-"""Pictures of the nouns: raster, pressure map, event picture, detections, recordings."""
+"""Plots of the data classes: raster, pressure map, event picture, detections, recordings."""
 
 from taxel.plot.notebook import html
 from taxel.plot.nouns import detections, event_picture, pressure_map, raster

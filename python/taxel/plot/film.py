@@ -1,4 +1,4 @@
-"""What taxels read, as a film."""
+"""Film of the taxels' values over time."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from taxel.wire import FRAME_US
 
 __all__ = ["film", "writer_of"]
 
-#: Pictures a second of the film.
+#: Frame rate of the film, Hz.
 _RATE_HZ = 20
-#: No longer: a film is looked at.
+#: The most pictures of a film.
 _MOST = 2_000
 
 
@@ -41,28 +41,28 @@ def film(
     overwrite: bool = False,
     watch: Callable[[float], object] = lambda _: None,
 ) -> Path:
-    """Draw what the taxels held over time, above their rest, and the force on the foam beside it.
+    """Write a film of the taxels' values above their rest, with a plot of the force on the foam.
 
     Parameters
     ----------
     events : Events
         With intensities and a start marker.
     path : path
-        A .gif always works (Pillow writes it); .mp4 and others where matplotlib finds a writer, as ffmpeg.
+        A .gif always works (Pillow writes it); .mp4 and others if matplotlib finds a writer, such as ffmpeg.
     force_n : float32, optional
-        The true force by frame of the board.
+        The true force at each frame of the board.
     frame_us : float, us
-        How long such a frame is.
+        Duration of a frame of the board.
     slower : float, above 0
-        The film runs so many times slower than the touch.
+        Factor by which the film is slower than the touch.
     overwrite : bool
         Whether an existing file may be replaced.
     watch : function, optional
-        Called with the share that is drawn.
+        Called with the share of pictures drawn.
 
     Raises
     ------
-    ProblemError : no event, no intensities, a kind that no writer knows, or a film of more than 2000 pictures
+    ProblemError : no event, no intensities, a file ending without a writer, or a film of more than 2000 pictures
     FileExistsError : the file is there already
     """
     place = Path(path)
@@ -93,13 +93,14 @@ def film(
         below.plot(to_ms(np.arange(len(force_n)) * frame_us - begin), force_n)
         below.set(ylabel="force (N)")
     cursor = below.axvline(0.0, color="0.5")
-    # Laid out once: nothing that moves changes its room.
+    # The layout is computed once, as no moving part changes its size.
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
 
     def write(file: io.BufferedIOBase) -> None:
         nonlocal rest
-        # Writers want a name with an ending of its own; the whole file is moved to its place by its bytes.
+        # Writers require a file name with an ending, so they write to a temporary file, whose bytes are copied to
+        # `file`.
         with tempfile.TemporaryDirectory() as folder:
             film = Path(folder) / f"film{place.suffix.lower()}"
             done = 0
@@ -122,11 +123,11 @@ def film(
 
 
 def writer_of(place: Path) -> animation.AbstractMovieWriter:
-    """Return what writes a film of that name.
+    """Return matplotlib's writer for a film of that name.
 
     Raises
     ------
-    ProblemError : no writer knows that kind
+    ProblemError : no writer supports the ending
     """
     if place.suffix.lower() == ".gif":
         return animation.PillowWriter(fps=_RATE_HZ)
@@ -136,7 +137,7 @@ def writer_of(place: Path) -> animation.AbstractMovieWriter:
 
 
 def _stage(events: Events, times: NDArray[np.float64]) -> tuple[Figure, AxesImage, Axes]:
-    """Return a figure, the picture of the taxels in it, and the axes of what happens over time."""
+    """Return a figure, the image of the taxels in it, and the axes of the plot over time."""
     figure = Figure(figsize=(5.0, 5.6), layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, height_ratios=[5, 1])
@@ -153,7 +154,7 @@ def _stage(events: Events, times: NDArray[np.float64]) -> tuple[Figure, AxesImag
 
 
 def _most(events: Events) -> float:
-    """Return how far the taxels rise, ticks: of those with events, above the least intensity of each."""
+    """Return the largest rise of a taxel, ticks, above the least intensity of its events."""
     assert events.intensity is not None  # checked before
     index = events.array.index(events.x, events.y)
     values = np.asarray(events.intensity, np.float64)

@@ -1,4 +1,4 @@
-"""A noun as a notebook shows it: its line and a small picture."""
+"""HTML of the data classes for notebooks: the text line and a small plot."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Drawn = Events | Frames | SpikeTrains | Detections | Recording | Health
 
 
 def html(noun: Drawn) -> str:
-    """Return a noun's line and a small picture of it as HTML; where there is nothing to draw, the line alone.
+    """Return the text line of an object and a small plot of it as HTML; only the line if there is nothing to draw.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def html(noun: Drawn) -> str:
     True
     """
     line = f"<code>{escape(repr(noun))}</code>"
-    # A figure of its own, which no window and no notebook shows a second time.
+    # A figure without pyplot, so that no window or notebook shows it a second time.
     figure = Figure(figsize=(7.0, 2.6) if isinstance(noun, Recording) else (4.2, 2.8), layout="constrained")
     match noun:
         case Recording():

@@ -1,4 +1,4 @@
-"""One picture a noun."""
+"""One plot for each data class."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ON, OFF = "#c44e52", "#4c72b0"
 
 
 def axes(ax: Axes | None, size: tuple[float, float]) -> Axes:
-    """Return the axes to draw on; new ones (inches) where none are given."""
+    """Return the given axes, or new ones of a size in inches."""
     if ax is None:
         return plt.subplots(figsize=size, layout="constrained")[1]
     if not isinstance(ax, Axes):
@@ -37,7 +37,7 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
     ----------
     trains : SpikeTrains
     ax : matplotlib.axes.Axes, optional
-        New axes are made where none are given.
+        Default: new axes.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
 
     Raises
     ------
-    ProblemError : no spike trains; no axes of matplotlib
+    ProblemError : not spike trains; not axes of matplotlib
 
     Examples
     --------
@@ -77,9 +77,9 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
     frames : Frames
         At least one.
     at : int, us, optional
-        Of the frames' clock.
+        Time by the frames' clock.
     ax : matplotlib.axes.Axes, optional
-        New axes are made where none are given.
+        Default: new axes.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
 
     Raises
     ------
-    ProblemError : no frames, or none in them; no number; no axes of matplotlib
+    ProblemError : not frames, or empty ones; not a number; not axes of matplotlib
 
     Examples
     --------
@@ -113,13 +113,13 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
 
 
 def event_picture(events: Events, ax: Axes | None = None) -> Axes:
-    """Draw how often each taxel rose, in one colour, and how often it fell, in another; both together are dark.
+    """Draw the number of events of each taxel: rises in one colour, falls in another, both together dark.
 
     Parameters
     ----------
     events : Events
     ax : matplotlib.axes.Axes, optional
-        New axes are made where none are given.
+        Default: new axes.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
 
     Raises
     ------
-    ProblemError : no events; no axes of matplotlib
+    ProblemError : not events; not axes of matplotlib
 
     Examples
     --------
@@ -144,7 +144,7 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
     most = max(1.0, *(float(count.max()) for count in counts))
     for count, colour, name in zip(counts, (ON, OFF), ("rises", "falls"), strict=True):
         shades = LinearSegmentedColormap.from_list(name, ["white", colour])
-        # A single event stands out against taxels without any.
+        # The scale makes a single event visible against taxels without any.
         share = np.where(count > 0, 0.15 + 0.85 * count / most, 0.0)
         picture *= shades(share)[..., :3]
         scale = ScalarMappable(Normalize(0, most), shades)
@@ -165,7 +165,7 @@ def detections(found: Detections, ax: Axes | None = None) -> Axes:
     ----------
     found : Detections
     ax : matplotlib.axes.Axes, optional
-        New axes are made where none are given.
+        Default: new axes.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def detections(found: Detections, ax: Axes | None = None) -> Axes:
 
     Raises
     ------
-    ProblemError : no detections; no axes of matplotlib
+    ProblemError : not detections; not axes of matplotlib
 
     Examples
     --------
@@ -192,5 +192,5 @@ def detections(found: Detections, ax: Axes | None = None) -> Axes:
 
 
 def _wide(start: float, stop: float) -> tuple[float, float]:
-    """Return limits that a plot can show even where the window has no length."""
+    """Return the limits of an axis, which are wider than the window if its length is 0."""
     return (start, stop) if stop > start else (start - 0.5, stop + 0.5)

@@ -1,4 +1,4 @@
-"""Pictures of whole recordings."""
+"""Plots of whole recordings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
     ----------
     recording : Recording
     figure : matplotlib.figure.FigureBase, optional
-        A figure, or a part of one, to draw in; a new one is made where none is given.
+        The figure or subfigure to draw in; default: a new one.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
 
     Raises
     ------
-    ProblemError : no recording; no figure of matplotlib
+    ProblemError : not a recording; not a figure of matplotlib
     FormatError : the recording's file is damaged
 
     Examples
@@ -68,7 +68,7 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
         for on, colour, name in ((True, "#c44e52", "rises"), (False, "#4c72b0", "falls")):
             rate = np.histogram(t[events.p == on], bins)[0] / width
             over.stairs(rate, bins, color=colour, label=name)
-        # Logarithmic from one event a bin on: a tare has a thousand times more events a second than a touch.
+        # The axis is logarithmic from one event a bin on, as a tare has a thousand times the event rate of a touch.
         over.set_yscale("symlog", linthresh=1 / width)
         over.set_ylabel("events/s")
         over.legend(loc="upper right")
@@ -97,9 +97,9 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     ----------
     frames : Frames
     above : float, from 0, in the frames' unit
-        Taxels that read more are loaded.
+        The value above which a taxel counts as loaded.
     figure : matplotlib.figure.FigureBase, optional
-        A figure, or a part of one, to draw in; a new one is made where none is given.
+        The figure or subfigure to draw in; default: a new one.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
 
     Raises
     ------
-    ProblemError : no frames; no finite number; no figure of matplotlib
+    ProblemError : not frames; not a finite number; not a figure of matplotlib
 
     Examples
     --------
@@ -144,7 +144,7 @@ def health_map(health: Health, ax: Axes | None = None) -> Axes:
     health : Health
         As `taxel.recording.health` returns it.
     ax : matplotlib.axes.Axes, optional
-        New axes are made where none are given.
+        Default: new axes.
 
     Returns
     -------
@@ -152,7 +152,7 @@ def health_map(health: Health, ax: Axes | None = None) -> Axes:
 
     Raises
     ------
-    ProblemError : no health of a recording; no axes of matplotlib
+    ProblemError : not the health of a recording; not axes of matplotlib
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Recordings: opened, cut, merged, put on a clock, converted."""
+"""Recordings: functions that open, cut, merge and convert them, and convert their times to another clock."""
 
 from taxel.clock import Clock
 from taxel.recording.convert import convert

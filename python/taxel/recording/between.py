@@ -1,4 +1,4 @@
-"""A part of a recording by time."""
+"""The part of a recording within an interval of time."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ __all__ = ["Apart", "between"]
 
 
 def between(of: Contents, start: float, stop: float) -> Contents:
-    """Return the part of ``start <= t < stop`` (us); notes without a time are left out, and stand in its `lost`.
+    """Return the part of ``start <= t < stop`` (us); notes without a time are dropped and listed in its `lost`.
 
-    What the taxels held at its beginning is known from what came before it. Taxels that were zeroed before it stay so.
+    The held values at its beginning follow from the events before it. Taxels that were zeroed before it stay zeroed.
     """
     return after(
         "between",
@@ -46,7 +46,7 @@ def _without_a_time(of: Contents) -> list[str]:
 
 
 class Apart(Mapping[str, Contents]):
-    """Hold the names of sources that a part by one clock does not define, as each has its own clock; refuse access."""
+    """Hold the names of sources with clocks of their own; refuse access, as the interval is by another clock."""
 
     def __init__(self, path: Path, names: Iterable[str]) -> None:
         self._path, self._names = path, tuple(names)
@@ -65,7 +65,7 @@ class Apart(Mapping[str, Contents]):
 
 
 def _sources(of: Contents, start: float, stop: float) -> Mapping[str, Contents]:
-    """Return the same part of all sources of a file, which have one clock only where they were put on it."""
+    """Return the same part of all sources of a file if they are on one clock; else refuse access to them."""
     sources = of.sources
     if len(sources) > 1 and of.clock_of is None:
         return Apart(of.path, sources)
@@ -76,7 +76,7 @@ def _sources(of: Contents, start: float, stop: float) -> Mapping[str, Contents]:
 
 
 def _stretch(of: Contents, start: float, stop: float) -> tuple[int, int]:
-    """Return the first time and the end of a part: those of the whole, where they lie within it."""
+    """Return the first time and the end of a part, limited to those of the whole."""
     t = of.table.t
     whole = of.stretch or ((int(t.min()), int(t.max()) + 1) if len(t) else (0, 1))
     first, last = max(whole[0], _whole(start)), min(whole[1], _whole(stop))
@@ -84,12 +84,12 @@ def _stretch(of: Contents, start: float, stop: float) -> tuple[int, int]:
 
 
 def _whole(value: float) -> int:
-    """Return a bound in whole us, infinite ones far away."""
+    """Return a bound in whole us; an infinite one becomes the largest time."""
     return int(np.ceil(np.clip(value, -(2.0**62), 2.0**62)))
 
 
 def _held_at(of: Contents, start: float) -> NDArray[np.uint16] | None:
-    """Return what the taxels held at a time, as far as is known."""
+    """Return the values that the taxels held at a time, as far as they are known."""
     events = of.events if of.has_events else None
     if events is None or events.intensity is None or events.present is None:
         return of.held

@@ -1,4 +1,4 @@
-"""The contents of a recording of any kind of file: one dataclass, each field read at its first access."""
+"""The contents of a recording from any kind of file: one dataclass, each field read at its first access."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ __all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "once",
 
 T = TypeVar("T")
 
-#: Value of a taxel without any event so far, where files hold what the taxels held.
+#: The held value, in files, of a taxel without any event so far.
 UNKNOWN = _core.UNKNOWN
 
 
 class Once(Generic[T]):
-    """Function that reads a value when it is first called, and keeps it.
+    """Function that reads a value at its first call and caches it.
 
     Parameters
     ----------
     read : function without arguments
-        Called once; where it raises, the next call tries again.
+        Called once; after an error the next call tries again.
     holds : function without arguments, optional
-        Whether the value holds anything, where that is known more cheaply than the value itself.
+        Whether the value holds anything, if that can be computed faster than the value itself.
     """
 
     def __init__(self, read: Callable[[], T], holds: Callable[[], bool] | None = None) -> None:
@@ -49,12 +49,12 @@ class Once(Generic[T]):
         """Return the value."""
         if self._read is not None:
             self._value = self._read()
-            # What the function refers to (another recording's contents) need not be kept longer than this.
+            # Drop the function, so that what it refers to (another recording's contents) can be freed.
             self._read = self._holds = None
         return self._value
 
     def holds(self) -> bool:
-        """Tell whether the value holds anything."""
+        """Return whether the value holds anything."""
         return anything(self()) if self._holds is None else self._holds()
 
 
@@ -81,31 +81,31 @@ def anything(value: object) -> bool:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Contents:
-    """Hold what a recording holds.
+    """Hold the contents of a recording.
 
-    Each field is a value, or a function that reads it once (`once`); reading an attribute gives the value either way.
-    What a file cannot hold has the field's default. Which function does what to which field stands in
-    `taxel.recording.fates`.
+    Each field is a value, or a function that reads it once (`once`); the attribute is the value in both cases. A field
+    that a file cannot hold has its default. The table in `taxel.recording.fates` states what each function does to each
+    field.
 
     Parameters
     ----------
     path : Path
     name, kind, label : str
-        The file's name (of a trial in other people's file what that calls it); the kind of file; what the source is
-        called among those of its file, "" where the file holds several boards of which none is its own.
+        The file's name (for a trial in a file of another format the name in that file); the kind of file; the name of
+        the source within its file, "" for a file of several boards as a whole.
     array : Array
         The sensor.
     source : str
-        Where the bytes came from.
+        The origin of the bytes, such as an address or a port.
     events, frames : Events, Frames
-        One of the two; `frames` is the value None, never a function, where it holds events.
+        One of the two; for a recording of events `frames` is None, never a function.
     stretch : (int, int), us
-        Of a part by time the first time and the end.
+        The first time and the end of a part by time.
     held : uint16, shape (rows, columns), ticks
-        What the taxels held at the beginning; `UNKNOWN` of one without any event before.
+        The values that the taxels held at the beginning; `UNKNOWN` for one without any event before.
     registers : Registers
-        What the board's registers held at the beginning, with the array that they drive: the whole sensor also where
-        the recording is a part of one.
+        The board's registers at the beginning, with the array that they drive: the whole sensor, even if the recording
+        is a part of it.
     register_changes : tuple of (int ns since 1970, Registers)
     board_changes : tuple of BoardChange
     notes : tuple of Note
@@ -115,34 +115,34 @@ class Contents:
     clock : Clock
         Arrival times against the source's time.
     clock_of : str
-        By whose clock times are, where they are not by the source's own.
+        The name of the clock of all times, if it is not the source's own.
     counts : mapping
         What was received and lost, by cause.
     verdict : str
-        The same in one line; None where nothing is said.
+        The same in one line; None if there is none.
     datagrams : Datagrams
-        As they came, of the whole file also where the recording is a part by time.
+        The datagrams as received; those of the whole file, even if the recording is a part by time.
     payload : uint8, shape (bytes,)
-        The board's bytes, of a file that does not say where datagrams begin.
+        The board's bytes, for a file that does not record where datagrams begin.
     version_2 : bool
         Whether the datagrams are of version 2 of the wire.
     differences : bool
         Whether intensities in the datagrams are differences.
     origin_us : int, us
-        What is added to times in the datagrams.
+        Offset that is added to times in the datagrams.
     unmarked : tuple of int
-        The numbers of events that are repaired though the datagrams do not say so.
+        The numbers of repaired events that the datagrams do not mark as repaired.
     samples : Samples
-        Of a stream of numbers its lines as they came.
+        The lines of a stream of numbers, as received.
     columns : tuple of str
-        Of a stream of numbers the names of its columns; None of a sensor.
+        The names of the columns of a stream of numbers; None for a sensor.
     truncated : bool
     rebuilt : mapping
-        What reading had to put up with.
+        Counts of damage that the reader skipped or repaired.
     sources : mapping from str to Contents
-        All sources of the file, this one among them; empty where it is alone.
+        All sources of the file, including this one; empty if there is only one.
     lost : tuple of str
-        A line for each thing that was left behind.
+        A line for each kind of information that was lost.
     """
 
     path: Path
@@ -184,38 +184,38 @@ class Contents:
         return value() if isinstance(value, Once) else value
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all fields, read: what goes to another process needs no file."""
+        """Read and return all fields, so that a pickle does not need the file."""
         return {name: getattr(self, name) for name in FIELDS}
 
     def holds(self, name: str) -> bool:
-        """Tell whether a field holds anything; reads no more than that takes."""
+        """Return whether a field holds anything; read no more than necessary."""
         value = vars(self)[name]
         return value.holds() if isinstance(value, Once) else anything(value)
 
     def but(self, **changed: Any) -> Self:
-        """Return the same contents with other values of some fields; nothing is read."""
+        """Return the same contents with other values of some fields; read nothing."""
         return type(self)(**{**vars(self), **changed})
 
     @property
     def has_events(self) -> bool:
-        """Whether it holds events (else pictures); reads neither."""
+        """Whether it holds events (else pictures); neither is read."""
         return vars(self)["frames"] is None
 
     @property
     def is_slice(self) -> bool:
-        """Whether it is a part by time; reads nothing."""
+        """Whether it is a part by time; nothing is read."""
         return vars(self)["stretch"] is not None
 
     @property
     def is_several(self) -> bool:
-        """Whether the file holds several boards, of which none is its own."""
+        """Whether these are the contents of a file of several boards as a whole."""
         return not self.label
 
     @property
     def table(self) -> Events | Frames:
         """The events or the pictures."""
         table = self.events if self.has_events else self.frames
-        assert table is not None  # each reader gives one of the two
+        assert table is not None  # each reader sets one of the two
         return table
 
 
@@ -224,7 +224,7 @@ FIELDS = tuple(one.name for one in fields(Contents))
 
 
 def several(sources: Mapping[str, Contents]) -> Contents:
-    """Return the contents of a file of several boards: what is of one board is refused, by the sources' names."""
+    """Return the contents of a file of several boards; fields of a single board raise an error."""
     first = next(iter(sources.values()))
     names = ", ".join(sources)
 
@@ -254,7 +254,7 @@ def several(sources: Mapping[str, Contents]) -> Contents:
 
 
 def alone(sources: Mapping[str, Contents]) -> Contents:
-    """Return the contents of a file: those of its only source, or of its only board; else one that refuses."""
+    """Return the contents of a file: those of its only source or its only board; else those of `several`."""
     boards = [one for one in sources.values() if one.has_events]
     if len(sources) == 1:
         return next(iter(sources.values()))

@@ -1,4 +1,4 @@
-"""Conversion between kinds of recordings: lossless where the target can hold all; what it cannot hold is reported."""
+"""Conversion between kinds of recordings; information that the target cannot hold is reported."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from taxel.recording.write_mcap import write_mcap
 
 __all__ = ["KINDS", "convert"]
 
-#: What can be written.
+#: The kinds of files that can be written.
 KINDS = tuple(ENDINGS)
 
 
@@ -58,13 +58,13 @@ def convert(
     Returns
     -------
     list of str
-        What was left behind, one line each: what `Recording.lost` says of the source, and what the target cannot hold;
-        empty where nothing is lost.
+        A line for each kind of information that was lost: `Recording.lost` of the source, and what the target cannot
+        hold; empty if nothing is lost.
 
     Raises
     ------
     ProblemError : another ending, or something that the target cannot hold at all (pictures in a .mcap)
-    FormatError : a source that is no recording
+    FormatError : a source that is not a recording
     OSError : a target that exists, a folder that does not, a full disk ...
 
     Examples
@@ -97,7 +97,7 @@ def convert(
     lost = list(written.lost)
     match kind:
         case ".lsa":
-            assert written.payload is not None  # `stored` gives it
+            assert written.payload is not None  # `stored` sets it
             _core.write_lsa(place, written.payload.tobytes(), overwrite)
         case ".npz":
             write_whole(place, lambda file: write_npz(file, written), overwrite=overwrite)
@@ -125,11 +125,11 @@ def _contents(source: object) -> Contents:
 
 
 def _counts(of: Contents, written: Contents) -> dict[str, Any]:
-    """Return the counts of a recording in the words of the live format."""
+    """Return the counts of a recording under the names of the live format."""
     if of.samples is not None:
         return {"received": len(of.samples), "converted": str(written.verdict).partition(": ")[2]}
     if of.kind == "events":
-        # Made of events, of which none is missing.
+        # The datagrams are made of the events, so none is missing.
         return {"received": len(written.datagrams or ()), "missing": 0}
     counts = of.counts
     known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
@@ -139,7 +139,7 @@ def _counts(of: Contents, written: Contents) -> dict[str, Any]:
 
 
 def _read_otherwise(part: Path, of: Contents) -> list[str]:
-    """Say where datagrams that were copied as they came are read as other events than the recording's."""
+    """Return a line if copied datagrams decode to other events than the recording's."""
     events = of.events
     if of.samples is not None or events is None or is_made(of):
         return []

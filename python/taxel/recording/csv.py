@@ -1,7 +1,7 @@
 """Tables of text: a .csv of events or of pictures.
 
-A .csv is either ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is one that did not come), or ``t_us`` and
-a column a taxel, named ``x3y5``.
+A .csv has either the columns ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is an absent one), or ``t_us``
+and a column a taxel, named ``x3y5``.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _TAXEL = re.compile(r"x(\d{1,5})y(\d{1,5})")
 
 
 def array_in_csv(table: Events | Frames) -> Array:
-    """Return the sensor that a .csv of a table reads as: it holds neither name nor pitch."""
+    """Return the sensor that a reader of the .csv assumes: the file holds neither name nor pitch."""
     if isinstance(table, Events):
         return around(table.x, table.y)
     x, y = np.array(_places(table.array)).reshape(-1, 2).T
@@ -53,7 +53,7 @@ def write_csv(file: BinaryIO, contents: Contents) -> None:
         names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
         file.write(names.encode() + b"\n")
         for t, picture in zip(table.t, table.values, strict=True):
-            # repr of a float32 is the shortest text that gives it back.
+            # repr of a float32 is the shortest text that reads back as the same value.
             values = (_shortest(picture[y, x]) for x, y in places)
             file.write(",".join([str(t), *values]).encode() + b"\n")
         return
@@ -76,7 +76,7 @@ def read_csv(path: Path, array: Array | None) -> Contents:
 
     Raises
     ------
-    FormatError : another header, or a value that makes no sense (names line and column)
+    FormatError : another header, or an invalid value (names line and column)
     """
     table = limited(path, _table(path, array))
     events, frames = (table, None) if isinstance(table, Events) else (None, table)
@@ -112,7 +112,7 @@ def _table(path: Path, array: Array | None) -> Events | Frames:
 
 def _csv_events(path: Path, names: list[str], body: bytes, array: Array | None) -> Events:
     if "intensity" in names:
-        # An empty intensity is one that did not come; -1 stands for it while numbers are read.
+        # An empty intensity is an absent one; -1 stands for it while numbers are read.
         body = re.sub(rb",[ \t]*(?=,|\n|$)", b",-1", body)
     table = _numbers(path, names, body, np.int64)
     t, x, y, p = table[:, :4].T
@@ -174,14 +174,14 @@ def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) 
 
 
 def _numbers(path: Path, names: list[str], body: bytes, dtype: type[Any]) -> NDArray[Any]:
-    """Read the rows below the names; the error names line and column."""
+    """Read the rows below the header; an error names line and column."""
     if not body.strip():
         return np.empty((0, len(names)), dtype)
     try:
         table = np.loadtxt(io.BytesIO(body), dtype=dtype, delimiter=",", comments=None, ndmin=2)
     except (ValueError, OverflowError) as error:
         place = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
-        # Rows are counted from 0 in one of its messages, from 1 in the other.
+        # NumPy counts rows from 0 in one of its messages, and from 1 in the other.
         row = 0 if place is None else int(place[1]) - ("changed" in str(error))
         where = "" if place is None else f", line {_line_number(body, row)}"
         if place is not None and place[2] is not None and int(place[2]) <= len(names):
@@ -194,7 +194,7 @@ def _numbers(path: Path, names: list[str], body: bytes, dtype: type[Any]) -> NDA
 
 
 def _line_number(body: bytes, row: int) -> int:
-    """Return the line of the file that holds a row of numbers; empty lines are no rows."""
+    """Return the line number of a row of numbers; empty lines are not rows."""
     rows = -1
     for k, line in enumerate(body.split(b"\n")):
         rows += bool(line.strip())

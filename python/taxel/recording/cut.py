@@ -27,26 +27,26 @@ def cut(
     before_us: float = 500_000.0,
     after_us: float = 500_000.0,
 ) -> list[Recording]:
-    """Cut a stretch of time, a region of the sensor, or what lies around each note of a label.
+    """Cut an interval of time, a region of the sensor, or an interval around each note with a label.
 
     Parameters
     ----------
     recording : Recording
     start_us, stop_us : float, us
-        What is kept, by the board's clock: ``start_us <= t < stop_us``.
+        The interval to keep, by the board's clock: ``start_us <= t < stop_us``.
     columns, rows : slice, optional
-        The rectangle that is kept; it becomes a sensor of its own, whose columns and rows count from 0. All columns and
-        rows are the recording as it is.
+        The rectangle to keep; it becomes a sensor of its own, whose columns and rows count from 0. With all columns and
+        rows the recording is unchanged.
     label : str, optional
-        Cut around each note of this text: one recording each, of which there may be none.
+        Cut around each note of this text; the result is one recording a note, and may be empty.
     before_us, after_us : float, us
-        How much around it.
+        Time to keep before and after the note.
 
     Returns
     -------
     list of Recording
-        One, or one a note. Times stay the board's. What a part by region cannot hold (datagrams) stands in its `lost`;
-        its registers are those of the whole sensor.
+        One recording, or one a note. Times do not change. Its `lost` lists what a part by region cannot hold
+        (datagrams); its registers are those of the whole sensor.
 
     Raises
     ------
@@ -81,11 +81,11 @@ def cut(
 
 
 def region(of: Contents, columns: slice, rows: slice) -> Contents:
-    """Return the part of a recording within a rectangle, as a sensor of its own; all of it as it is.
+    """Return the part of a recording within a rectangle, as a sensor of its own; unchanged if that is all.
 
     Raises
     ------
-    ProblemError : no taxel lies in the rectangle, or a file of several boards
+    ProblemError : no taxel lies in the rectangle, or the file holds several boards
     """
     array = of.array
     (left, right), (top, bottom) = array.region(columns, rows)
@@ -94,7 +94,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
     if (bottom - top, right - left) == array.shape:
         return of
     if of.is_several:
-        # Reading its events raises the error that lists its sources.
+        # Reading the events raises the error that lists the sources.
         _ = of.events
     exists = None if array.exists is None else array.exists[top:bottom, left:right]
     small = Array(bottom - top, right - left, array.pitch_mm, exists, array.name)

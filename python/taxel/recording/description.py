@@ -24,7 +24,7 @@ __all__ = ["about_of", "array_of", "board_changes_of", "detections_of", "json_of
 
 
 def json_of(contents: Contents) -> str:
-    """Return what stands beside the columns of a table, as files hold it."""
+    """Return all fields that are not columns of the table, as the JSON in files."""
     registers = contents.registers
     changes = contents.register_changes
     driven = registers.array if registers is not None else changes[0][1].array if changes else contents.array
@@ -55,7 +55,7 @@ def about_of(place: str, document: str) -> dict[str, Any]:
 
     Raises
     ------
-    FormatError : no JSON as taxel writes it (names the entry)
+    FormatError : not JSON of the expected form (names the entry)
     """
     limits.unpacked(place, len(document), limits.DESCRIPTION)
     entry = "the whole"
@@ -117,7 +117,7 @@ def zeroings_of(records: Any) -> tuple[Zeroing, ...]:
 
 
 def board_changes_of(records: Any) -> tuple[BoardChange, ...]:
-    """Return changes of the board from pairs of the host's time (ns) and a record of t_us, change, version, asked."""
+    """Return changes of the board from pairs of a host time (ns) and a record of t_us, change, version, asked."""
     return tuple(
         BoardChange(
             _time("t_us", one["t_us"]),
@@ -142,7 +142,7 @@ def _registers(values: Any, driven: Array) -> Any:
 
 
 def _counts(counts: Any, depth: int = 0) -> dict[str, Any]:
-    """Return counts by cause, whole numbers of 0 or more; those of the decoder stand in one of their own."""
+    """Return counts by cause, whole numbers of 0 or more; those of the decoder are a nested mapping."""
     if not isinstance(counts, dict):
         raise ProblemError("no object")
     return {
@@ -157,7 +157,7 @@ def _texts(texts: Any) -> tuple[str, ...]:
     return tuple(text("entry", one) for one in texts)
 
 
-#: How each entry is read, by its name; registers are checked later, as the array that they drive is another entry.
+#: The reader of each entry by name; registers are checked later, as the array that they drive is another entry.
 _ENTRIES: dict[str, Any] = {
     "array": lambda value, place: sensor(place, array_of(value)),
     "source": lambda value, _: text("source", value),

@@ -1,8 +1,8 @@
-"""What becomes of each field of a recording's contents in each function: carried, changed or lost, as one table.
+"""The table of what each function does to each field of a recording's contents: carry, change or lose it.
 
-`=` the field is carried over as it is. `~` the function gives it another value. `-` the field is lost: it gets its
-default, and `LINES` says so in `Contents.lost` where it held anything. A field that someone adds to `Contents` and does
-not decide here fails `tests/recording/test_fates.py`.
+`=`: the field is copied unchanged. `~`: the function sets another value. `-`: the field is lost; it gets its default,
+and if it held anything, `LINES` adds a line to `Contents.lost`. A field of `Contents` without a row in this table fails
+`tests/recording/test_fates.py`.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _datagrams(of: Contents, step: str) -> str:
 
 
 def _made(of: Contents) -> bool:
-    """Tell whether a file's bytes are made of events, as the datagrams are not those of this part, or by this clock."""
+    """Return whether a file's bytes must be made of the events, as the datagrams are of another part or clock."""
     return of.is_slice or of.clock_of is not None
 
 
@@ -96,10 +96,10 @@ def _sources(of: Contents, _: str) -> list[str]:
     return [f"the source {name}" for name in of.sources if name != of.label]
 
 
-#: The line of `lost` for a field that held anything. None: it is part of another field, or follows from the others.
+#: The line of `lost` for a field that held anything. None: the field is part of another one, or follows from others.
 LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "source": lambda of, _: f"where it came from ({of.source})",
-    # A part that was written is a recording of its own.
+    # A part that is written to a file becomes a recording of its own.
     "stretch": None,
     "held": lambda of, _: f"what {counted(int(np.sum(of.held != UNKNOWN)), 'taxel')} held at the beginning",
     "registers": lambda _, __: "the board's registers",
@@ -111,11 +111,11 @@ LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "clock": lambda of, _: [] if of.holds("datagrams") else "arrival times",
     "clock_of": lambda of, _: f"by whose clock times are ({of.clock_of})",
     "counts": lambda _, __: "what was received and lost, by cause",
-    # The counts in one line.
+    # This field is the counts in one line.
     "verdict": None,
     "datagrams": _datagrams,
     "payload": lambda _, __: "raw bytes (words that are no events)",
-    # These describe how the datagrams are encoded; a .lsa has no datagrams, but their bytes.
+    # These fields describe how the datagrams are encoded; a .lsa has only the bytes of the datagrams.
     "version_2": None,
     "differences": lambda _, step: "that intensities are differences" if step == ".lsa" else [],
     "origin_us": None,
@@ -129,7 +129,7 @@ LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
 
 
 def after(step: str, of: Contents, lines: Callable[[], Iterable[str]] | None = None, **changed: Any) -> Contents:
-    """Return the contents that a function makes of others, by the table.
+    """Return new contents according to the column of a function in the table.
 
     Parameters
     ----------
@@ -137,9 +137,9 @@ def after(step: str, of: Contents, lines: Callable[[], Iterable[str]] | None = N
         The function: a column of the table.
     of : Contents
     lines : function that returns lines, optional
-        What of the changed fields is lost.
+        Lines for information that is lost from the changed fields.
     **changed
-        A value (or `once`) for each field that the table calls changed, and for no other.
+        A value (or `once`) for each field that the table marks as changed, and for no other.
     """
     fates = FATES[step]
     expected = {name for name, fate in fates.items() if fate == CHANGED} - {"lost"}
@@ -165,5 +165,5 @@ def _lost_lines(step: str, of: Contents, gone: Iterable[str]) -> list[str]:
 
 
 def _together(*every: Iterable[str]) -> tuple[str, ...]:
-    """Return lines in their order, each once."""
+    """Return all lines in order, without duplicates."""
     return tuple(dict.fromkeys(line for lines in every for line in lines))

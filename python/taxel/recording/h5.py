@@ -1,10 +1,10 @@
-"""Events or pictures in a .h5: a data set a column, as `taxel convert` writes them.
+"""Events or pictures in a .h5: one data set a column, as `taxel convert` writes them.
 
 The root has the attribute ``taxel`` (1, the layout's version). Events are the data sets ``t`` (int64, us), ``x``, ``y``
-(uint16), ``p`` (bool) and where they came ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
+(uint16), ``p`` (bool), optionally ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
 ``markers`` (int64, two columns: us, whether a start); pictures are ``values`` (float32, pictures x rows x columns)
-with ``t`` and ``unit`` (text). ``held`` (uint16, rows x columns, 65 535 where nothing is known) is what the taxels held
-at the beginning. ``about`` is JSON: the sensor, where it came from, registers, notes, detections and what was lost.
+with ``t`` and ``unit`` (text). ``held`` (uint16, rows x columns, 65 535 for unknown) is the values of the taxels at the
+beginning. ``about`` is JSON: the sensor, the source, registers, notes, detections and lost information.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from taxel.recording.npz import TEXTS, columns_of, contents_of
 
 __all__ = ["is_ours", "read_h5", "write_h5"]
 
-#: Of the layout.
+#: Version of the layout.
 _VERSION = 1
-#: Of a data set's pieces, which are packed one by one.
+#: Size of the chunks of a data set, which are compressed one by one.
 _PIECE_BYTES = 1 << 20
 
 
 def is_ours(path: Path) -> bool:
-    """Tell whether a .h5 is of the layout that `taxel convert` writes; false too for what is no HDF5 file."""
+    """Return whether a .h5 has the layout that `taxel convert` writes; false for a file that is not HDF5."""
     try:
         with H5File(path) as h5:
             return "taxel" in h5.attributes
@@ -53,11 +53,11 @@ def write_h5(part: Path, contents: Contents) -> None:
 
 
 def read_h5(path: Path, array: Array | None) -> Contents:
-    """Read a .h5 of ours.
+    """Read a .h5 that taxel wrote.
 
     Raises
     ------
-    FormatError : no HDF5 file, or one of another layout
+    FormatError : not an HDF5 file, or one of another layout
     """
     with H5File(path) as h5:
         if "taxel" not in h5.attributes:

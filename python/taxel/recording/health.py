@@ -1,4 +1,4 @@
-"""Which taxels are dead, stuck or noisy, as far as a recording can show it."""
+"""Detection of dead, stuck and noisy taxels in a recording."""
 
 from __future__ import annotations
 
@@ -22,21 +22,23 @@ if TYPE_CHECKING:
 
 __all__ = ["Health", "TaxelStatistics", "health", "judged"]
 
-#: Reading: a taxel is called dead where it was silent while its neighbours spoke so often (median of them), and went on
-#: the way that they went before so often: a touch does that, but noise at a floor goes up and down in turn ...
+#: Reading: a taxel is dead if it had no event while the median of its neighbours had at least this number of events,
+#: and at least this number in the direction of their event before. A touch causes such events; noise at the noise floor
+#: alternates ...
 DEAD_BELOW, MOVED_FROM = 10, 3
-#: ... or where it is known to hold 0 while its neighbours (median) never held less than so many ticks, and than such a
-#: share of the largest value of the array ...
+#: ... or if it is known to hold 0 while the least value of its neighbours (median) was at least this number of ticks
+#: and this share of the largest value of the array ...
 REST_FROM, REST_SHARE = 10, 0.2
-#: ... or where most of the array is so loud that hardly a taxel spoke less: of those among speaking neighbours, as many
-#: as such a share of the silent ones ...
+#: ... or if most of the array is so noisy that hardly any taxel had few events: among taxels with active neighbours, at
+#: most this share of the number of silent ones ...
 QUIET_SHARE = 0.1
-#: ... stuck where it spoke so often at least and showed one value only ...
+#: ... It is stuck if it had at least this number of events, all with one value ...
 STUCK_FROM = 3
-#: ... noisy where it spoke so many times as often as four in five of the 24 taxels around it, and so often at least.
+#: ... It is noisy if it had this many times the events of four in five of the 24 taxels around it, and at least this
+#: number.
 NOISY_TIMES, NOISY_FROM, NOISY_SHARE = 8.0, 20, 0.8
 
-#: Taxels whose neighbours are looked at at once.
+#: Number of taxels whose neighbours are computed at once.
 _AT_ONCE = 1 << 17
 
 
@@ -48,7 +50,7 @@ class Health:
     ----------
     array : Array
     activity : int64, shape (rows, columns)
-        Events (or changes of the picture) at each taxel.
+        Number of events (or changes of the picture) at each taxel.
     dead, stuck, noisy : bool, shape (rows, columns)
     """
 
@@ -76,17 +78,16 @@ class Health:
 
 
 def health(recorded: Events | Frames | Recorded) -> Health:
-    """Tell which taxels are dead, stuck or noisy, each against its neighbours.
+    """Return which taxels are dead, stuck or noisy, each compared with its neighbours.
 
-    A recording in which a place was never touched cannot show whether its taxels live: a taxel counts as dead only
-    where most of its neighbours were moved, or where it is known to hold 0 and they never do. What a state of wire
-    version 2 told (`Events.repaired`), and what was held as a recording began, says what a taxel holds; it is the
-    board's word, so it does not count as the taxel's own.
+    A recording cannot show whether taxels work in a region that was never touched: a taxel counts as dead only if most
+    of its neighbours had events, or if it is known to hold 0 and they never do. States of wire version 2
+    (`Events.repaired`) and the values held at the beginning count as held values, but not as events of the taxel.
 
     Parameters
     ----------
     recorded : Events, Frames or Recording
-        Of pictures each change of a value counts as an event.
+        In pictures each change of a value counts as an event.
 
     Returns
     -------
@@ -98,15 +99,14 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 
     Notes
     -----
-    *Reading* (the thesis defines none): dead, silent while the median of its up to 8 neighbours has 10 events or more,
-    of which 3 or more go the way that the taxel's last one went; or silent and known to hold 0, while the median of
-    what its neighbours held at least is 10 ticks or more and a fifth of the array's largest value. Noise at a noise
-    floor makes events that go up and down in turn, so that a live taxel may be silent for long where others speak; it
-    tells of a death only where it is so loud that, over half of the array or more, at most a tenth as many spoke 1 to 9
-    times as were silent.
-    Stuck, 3 events or more with one and the same intensity in all, while its neighbours show more than one; or silent
-    as a dead one, but known to hold something. Noisy, 20 events or more and 8 times what four in five of the up to 24
-    taxels around it have.
+    *Reading* (the thesis defines none). Dead: no event, while the median of its up to 8 neighbours has 10 events or
+    more, of which 3 or more have the polarity of the same taxel's event before; or no event and known to hold 0, while
+    the median of the least values of its neighbours is 10 ticks or more and a fifth of the array's largest value. Noise
+    at the noise floor causes events of alternating polarity, so that a working taxel may have none for long while
+    others do; it shows a dead taxel only if it is so strong that, over half of the array or more, the taxels with 1 to
+    9 events are at most a tenth as many as the silent ones. Stuck: 3 events or more, all with one intensity, while its
+    neighbours show more than one; or silent like a dead one, but known to hold a value other than 0. Noisy: 20 events
+    or more, and 8 times as many as four in five of the up to 24 taxels around it.
 
     Examples
     --------
@@ -123,11 +123,11 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     if not isinstance(held, Frames):
         raise ProblemError(f"recorded is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     flat = held.values.reshape(len(held), held.array.rows * held.array.columns)
-    # What is no number goes no way.
+    # A NaN has no direction of change.
     ways = (flat[1:] > flat[:-1]).astype(np.int8) - (flat[1:] < flat[:-1])
     turn, taxel = np.nonzero(ways)
     activity, moved = _ways(taxel, ways[turn, taxel], held.array)
-    # A taxel of pictures that never changes is dead or stuck: its value tells which.
+    # In pictures a taxel that never changes is dead or stuck, depending on its value.
     result = judged(held.array, TaxelStatistics(activity, moved, activity + 1))
     if not len(held):
         return result
@@ -136,26 +136,26 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 
 
 class TaxelStatistics(NamedTuple):
-    """What each taxel did, and what is known to be held; whole numbers, shape (rows, columns)."""
+    """Statistics of each taxel's events and held values; whole numbers, shape (rows, columns)."""
 
     activity: NDArray[np.int64]
-    """Events."""
+    """Number of events."""
     moved: NDArray[np.int64]
-    """Events that go the way of the taxel's event before."""
+    """Number of events with the polarity of the taxel's event before."""
     values: NDArray[np.signedinteger] | None = None
-    """How many different intensities its events showed: 0, 1, or 2 and more; None where events have none."""
+    """Number of different intensities of its events: 0, 1, or 2 for more; None if events have none."""
     least: NDArray[np.signedinteger] | None = None
-    """The least value that it is known to have held, ticks; -1 of a taxel without any event."""
+    """The least value that it is known to have held, ticks; -1 for a taxel without any event."""
     greatest: NDArray[np.signedinteger] | None = None
-    """The greatest, likewise."""
+    """The greatest value that it is known to have held, ticks; -1 for a taxel without any event."""
 
 
 def judged(array: Array, statistics: TaxelStatistics) -> Health:
-    """Tell it from what each taxel did, by the rules of `health`."""
+    """Return the health of taxels with these statistics, by the rules of `health`."""
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
     activity = statistics.activity
     silent = exists & (activity == 0)
-    # A median reaches a bound only beside a taxel that does: all others need not be looked at.
+    # A median reaches a bound only if a neighbour reaches it, so all other taxels are skipped.
     among = _reaches(activity, exists, _beside(exists & (activity >= DEAD_BELOW)) & exists, DEAD_BELOW)
     moved = _reaches(statistics.moved, exists, silent & among, MOVED_FROM)
     quiet = np.count_nonzero(among & (activity > 0) & (activity < DEAD_BELOW))
@@ -198,7 +198,7 @@ def _statistics_of_events(events: Events) -> TaxelStatistics:
 
 
 def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return how many changes each taxel has, and how many of them go the way of the one before."""
+    """Return how many changes each taxel has, and how many of them have the direction of the one before."""
     order = np.argsort(index, kind="stable")
     taxel, way = index[order], way[order]
     on = taxel[1:][(taxel[1:] == taxel[:-1]) & (way[1:] == way[:-1])]
@@ -209,7 +209,7 @@ def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[ND
 
 
 def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Tell which taxels have one of a mask among their up to 8 neighbours."""
+    """Return which taxels have a taxel of a mask among their up to 8 neighbours."""
     rows, columns = mask.shape
     padded = np.pad(mask, 1)
     reached = np.zeros(mask.shape, bool)
@@ -221,7 +221,7 @@ def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _reaches(
     grid: NDArray[Any], counts: NDArray[np.bool_], where: NDArray[np.bool_], bound: float, *, above: bool = False
 ) -> NDArray[np.bool_]:
-    """Tell at which of some taxels the median of the neighbours that count is at least a bound, or above it."""
+    """Return for which taxels the median of the neighbours that count is at least a bound, or above it."""
     reached = np.zeros(grid.shape, bool)
     places = np.flatnonzero(where)
     medians = _around(grid, counts, places)
@@ -232,9 +232,9 @@ def _reaches(
 def _around(
     grid: NDArray[Any], counts: NDArray[np.bool_], places: NDArray[np.int64], reach: int = 1, share: float = 0.5
 ) -> NDArray[np.float64]:
-    """Return a quantile (the median) of the neighbours that count, for taxels by index; 0 where none counts.
+    """Return a quantile (the median) of the neighbours that count, for taxels by index; 0 if none counts.
 
-    numpy.nanquantile does the same a hundred times slower, a taxel at a time.
+    numpy.nanquantile does the same for one taxel at a time and is a hundred times slower.
     """
     rows, columns = grid.shape
     quantiles = np.empty(len(places))
@@ -246,7 +246,7 @@ def _around(
             at = (np.where(inside, y + i, 0), np.where(inside, x + j, 0))
             use = inside & counts[at]
             row[use] = grid[at][use]
-        # Sorted, what does not count is last.
+        # Neighbours that do not count are NaN, which is sorted last.
         stack.sort(axis=0)
         last = np.count_nonzero(~np.isnan(stack), axis=0) - 1
         place = share * np.maximum(last, 0)
@@ -258,6 +258,6 @@ def _around(
 
 
 def _offsets(reach: int) -> list[tuple[int, int]]:
-    """Return how far rows and columns of the neighbours so far away lie off."""
+    """Return the row and column offsets of all neighbours within a distance."""
     steps = range(-reach, reach + 1)
     return [(i, j) for i in steps for j in steps if (i, j) != (0, 0)]

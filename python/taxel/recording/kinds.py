@@ -1,4 +1,4 @@
-"""Which kind of recording a file is, by its first bytes and its ending."""
+"""Recognition of the kind of a recording by a file's first bytes and its ending."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from taxel.recording.contents import Contents
 
 __all__ = ["ENDINGS", "kind_of", "kind_of_file", "verdict_of"]
 
-#: The kinds of ours by their endings.
+#: taxel's own kinds of files by their endings.
 ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
 
-#: How files of ours begin that have a magic.
+#: The magic bytes of taxel's own kinds of files.
 _MAGIC = {
     b"\x89MCAP0\r\n": "mcap",
     b"PK\x03\x04": "npz",
     b"PK\x05\x06": "npz",
     b"\x89HDF\r\n\x1a\n": "h5",
 }
-#: How well-known files of other kinds begin, and what to do with them.
+#: The first bytes of well-known files of other kinds, and advice for the error.
 _STRANGERS = {
     b"\x1f\x8b": "gzip; unpack it first",
     b"\x28\xb5\x2f\xfd": "zstd; unpack it first",
@@ -35,7 +35,7 @@ _STRANGERS = {
 
 
 def kind_of_file(kind: str) -> str:
-    """Return what a kind of recording is called: by its ending where it is ours, else by its format.
+    """Return the name of a kind of recording: its ending if it is taxel's own, else its format.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def kind_of_file(kind: str) -> str:
 
 
 def verdict_of(contents: Contents) -> str:
-    """Return in one line what was lost of a recording, or that its file does not record it."""
+    """Return in one line what was lost of a recording, or that its file does not record losses."""
     verdict = contents.verdict
     return f"the {kind_of_file(contents.kind)} does not say what was lost" if verdict is None else verdict
 
@@ -56,7 +56,7 @@ def kind_of(path: Path) -> str:
 
     Raises
     ------
-    FormatError : no recording (says what it is, where that is known)
+    FormatError : not a recording (names the kind of file if it is known)
     OSError : the file is not there, or cannot be read
     """
     with path.open("rb") as file:
@@ -85,5 +85,5 @@ def kind_of(path: Path) -> str:
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
         raise FormatError(f"{path}, byte 0: starts with {begins}, not with {expected[ending]} ({magic})")
-    # Errors of a .mcap come from the compiled reader, those of a .csv from the reader of tables.
+    # The compiled reader raises the errors of a .mcap, and the reader of tables those of a .csv.
     return ending

@@ -1,4 +1,4 @@
-"""Recordings merged into one: one after the other, by their times, or sensors beside one another."""
+"""Merges recordings into one: in sequence, by their times, or with their sensors side by side."""
 
 from __future__ import annotations
 
@@ -30,24 +30,25 @@ __all__ = ["merge", "merged"]
 
 
 def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, beside: bool = False) -> Recording:
-    """Merge recordings of one sensor in time, or of several sensors beside one another.
+    """Merge recordings of one sensor in time, or of several sensors side by side.
 
     Parameters
     ----------
     recordings : iterable of Recording
-        Of events all, or of pictures all in one unit.
+        All of events, or all of pictures in one unit.
     gap_us : float, us, 0 or more, optional
-        Put each after the end of the one before, with such a pause; left out, all keep their times (one clock).
+        Pause between the end of a recording and the next one, which is shifted to follow it; default: all keep their
+        times (one clock).
     beside : bool
-        Put the sensors beside one another, left to right, as one with all their columns; else they must be equal.
-        Of pictures then the times must be equal.
+        Whether to place the sensors side by side, left to right, as one sensor with all their columns; pictures must
+        then have equal times. Otherwise the sensors must be equal.
 
     Returns
     -------
     Recording
-        In memory; `taxel.convert` writes it. A note at the beginning of each says which it was, so that `cut` finds it.
-        Registers, changes of the board, zeroed taxels, counts, arrival times and what the taxels held at the beginning
-        stay where the recordings agree; where they do not, `Recording.lost` says so.
+        In memory; `taxel.convert` writes it. A note with its name marks the beginning of each recording, so that `cut`
+        finds it. Registers, changes of the board, zeroed taxels, counts, arrival times and the values held at the
+        beginning are carried if the recordings agree; otherwise `Recording.lost` lists them.
 
     Raises
     ------
@@ -129,7 +130,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         truncated=any(part.truncated for part in parts),
         **fields,
     )
-    # Reading `lost` read all fields; with its value in place of its function the parts can be freed.
+    # `lost` is stored as a value, not as a function of the parts, so that the parts can be freed.
     return together.but(lost=together.lost)
 
 
@@ -139,7 +140,7 @@ def _at(t: int | None, shift: int, change: Any) -> Any:
 
 
 class _Common:
-    """Merges a field: the common value where all recordings agree, else the empty value and a line of `lost`."""
+    """Merges a field: the common value if all recordings agree, else the empty value and a line of `lost`."""
 
     def __init__(self, parts: Sequence[Contents], lost: list[str]) -> None:
         self.parts, self.lost = parts, lost
@@ -191,7 +192,7 @@ def _others(parts: Sequence[Contents]) -> list[str]:
 
 
 def _notes(parts: Sequence[Contents], tables: Sequence[Events | Frames], shifts: Sequence[int]) -> tuple[Note, ...]:
-    """Return all notes by time, and one with its name where each recording begins."""
+    """Return all notes by time, and a note with its name at the beginning of each recording."""
     notes: list[Note] = []
     for part, own, shift in zip(parts, tables, shifts, strict=True):
         notes.append(Note(part.name, int(own.t.min()) + shift if len(own) else shift, 0))
@@ -200,7 +201,7 @@ def _notes(parts: Sequence[Contents], tables: Sequence[Events | Frames], shifts:
 
 
 def _detections(parts: Sequence[Contents], shifts: Sequence[int]) -> Detections:
-    """Return all detections by the time at which they were known."""
+    """Return all detections in the order of `known`."""
     rows: list[Any] = []
     for part, shift in zip(parts, shifts, strict=True):
         d = part.detections
@@ -213,13 +214,13 @@ def _detections(parts: Sequence[Contents], shifts: Sequence[int]) -> Detections:
 def _zeroings(
     parts: Sequence[Contents], shifts: Sequence[int], lefts: Sequence[int], lost: list[str], *, beside: bool
 ) -> tuple[Zeroing, ...]:
-    """Return the zeroed taxels of all, where none of them would rest elsewhere in another recording than it did."""
+    """Return the zeroed taxels of all recordings, unless one of them would change a rest in another recording."""
     every = [
         [Zeroing(z.t + shift, z.x + left, z.y, z.rest, z.before) for z in part.zeroings]
         for part, shift, left in zip(parts, shifts, lefts, strict=True)
     ]
     together = tuple(sorted({z for own in every for z in own}, key=lambda z: (z.t, z.x, z.y)))
-    # Beside one another each has taxels of its own.
+    # Sensors side by side have no taxels in common.
     for part, own, shift in zip(parts, every, shifts, strict=True):
         stop = _end(part) + shift
         if not beside and {z for z in together if z.t < stop} != {z for z in own if z.t < stop}:
@@ -229,7 +230,7 @@ def _zeroings(
 
 
 def _end(part: Contents) -> int:
-    """Return the time behind all that a recording holds."""
+    """Return the first time after everything in a recording."""
     if part.stretch is not None:
         return part.stretch[1]
     t = part.table.t
@@ -246,12 +247,12 @@ def _begin(part: Contents) -> int:
 def _held(
     parts: Sequence[Contents], tables: Sequence[Events | Frames], shifts: Sequence[int], lost: list[str]
 ) -> NDArray[np.uint16] | None:
-    """Return what the taxels held at the beginning, where what came since explains what they held in later parts."""
+    """Return the values held at the beginning, if they and the events since imply those held in later parts."""
     every = list(zip(parts, tables, shifts, strict=True))
     every.sort(key=lambda one: _begin(one[0]) + one[2])
     first = every[0][0].held
     now = np.full(parts[0].array.shape, UNKNOWN, np.uint16) if first is None else first.copy()
-    # All that came, by time: what the taxels hold where each recording begins.
+    # All events by time determine the values that the taxels hold at the beginning of each recording.
     changes = [(t.t + shift, t) for _, t, shift in every if isinstance(t, Events) and t.intensity is not None]
     at = np.concatenate([t[e.present] for t, e in changes]) if changes else np.zeros(0, np.int64)
     x, y, ticks = (
@@ -275,7 +276,7 @@ def _held(
 
 
 def _beside_held(parts: Sequence[Contents], array: Array, lefts: Sequence[int]) -> NDArray[np.uint16] | None:
-    """Return what the taxels of all sensors held at the beginning."""
+    """Return the values that the taxels of all sensors held at the beginning."""
     if all(part.held is None for part in parts):
         return None
     held = np.full(array.shape, UNKNOWN, np.uint16)
@@ -286,7 +287,7 @@ def _beside_held(parts: Sequence[Contents], array: Array, lefts: Sequence[int]) 
 
 
 def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
-    """Return what is added to the times of each."""
+    """Return the time that is added to each recording."""
     if gap is None:
         return [0] * len(tables)
     shifts: list[int] = [0]
@@ -312,7 +313,7 @@ def _common(parts: Sequence[Contents], tables: Sequence[Events | Frames]) -> Arr
 
 
 def _side_by_side(tables: Sequence[Events | Frames]) -> tuple[Array, list[int]]:
-    """Return one sensor of all, and the first column of each; what one has fewer rows does not exist."""
+    """Return one sensor of all, and the first column of each; rows that a sensor lacks do not exist there."""
     arrays = [table.array for table in tables]
     lefts = np.cumsum([0, *(a.columns for a in arrays)]).tolist()
     rows = max(a.rows for a in arrays)

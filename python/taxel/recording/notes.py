@@ -1,4 +1,4 @@
-"""What stands in a recording beside its events and notes: zeroed taxels, changes of the board, raw bytes and lines."""
+"""Parts of a recording other than events and notes: zeroed taxels, changes of the board, datagrams, samples."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ __all__ = ["BoardChange", "Datagrams", "Samples", "Zeroing"]
 
 @dataclass(frozen=True)
 class Zeroing:
-    """Hold that a person zeroed a taxel: from then on it rests at what it held.
+    """Hold that a person zeroed a taxel: its held value becomes its rest.
 
     Parameters
     ----------
     t : int, us
-        When: after all events up to then, before later ones.
+        Time of the zeroing: after all events up to it, before later ones.
     x, y : int, taxels
         The taxel's column and row.
     rest : float, ticks
-        What it rests at from then on.
+        The rest from then on.
     before : float, ticks, optional
-        What it rested at before, where that was known.
+        The rest before, if it was known.
     """
 
     t: int
@@ -42,16 +42,16 @@ class BoardChange:
     Attributes
     ----------
     t : int, us, or None
-        The board's time, which goes on over the change; None where it was not known.
+        The board's time, which continues over the change; None if it was unknown.
     at_ns : int, ns since 1970
-        When it was noticed.
+        Time at which the change was detected.
     change : str
-        "reset": the board was reset, so its taxels hold nothing until their next event. "wire": it speaks another
-        version of the wire.
+        "reset": the board was reset, so the values of its taxels are unknown until their next event. "wire": it
+        switched to another version of the wire.
     version : int, 1 or more, or None
-        Of the wire from here on.
+        The version of the wire from then on.
     asked : bool
-        Whether the host asked for that change; else the board's datagrams showed it.
+        Whether the host requested the change; otherwise it was detected in the board's datagrams.
 
     Examples
     --------
@@ -75,15 +75,15 @@ class BoardChange:
 
 @dataclass(frozen=True, eq=False)
 class Datagrams:
-    """Hold raw datagrams as they came.
+    """Hold raw datagrams as received.
 
     Parameters
     ----------
     arrived_ns : int64, shape (n,), ns since 1970
     number : uint64, shape (n,), from 0 on
-        Our own arrival number: a hole in it is a datagram that was received but is not here.
+        Our arrival number; a missing number is a datagram that was received but is not stored.
     offsets : int64, shape (n + 1,), bytes
-        Where each begins in `payload`, and at last where all end.
+        Index of the first byte of each in `payload`; the last entry is the number of bytes.
     payload : uint8, shape (bytes,), bytes as received
 
     Examples
@@ -112,19 +112,19 @@ class Datagrams:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Hold the lines of a stream of numbers as they came.
+    """Hold the lines of a stream of numbers as received.
 
     Parameters
     ----------
     about : mapping
-        What the file says of the stream: its name, columns, and which of them is its own time.
+        The description of the stream in the file: its name, columns, and which of them is its own time.
     arrived_ns : int64, shape (n,), ns since 1970
     number : uint64, shape (n,)
-        Our own arrival number.
+        Our arrival number.
     t : int64, shape (n,), us
-        The stream's own time, unwrapped; the host's where it has none.
+        The stream's own time, unwrapped; the host's if it has none.
     values : float64, shape (n, columns)
-        All columns of each line, its own time unwrapped.
+        All columns of each line, with its own time unwrapped.
     """
 
     about: Mapping[str, Any]

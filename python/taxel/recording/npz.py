@@ -1,7 +1,7 @@
-"""Events or pictures as named columns, as a .npz and a .h5 hold them.
+"""Events or pictures as named columns, the common layout of .npz and .h5.
 
-Events are ``t x y p``, with ``intensity present``, ``repaired`` and ``markers`` where there are any; pictures are
-``values t unit``. ``held`` is what the taxels held at the beginning; ``about`` is JSON of all that no column holds.
+Events are ``t x y p``, optionally with ``intensity present``, ``repaired`` and ``markers``; pictures are
+``values t unit``. ``held`` is the values of the taxels at the beginning; ``about`` is JSON with all other fields.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["TEXTS", "around", "columns_of", "contents_of", "read_npz", "write_np
 
 _EVENTS = ("t", "x", "y", "p")
 _COLUMNS = (*_EVENTS, "intensity", "present", "repaired", "markers", "values", "unit", "held", "about")
-#: The columns that are one text.
+#: The columns that are a single text.
 TEXTS = ("about", "unit")
 
 
@@ -50,7 +50,7 @@ def columns_of(contents: Contents) -> dict[str, NDArray[Any]]:
 
 
 def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: Array | None) -> Contents:
-    """Return the contents of a file of columns, which become its own.
+    """Return the contents of a file of columns; the arrays are not copied.
 
     Parameters
     ----------
@@ -58,11 +58,11 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
     kind : str
     columns : dict from name to array
     array : Array, optional
-        The sensor, where the caller says; else what the file says, else one around the events.
+        The sensor; default: that of the file, else one large enough for the events.
 
     Raises
     ------
-    FormatError : a column is missing, or makes no sense
+    FormatError : a column is missing or invalid
     """
     columns = {name: frozen(values) for name, values in columns.items()}
     about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
@@ -104,19 +104,19 @@ def write_npz(file: BinaryIO, contents: Contents) -> None:
 
 
 def read_npz(path: Path, array: Array | None) -> Contents:
-    """Read a .npz of ours, or one with the columns ``t x y p`` or ``values t``.
+    """Read a .npz that taxel wrote, or one with the columns ``t x y p`` or ``values t``.
 
     Raises
     ------
     FormatError : damage, or no such columns
     """
-    # A column of another name is not read, but stands in the error of what is missing.
+    # Other columns are not read, but the error for a missing column lists them.
     columns = read_arrays(path, _COLUMNS, texts=TEXTS) or {name: np.empty(0) for name in stored_names(path)[:8]}
     return contents_of(path, "npz", columns, array)
 
 
 def around(x: NDArray[Any], y: NDArray[Any]) -> Array:
-    """Return the thesis' array, or a larger one where events lie outside it."""
+    """Return the thesis' array, or a larger one if events lie outside it."""
     thesis = Array.thesis()
     if not len(x):
         return thesis

@@ -1,4 +1,4 @@
-"""All sources of a recording by one clock."""
+"""Converts the times of all sources of a recording to one clock."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Times = Callable[[NDArray[np.int64]], NDArray[np.int64]]
 
 
 def on_clock(of: Contents, name: str) -> Contents:
-    """Return the same recording with all sources' times by the clock of one of them, or of the host.
+    """Return the same recording with the times of all sources by the clock of one of them, or of the host.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def _clock(of: Contents) -> Clock:
 
 
 def _times(own: Clock, to: Clock | None) -> Times:
-    """Return a function from times of one clock to those of another; the host's, where that is none."""
+    """Return a function that converts times of one clock to those of another; None is the host's clock."""
 
     def times(t: NDArray[np.int64]) -> NDArray[np.int64]:
         host = own.host_ns(np.asarray(t, np.int64))
@@ -67,7 +67,7 @@ def _times(own: Clock, to: Clock | None) -> Times:
 
 
 def _moved(of: Contents, name: str, times: Times | None) -> Contents:
-    """Return a source with its times by another clock; with its own, where that is none."""
+    """Return a source with its times converted to another clock; None leaves them unchanged."""
     if times is None:
         same = ("events", "frames", "board_changes", "notes", "detections", "zeroings", "clock", "samples", "sources")
         return after("on_clock", of, clock_of=name, **{field: vars(of)[field] for field in same})
@@ -110,7 +110,7 @@ def _moved(of: Contents, name: str, times: Times | None) -> Contents:
         zeroings=once(lambda: tuple(replace(z, t=one(z.t)) for z in of.zeroings)),
         clock=once(lambda: None if of.clock is None else Clock(times(of.clock.board_us), of.clock.arrived_ns)),
         clock_of=name,
-        # Their own times are by another clock.
+        # The times in the datagrams are by the source's own clock.
         samples=None,
         sources={},
     )

@@ -1,4 +1,4 @@
-"""What `taxel.open` opens: a file of ours, a file of other people's, a folder of trials."""
+"""Opens a recording: a file that taxel writes, a file of another format, or a folder of trials."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from taxel.recording.sidecars import with_sidecars
 
 __all__ = ["open_any", "open_recording"]
 
-#: What a folder's reference events are called.
+#: The file name of a folder's reference events.
 LABELS = "labels.csv"
 
 
@@ -41,32 +41,32 @@ def open_any(
     Parameters
     ----------
     path : path
-        A .mcap, .lsa, .npz, .csv or .h5 of ours, finished or not, whole or damaged; a file of other people's that
-        `taxel.formats` reads; or a folder of either kind.
+        A .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged; a file of another format
+        that `taxel.formats` reads; or a folder of either kind.
     array : Array, optional
-        The sensor, for files that do not hold it (.lsa, .csv, plain .npz); the thesis' 64 x 64 where it is left out,
-        a larger one where events lie outside it.
+        The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
+        a larger one if events lie outside it.
     pairing : {"direct", "taxel"}
         Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
     differences : bool
-        Whether the intensities of a .lsa are differences (the board's option); a .mcap says so itself.
+        Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
     Returns
     -------
     Recording, or list of Recording
-        A file of ours is one. A folder is a list, in the order of the names (2 before 10), and so is a file of other
-        people's, which holds a trial or several: what is known of them (contact, foot-off ...) appears as notes.
+        One for a file as taxel writes it. A list for a folder, in the order of the names (2 before 10), and for a file
+        of another format, which holds one or more trials: their reference events (contact, foot-off ...) become notes.
 
     Raises
     ------
-    FormatError : no recording, or damaged where nothing can be read (names the place)
-    OSError : the file is not there, or cannot be read
+    FormatError : not a recording, or damaged so that nothing can be read (names the place)
+    OSError : the file does not exist, or cannot be read
 
     Notes
     -----
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
-    stands in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) appear as
-    notes of the recordings that it names; where a folder holds files of ours, other files in it are not looked at.
+    is described in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) become
+    notes of the recordings that it names; in a folder with files that taxel writes, all other files are ignored.
 
     Examples
     --------
@@ -84,7 +84,7 @@ def open_any(
     how: dict[str, Any] = {"array": array, "pairing": pairing, "differences": differences}
     if place.is_dir():
         return _folder(place, how)
-    # Names of other people's formats are tested first, as telling whose a .h5 is means to read it once more.
+    # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
     if place.exists() and (names := _formats(place)) and not _is_own(place):
         return [_of(trial, place, names[0]) for trial in formats.trials(place, names[0])]
     return open_recording(place, **how)
@@ -93,18 +93,18 @@ def open_any(
 def open_recording(
     path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
 ) -> Recording:
-    """Open one file of ours: .mcap, .lsa, .npz, .csv or .h5, finished or not, whole or damaged.
+    """Open one .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged.
 
     Parameters
     ----------
     path : path
     array : Array, optional
-        The sensor, for files that do not hold it (.lsa, .csv, plain .npz); the thesis' 64 x 64 where it is left out,
-        a larger one where events lie outside it.
+        The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
+        a larger one if events lie outside it.
     pairing : {"direct", "taxel"}
         Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
     differences : bool
-        Whether the intensities of a .lsa are differences (the board's option); a .mcap says so itself.
+        Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
 
     Returns
     -------
@@ -112,8 +112,8 @@ def open_recording(
 
     Raises
     ------
-    FormatError : the file is of another kind, or damaged where nothing can be read (names the place)
-    OSError : the file is not there, or cannot be read
+    FormatError : the file is of another kind, or damaged so that nothing can be read (names the place)
+    OSError : the file does not exist, or cannot be read
 
     Notes
     -----
@@ -141,7 +141,7 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
 
 
 def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
-    """Open all recordings of a folder, with the labels that lie beside them."""
+    """Open all recordings of a folder, with the labels in the same folder."""
     own = sorted((f for f in folder.iterdir() if f.is_file() and f.name != LABELS and _is_own(f)), key=_order)
     if own:
         opened = [open_recording(file, **how) for file in own]
@@ -160,7 +160,7 @@ def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
 
 
 def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recording]:
-    """Put the reference events of a folder among the notes of its recordings."""
+    """Add the reference events of a folder to the notes of its recordings."""
     if not table.exists():
         return [recording for _, recording in pairs]
     labels = Labels(table)
@@ -188,7 +188,7 @@ def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
 
 
 def _of(trial: Trial, place: Path, kind: str) -> Recording:
-    """Return a trial of other people's as a recording; what is known of it are notes."""
+    """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
@@ -209,7 +209,7 @@ def _holds_own(folder: Path) -> bool:
 
 
 def _is_own(file: Path) -> bool:
-    """Tell whether a file is of a kind of ours, by its ending and, where others use that too, by its content."""
+    """Return whether a file is of a kind that taxel writes, by its ending and, for shared endings, by its content."""
     ending = file.suffix.lower()
     if ending == ".csv":
         with file.open("rb") as table:
@@ -220,5 +220,5 @@ def _is_own(file: Path) -> bool:
 
 
 def _order(path: Path) -> list[tuple[bool, int, str]]:
-    """Return what puts names in the order that people expect: 2 before 10."""
+    """Return the sort key of a name in natural order: 2 before 10."""
     return [(part.isdigit(), int(part) if part.isdigit() else 0, part) for part in re.split(r"(\d+)", str(path))]

@@ -1,4 +1,4 @@
-"""Pictures of a recording: its own, or what its taxels held at whole periods; as they were read, or calibrated."""
+"""Pictures of a recording: its own, or the held values at multiples of a period; raw or calibrated."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from taxel.tare import Tare
 
 __all__ = ["FRAMES_HZ", "calibrated", "period_us", "pictures"]
 
-#: Pictures a second where a recording of events is asked for frames without a rate.
+#: The default rate of pictures of a recording of events, Hz.
 FRAMES_HZ = 100.0
 
 
 def period_us(name: str, rate_hz: float) -> int:
-    """Return the whole us of a rate.
+    """Return the period of a rate in whole us.
 
     Raises
     ------
@@ -39,19 +39,19 @@ def pictures(of: Contents, rate_hz: float | None = None, *, name: str = "rate_hz
     ----------
     of : Contents
     rate_hz : float, above 0, optional
-        Pictures a second, rounded to whole us; left out, pictures stay, and events are shown 100 times a second.
+        Pictures a second, with a period rounded to whole us; default: pictures are unchanged, events have 100 a second.
     name : str
-        What errors call the rate.
+        The name of the rate in errors.
 
     Returns
     -------
     Contents
-        Of events: what the taxels hold, from what they held at the beginning on, else from 0; of pictures: the last
-        one at each time.
+        For events: the held values of the taxels, beginning with those at the start of the recording, or with 0; for
+        pictures: the last one at each time.
 
     Raises
     ------
-    ProblemError : a rate that makes no sense; where the pictures are asked for, events without intensities
+    ProblemError : an invalid rate; when the pictures are read, events without intensities
     """
     period = None if rate_hz is None else period_us(name, rate_hz)
     return after(
@@ -60,15 +60,15 @@ def pictures(of: Contents, rate_hz: float | None = None, *, name: str = "rate_hz
         lambda: ["the events between the pictures"] if of.has_events else [],
         events=None,
         frames=once(lambda: _drawn(of, period) if of.has_events else _resampled(of, period)),
-        # The first picture holds it.
+        # The first picture includes the held values.
         held=None if of.has_events else once(lambda: of.held),
     )
 
 
 def _drawn(of: Contents, period: int | None) -> Frames:
     events = of.events
-    assert events is not None  # the caller asked
-    # A value of 65 535 stands for one that is not known.
+    assert events is not None  # the caller checked
+    # A value of 65 535 stands for an unknown one.
     begins = None if of.held is None else np.where(of.held == UNKNOWN, 0, of.held)
     period = round(1e6 / FRAMES_HZ) if period is None else period
     return Frames.from_events(events, period, *(of.stretch or ()), held=begins)
@@ -76,7 +76,7 @@ def _drawn(of: Contents, period: int | None) -> Frames:
 
 def _resampled(of: Contents, period: int | None) -> Frames:
     own = of.frames
-    assert own is not None  # the caller asked
+    assert own is not None  # the caller checked
     if period is None or not len(own):
         return own
     t = np.arange(own.t[0], own.t[-1] + 1, period, dtype=np.int64)
@@ -92,7 +92,7 @@ def calibrated(of: Contents, rate_hz: float | None = None, rest: Tare | None = N
     rate_hz : float, above 0, optional
         As of `pictures`.
     rest : Tare, optional
-        Today's rest; the calibration's own where it is left out.
+        Today's rest; default: the calibration's own.
 
     Raises
     ------

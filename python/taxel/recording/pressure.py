@@ -1,4 +1,4 @@
-"""What a recording reads above rest: the pictures whose area, peak, sum and centre a pressure lab looks at first."""
+"""Pictures of a recording above rest, and their contact area, peak, sum and centre of pressure over time."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from taxel.recording.recording import Recording
 
 __all__ = ["Series", "above_rest", "readings", "series"]
 
-#: Of a long recording, so many pictures at most: a curve has no more points to see.
+#: The most pictures of a long recording, as a plot resolves no more points.
 MOST_PICTURES = 2000
-#: Pictures a second of a short recording of events.
+#: Rate of the pictures of a short recording of events, Hz.
 PICTURES_HZ = 100.0
-#: Values of pictures that are looked at at once.
+#: Number of values of pictures that are computed at once.
 _BLOCK = 1 << 21
 
 
@@ -35,7 +35,7 @@ class Series:
     t : int64, shape (n,), us
     unit : str
     above : float
-        What a loaded taxel reads more than, in `unit`.
+        The value above which a taxel counts as loaded, in `unit`.
     area : float64, shape (n,), mm2
     peak, total : float64, shape (n,), in `unit`
     centre : float64, shape (n, 2), mm
@@ -61,8 +61,8 @@ class Series:
 def series(recording: Recording) -> Series | None:
     """Return area, peak, sum and centre of a recording's pictures above rest (`above_rest`); None without intensities.
 
-    Of events only taxels that have some are looked at, a block of pictures at a time: of a large sensor with few events
-    there is never a whole picture in memory.
+    For events only taxels with events are computed, a block of pictures at a time: for a large sensor with few events
+    no whole picture is in memory.
     """
     if not recording.has_events or recording.calibration is not None:
         result = above_rest(recording)
@@ -94,10 +94,10 @@ def series(recording: Recording) -> Series | None:
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """What the taxels with events hold at the times of pictures, a block of pictures at a time."""
+    """The held values of the taxels with events at the times of pictures, in blocks of pictures."""
 
     t: NDArray[np.int64]
-    #: The indices of the taxels, when the first event of each comes, us, and what they hold.
+    #: The indices of the taxels, the time of the first event of each, us, and their held values.
     taxels: NDArray[np.int64]
     since: NDArray[np.int64]
     held: _core.HeldValues
@@ -105,7 +105,7 @@ class _Drawn:
     @classmethod
     def of(cls, recording: Recording) -> _Drawn:
         events = recording.events
-        assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller asked
+        assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
         there = np.flatnonzero(events.present)
         taxels, column = np.unique(events.array.index(events.x[there], events.y[there]), return_inverse=True)
         begins, held = None, recording._contents.held
@@ -117,7 +117,7 @@ class _Drawn:
         return cls(_times(recording), taxels, since, values)
 
     def blocks(self) -> Iterator[tuple[int, NDArray[np.float32]]]:
-        """Give the first picture of each block, and what the taxels hold in its pictures."""
+        """Yield the number of the first picture of each block, and the held values of the taxels in its pictures."""
         each = max(1, _BLOCK // max(1, len(self.taxels)))
         for first in range(0, len(self.t), each):
             yield first, self.held.at(self.t[first : first + each]).reshape(-1, len(self.taxels))
@@ -136,13 +136,13 @@ def _times(recording: Recording) -> NDArray[np.int64]:
 
 
 def above_rest(recording: Recording) -> tuple[Frames, float] | None:
-    """Return pictures of what stands above rest, and what a loaded taxel reads more than; None without intensities.
+    """Return pictures of the values above rest, and the threshold of a loaded taxel; None without intensities.
 
-    They are in N or kPa where a calibration lies beside the recording.
+    They are in N or kPa if the recording has a calibration file beside it.
 
-    *Reading*: the rest of a taxel of events is the lowest value that it held since it was first heard, and it is loaded
-    above the noise floor of the board's fast presets and half a tick, as `taxel.encode.ContactArea` has it. Files of
-    pictures hold pressure: rest is 0 there.
+    *Reading*: in a recording of events the rest of a taxel is the lowest value since its first event, and it is loaded
+    if it is above its rest by more than the noise floor of the board's fast presets and half a tick, as in
+    `taxel.encode.ContactArea`. Files of pictures hold pressure, so the rest is 0.
     """
     read = readings(recording)
     if read is None:
@@ -157,9 +157,9 @@ def above_rest(recording: Recording) -> tuple[Frames, float] | None:
 
 
 def readings(recording: Recording) -> tuple[Frames, NDArray[np.float64], float] | None:
-    """Return pictures as they were read, each taxel's rest, and what a loaded one reads more; None without intensities.
+    """Return raw pictures, each taxel's rest, and the threshold of a loaded taxel; None without intensities.
 
-    The rest of a taxel that was never heard is infinite.
+    The rest of a taxel without any event is infinite.
     """
     if not recording.has_events:
         return recording.frames(), np.zeros(recording.array.shape), 0.0
@@ -173,7 +173,7 @@ def readings(recording: Recording) -> tuple[Frames, NDArray[np.float64], float] 
 
 
 def _first_event_us(events: Events) -> NDArray[np.int64]:
-    """Return the time of each taxel's first event, us; far ahead where there is none."""
+    """Return the time of each taxel's first event, us; the largest time if there is none."""
     first = np.full(events.array.shape, np.iinfo(np.int64).max)
     there = events.present
     np.minimum.at(first, (events.y[there], events.x[there]), events.t[there])

@@ -1,4 +1,4 @@
-"""Reads the manual's raw bytes (.lsa)."""
+"""Reads files of the board's raw bytes (.lsa), as the manual defines them."""
 
 from __future__ import annotations
 

@@ -24,11 +24,11 @@ __all__ = ["ascending", "read_mcap"]
 
 
 def read_mcap(path: Path, pairing: str) -> Contents:
-    """Return the contents of a .mcap: those of its only source or board, with all sources in them.
+    """Return the contents of a .mcap: those of its only source or board, including all sources.
 
     Raises
     ------
-    FormatError : no recording of the live format, or damaged where nothing can be read
+    FormatError : not a recording of the live format, or damaged so that nothing can be read
     OSError : the file cannot be read
     """
     reader = _core.RecordingReader(path)
@@ -40,7 +40,7 @@ def read_mcap(path: Path, pairing: str) -> Contents:
 
 
 class _Source:
-    """Reader of one source of a file: its header and trailer, and what its fields read in common."""
+    """Reader of one source of a file: its header and trailer, and the values that several fields share."""
 
     def __init__(self, path: Path, reader: _core.RecordingReader, sources: dict[str, Contents]) -> None:
         self.reader = reader
@@ -127,23 +127,23 @@ class _Source:
         return Registers._of(first, self.driven())
 
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:
-        """Return the registers as they were set."""
+        """Return the registers at each change."""
         return tuple((at, Registers._of(values, self.driven())) for at, values in self.remarks()["registers"])
 
     def held(self) -> NDArray[np.uint16] | None:
-        """Return what the taxels held at the beginning."""
+        """Return the values that the taxels held at the beginning."""
         held = self.remarks()["held"]
         if held is None or len(held) != self.array.rows * self.array.columns:
             return None
         return np.array(held, np.uint16).reshape(self.array.shape)
 
     def rebuilt(self) -> dict[str, int]:
-        """Return what reading had to put up with."""
+        """Return counts of damage that the reader skipped or repaired."""
         rebuilt = {key: int(value) for key, value in self.opened.items() if key != "unfinished"}
         return {**rebuilt, "bad_chunks": int(self.remarks()["bad_chunks"])}
 
     def counts_of_board(self, decoded: tuple[Any, ...]) -> dict[str, Any]:
-        """Return what came and was lost of a board, by cause."""
+        """Return the numbers of received and lost datagrams and events of a board, by cause."""
         counts = self.ending.get("finished", {}).get("counts") or self.remarks()["counts"] or {}
         _, decoder, _, _, number, *_ = decoded
         missing = int(number[-1]) - int(number[0]) + 1 - len(number) if len(number) else 0
@@ -157,14 +157,14 @@ class _Source:
         }
 
     def counts_of_stream(self, read: tuple[Any, ...]) -> dict[str, Any]:
-        """Return what came and was lost of a stream, by cause."""
+        """Return the numbers of received and lost datagrams and lines of a stream, by cause."""
         _, _, t, _, bad, resets = read
         counts = self.ending.get("finished", {}).get("counts") or {}
         damage = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
         return {**damage, "received": counts.get("received"), **self.rebuilt()}
 
     def verdict(self) -> str:
-        """Return in one line what was lost where."""
+        """Return in one line what was lost at which stage."""
         rebuilt = self.rebuilt()
         bad = []
         if rebuilt["large_chunks"]:
@@ -185,7 +185,7 @@ class _Source:
         so_far = self.remarks()["counts"]
         known = "no counts were saved yet"
         if so_far is not None:
-            # What was received then is more than what the file holds now: the rest is the unfinished end.
+            # If more was received than the file holds, the difference is in its unfinished end.
             known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))
         return "; ".join([why, *bad, f"until then: {known}"])
 
@@ -197,6 +197,6 @@ def _clock(decoded: tuple[Any, ...]) -> Clock:
 
 
 def ascending(t: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return times of pictures, of which two at one time follow one another by 1 us."""
+    """Return times of pictures, with equal times moved apart by 1 us."""
     steps = np.arange(len(t))
     return np.maximum.accumulate(t - steps) + steps if len(t) else t

@@ -1,4 +1,4 @@
-"""A file, opened: what was recorded, when, and what was lost."""
+"""An opened recording: its events or pictures, their times, and what was lost."""
 
 from __future__ import annotations
 
@@ -37,27 +37,27 @@ __all__ = ["Recording"]
 
 
 class Recording:
-    """Hold an opened file: each attribute is read at its first access.
+    """Hold an opened file; each attribute is read at its first access.
 
     Made by `taxel.open`.
 
     Parameters
     ----------
     contents : Contents
-        What `taxel.open` read.
+        The contents that `taxel.open` read.
 
     Attributes
     ----------
     path : Path
     name : str
-        The file's name; of a trial in other people's file what that calls it.
+        The file's name; for a trial in a file of another format its name in that file.
     kind : str
-        "mcap", "lsa", "npz", "csv" or "h5"; of other people's one of `taxel.formats.FORMATS`; of
-        `taxel.merge` "merged".
+        "mcap", "lsa", "npz", "csv" or "h5"; one of `taxel.formats.FORMATS` for another format; "merged" for the
+        result of `taxel.merge`.
     array : Array
         The sensor.
     source : str
-        Where the bytes came from, as the file says.
+        The origin of the bytes, as the file states it.
 
     Raises
     ------
@@ -111,16 +111,17 @@ class Recording:
         Parameters
         ----------
         rate_hz : float, above 0, optional
-            Pictures a second, rounded to whole us; left out, a file of pictures gives its own, one of events 100.
+            Pictures a second, with a period rounded to whole us; default: a file of pictures returns its own, one of
+            events 100 a second.
 
         Returns
         -------
         Frames
-            Of events: the held intensities, which begin with `held`, else with 0; of pictures: the last at each time.
+            For events: the held intensities, beginning with `held`, or with 0; for pictures: the last at each time.
 
         Raises
         ------
-        ProblemError : a rate that makes no sense, or events without intensities
+        ProblemError : an invalid rate, or events without intensities
         """
         frames = pictures(self._contents, rate_hz).frames
         assert frames is not None  # pictures
@@ -128,29 +129,29 @@ class Recording:
 
     @property
     def sources(self) -> dict[str, Recording]:
-        """The sources of the file by name, in the order in which they were named, each with its own clock.
+        """The sources of the file by name, in their order in the file, each with its own clock.
 
-        Each is a recording that every step takes. A file of one board is one source. Of one board and streams of
-        numbers (an IMU) the file's own events, frames and all else are the board's; of several boards they are refused,
-        by name.
+        Each is a recording that every function accepts. A file of one board has one source. In a file of one board and
+        streams of numbers (an IMU) the events, frames and other attributes are those of the board; in a file of several
+        boards they raise an error that names the sources.
 
         Raises
         ------
-        ProblemError : of a slice by the clock of one source: the others have another
+        ProblemError : a slice by the clock of one source, as the other sources have other clocks
         """
         own = self._contents
         every = own.sources or {own.label: own}
         return {name: self if name == own.label else Recording(one_source(own, name)) for name in every}
 
     def on_clock(self, name: str) -> Recording:
-        """Return the same recording with all its sources' times by the clock of one of them, or of the host.
+        """Return the same recording with the times of all sources by the clock of one of them, or of the host.
 
-        Nothing else applies what is known of the clocks (`clock`): until this is asked for, each source has its own.
+        No other function converts times between clocks (`clock`): without this call each source has its own.
 
         Parameters
         ----------
         name : str
-            A source, or "host": then times are us since 1970.
+            A source, or "host" for times in us since 1970.
 
         Raises
         ------
@@ -165,18 +166,18 @@ class Recording:
 
     @property
     def held(self) -> NDArray[np.float32] | None:
-        """What the taxels held when it began, ticks, shape (rows, columns), NaN of one without any event before.
+        """The values of the taxels at its beginning, ticks, shape (rows, columns); NaN without any event before.
 
-        None where nothing is known of it. A recording that begins in mid-stream says it, as a taxel that does not
-        change would else be unknown until it does; a slice knows what came before it. `frames` begins with it, and so
-        do encoders and readouts that are given the recording (not its events alone).
+        None if they are unknown. A recording that begins in mid-stream stores them, as a taxel without changes would
+        otherwise be unknown; for a slice they follow from the events before it. `frames` begins with them, and so do
+        encoders and readouts whose argument is the recording (not its events alone).
         """
         held = self._contents.held
         return None if held is None else np.where(held == UNKNOWN, np.nan, held).astype(np.float32)
 
     @property
     def calibration(self) -> Calibration | None:
-        """The calibration that lies beside the file (`Calibration.beside`); None where there is none.
+        """The calibration in the file's folder (`Calibration.beside`); None if there is none.
 
         Raises
         ------
@@ -186,14 +187,14 @@ class Recording:
         return self._contents.calibration
 
     def calibrated(self, rate_hz: float | None = None, rest: Tare | None = None) -> Frames:
-        """Return pictures in N or kPa, by the calibration that lies beside the file.
+        """Return pictures in N or kPa, by the calibration in the file's folder.
 
         Parameters
         ----------
         rate_hz : float, above 0, optional
-            As of `frames`.
+            As in `frames`.
         rest : Tare, optional
-            Today's rest; the calibration's own where it is left out.
+            Today's rest; default: the calibration's own.
 
         Raises
         ------
@@ -215,54 +216,54 @@ class Recording:
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What people wrote down, in the order of the file; then the labels of its folder and of `NAME.notes.csv`.
+        """The notes of the file in its order, followed by the labels of its folder and of `NAME.notes.csv`.
 
         Raises
         ------
-        FormatError : a table of labels that is none (names the line)
+        FormatError : an invalid table of labels (names the line)
         """
         return self._contents.notes
 
     @property
     def zeroings(self) -> tuple[Zeroing, ...]:
-        """Taxels that people zeroed while recording, in order; of a slice those before it too, which hold in it."""
+        """Taxels that people zeroed while recording, in order; a slice includes those before it, which still apply."""
         return self._contents.zeroings
 
     @property
     def detections(self) -> Detections:
-        """What a readout detected while recording."""
+        """The detections of a readout while recording."""
         return self._contents.detections
 
     @property
     def registers(self) -> Registers | None:
-        """What the board's registers held at the beginning; None where the file does not say.
+        """The board's registers at the beginning; None if the file does not have them.
 
-        They are those of the whole sensor (`Registers.array`), also where the recording is a part of it.
+        They are those of the whole sensor (`Registers.array`), even if the recording is a part of it.
         """
         return self._contents.registers
 
     @property
     def register_changes(self) -> tuple[tuple[int, Registers], ...]:
-        """The registers as they were set while recording, each with the host's time (ns since 1970)."""
+        """The registers at each change while recording, with the host's time (ns since 1970)."""
         return self._contents.register_changes
 
     @property
     def board_changes(self) -> tuple[BoardChange, ...]:
-        """Resets of the board and changes of its version of the wire, as they were noticed live."""
+        """Resets of the board and changes of its version of the wire, as detected while recording."""
         return self._contents.board_changes
 
     @property
     def clock(self) -> Clock | None:
-        """Arrival times against board time; None where the file has no arrival times."""
+        """Arrival times against board time; None if the file has no arrival times."""
         return self._contents.clock
 
     @property
     def columns(self) -> list[str]:
-        """Of a stream of numbers the names of its columns of values, in the order of `frames`.
+        """The names of the columns of a stream of numbers, in the order of `frames`.
 
         Raises
         ------
-        ProblemError : no stream of numbers
+        ProblemError : the recording is not a stream of numbers
         """
         columns = self._contents.columns
         if columns is None:
@@ -273,20 +274,20 @@ class Recording:
 
     @property
     def is_stream(self) -> bool:
-        """Whether it is a stream of numbers, line by line, as an IMU's, and no array of taxels."""
+        """Whether it is a stream of numbers, such as that of an IMU, instead of an array of taxels."""
         return self._contents.columns is not None
 
     @property
     def is_on_clock(self) -> bool:
-        """Whether times are by another clock, made by `on_clock`."""
+        """Whether times were converted to another clock by `on_clock`."""
         return self._contents.clock_of is not None
 
     def datagrams(self) -> Datagrams:
-        """Return the raw datagrams as they came; of a slice, too, all of the file.
+        """Return the raw datagrams as received; a slice returns all those of the file.
 
         Raises
         ------
-        ProblemError : there are none: of a stream, of a part of a sensor, of a kind of file that does not hold them
+        ProblemError : there are none: a stream, a part of a sensor, or a kind of file that does not hold them
         """
         datagrams = self._contents.datagrams
         if datagrams is not None:
@@ -301,20 +302,20 @@ class Recording:
 
     @property
     def counts(self) -> dict[str, Any]:
-        """What came and what was lost, by cause."""
+        """The numbers of what was received and lost, by cause."""
         return dict(self._contents.counts)
 
     @property
     def verdict(self) -> str:
-        """One line: nothing lost after arrival, or what was lost where."""
+        """One line: nothing lost after arrival, or what was lost at which stage."""
         return verdict_of(self._contents)
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """What was left behind on the way from what was recorded to here, one line each; nothing of a whole file.
+        """Information that functions could not carry over from the original recording, one line each.
 
-        Cutting, merging, converting and the like add to it, and `.mcap`, `.npz` and `.h5` keep it. What was lost while
-        recording is the `verdict`.
+        Cutting, merging, converting and similar functions add to it, and `.mcap`, `.npz` and `.h5` store it. It is
+        empty for an original file. Losses while recording are in `verdict`.
 
         Examples
         --------
@@ -336,13 +337,13 @@ class Recording:
 
     @property
     def rebuilt(self) -> dict[str, int]:
-        """What reading had to put up with: torn bytes at the end, gaps, bytes skipped there, bad and large chunks."""
+        """Counts of damage found while reading: cut bytes at the end, gaps, bytes skipped, bad and large chunks."""
         return dict(self._contents.rebuilt)
 
     def between(self, start: float, stop: float) -> Recording:
         """Return the part of ``start <= t < stop`` (us of the board's clock).
 
-        Notes without a time are left out, and stand in its `lost`.
+        Notes without a time are dropped and listed in its `lost`.
 
         Parameters
         ----------
@@ -378,7 +379,7 @@ class Recording:
         return Recording(with_notes(self._contents, more))
 
     def plot(self) -> Figure:
-        """Draw what is in it: events (or the sum of pressure) over time, and where on the array."""
+        """Draw events (or the sum of pressure) over time, and the activity of each taxel."""
         return draw("overview", self)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
@@ -416,7 +417,7 @@ def with_notes(of: Contents, more: tuple[Note, ...]) -> Contents:
 
 
 def one_source(of: Contents, name: str) -> Contents:
-    """Return one source of a file; its sources are those of the file, so that every way back is open."""
+    """Return one source of a file; its `sources` are all those of the file."""
     one = of.sources[name]
     fixed = ("path", "kind", "clock_of", "sources")
     values = {field: value for field, value in vars(one).items() if field not in (*fixed, "lost")}

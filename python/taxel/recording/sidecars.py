@@ -14,7 +14,7 @@ __all__ = ["calibration_beside", "has_calibration", "with_sidecars"]
 
 
 def with_sidecars(of: Contents) -> Contents:
-    """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration that lie beside it."""
+    """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration in its folder."""
     sources: dict[str, Contents] = {}
     for name, one in (of.sources or {of.label: of}).items():
         # Labels are by the clock of the file's first source.
@@ -43,12 +43,12 @@ def _labels(path: Path) -> tuple[Note, ...]:
 
 
 def has_calibration(path: Path) -> bool:
-    """Tell whether a calibration lies beside a file."""
+    """Return whether a calibration file lies beside a file."""
     return Calibration.beside(path) is not None
 
 
 def calibration_beside(path: Path, of: Contents) -> Calibration | None:
-    """Return the calibration that lies beside a file (`Calibration.beside`); None where there is none.
+    """Return the calibration beside a file (`Calibration.beside`); None if there is none.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a file of each kind can hold of a recording: contents as they will be read again, and what is lost."""
+"""The contents that a file of each kind can hold: the fields that a reader will return, and what is lost."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ STAMP_US = 100
 #: Fields that describe how the datagrams are encoded.
 _OF_DATAGRAMS = ("version_2", "differences", "origin_us", "unmarked")
 
-#: So many numbers of repaired events at most stand in the description of a .mcap, which holds 16 MiB.
+#: The most numbers of repaired events in the description of a .mcap, which is limited to 16 MiB.
 _MOST = 1_000_000
 
 
 def stored(of: Contents, place: Path) -> Contents:
-    """Return what a file holds of a recording; the kind of file is the ending of its place.
+    """Return the contents that a file can hold of a recording; the kind of file is the ending of its path.
 
     Raises
     ------
-    ProblemError : something that the kind of file cannot hold at all (pictures in a .mcap)
+    ProblemError : contents that the kind of file cannot hold at all (pictures in a .mcap)
     """
     ending = place.suffix.lower()
     common: dict[str, Any] = {"path": place, "name": place.name, "kind": ENDINGS[ending], "label": "board"}
@@ -46,30 +46,30 @@ def stored(of: Contents, place: Path) -> Contents:
 
 
 def is_made(of: Contents) -> bool:
-    """Tell whether the bytes of a file are made of events, as there are no datagrams of just these events."""
+    """Return whether a file's bytes must be made of the events, as no datagrams contain exactly these events."""
     return of.is_slice or of.clock_of is not None or not (of.holds("datagrams") or of.holds("payload"))
 
 
 def _calibration(of: Contents, place: Path) -> dict[str, Any]:
-    """Return the calibration that lies beside a new file."""
+    """Return the calibration beside a new file."""
     return {"calibration": once(lambda: calibration_beside(place, of), lambda: has_calibration(place))}
 
 
 def _left_beside(of: Contents, place: Path) -> list[str]:
-    """Say that a recording's calibration does not lie beside the new file."""
+    """Return a line if the recording's calibration does not lie beside the new file."""
     if not of.holds("calibration") or has_calibration(place):
         return []
     return ["the calibration, a file of its own: lay a copy beside the new one"]
 
 
 def _table(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
-    """Return what a .npz or a .h5 holds: all but the bytes as they came."""
+    """Return the contents of a .npz or a .h5: all but the raw datagrams."""
     place = common["path"]
     return after(ending, of, lambda: _left_beside(of, place), **common, source=of.source or of.name)
 
 
 def _csv(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
-    """Return what a .csv holds: events without markers, or pictures without their unit."""
+    """Return the contents of a .csv: events without markers, or pictures without their unit."""
     place = common["path"]
     table, events, frames = of.table, None, None
     lost = [sensor(of.array)]
@@ -87,7 +87,7 @@ def _csv(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
 
 
 def _lsa(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
-    """Return what a .lsa holds: the board's bytes as they came, or made of the events."""
+    """Return the contents of a .lsa: the board's bytes as received, or made of the events."""
     place, events = common["path"], _events(of, common["path"])
     lost = [sensor(of.array)] * (of.array != Array.thesis())
     payload = of.payload if of.datagrams is None else of.datagrams.payload
@@ -107,7 +107,7 @@ def _lsa(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
 
 
 def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
-    """Return what a .mcap holds: all; where there are no datagrams of just these events, the events in new ones."""
+    """Return the contents of a .mcap: all; events without datagrams of exactly these events get new datagrams."""
     place, verdict = common["path"], verdict_of(of)
     changed: dict[str, Any] = {
         "source": of.source or of.name or "events",
@@ -142,7 +142,7 @@ def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
 
 
 def _mended(of: Contents) -> list[str]:
-    """Say what a new .mcap, which is whole, states in its verdict alone: that it was made of a damaged file."""
+    """Return a line if a new .mcap is made of a damaged file, as the new file itself is undamaged."""
     return ["that its end is missing"] * of.truncated + ["what reading had to put up with"] * of.holds("rebuilt")
 
 

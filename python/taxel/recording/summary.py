@@ -1,4 +1,4 @@
-"""What is in a recording, in numbers: its size and rates, its pressure, which taxels are dead, and what was lost."""
+"""Summary of a recording: its size and rates, pressure, dead taxels, and losses."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from taxel.recording.recording import Recording
 
 __all__ = ["summary"]
 
-#: The stretch over which the highest rate is taken, us.
+#: The interval over which the highest rate is measured, us.
 _PEAK_US = 10_000
 
 
 def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
-    """Return all that `taxel info` says, as JSON holds it.
+    """Return everything that `taxel info` prints, as JSON values.
 
     Parameters
     ----------
     recording : Recording
     pressed : Series, optional
-        Its pressure over time (`taxel.recording.pressure.series`), where it has any.
+        Its pressure over time (`taxel.recording.pressure.series`), if it has intensities.
     """
     array = recording.array
     table = recording.events if recording.has_events else recording.frames()
@@ -79,13 +79,13 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
 
 
 def _file_name(recording: Recording) -> str:
-    """Return the file, and which trial of it this is where other people's holds several."""
+    """Return the name of the file, and that of the trial if a file of another format holds several."""
     place = str(recording.path)
     return place if place.endswith(recording.name) else f"{place}, {recording.name}"
 
 
 def _pressure(pressed: Series) -> dict[str, Any] | None:
-    """Return the largest contact area, peak and sum with their times, and where the centre went."""
+    """Return the largest contact area, peak and sum with their times, and the path of the centre."""
     if not len(pressed.t):
         return None
     facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
@@ -100,7 +100,7 @@ def _pressure(pressed: Series) -> dict[str, Any] | None:
 
 
 def _peak(t: NDArray[np.int64]) -> float | None:
-    """Return the highest rate in a stretch of 10 ms of board time, events/s."""
+    """Return the highest rate in an interval of 10 ms of board time, events/s."""
     if not len(t):
         return None
     _, counts = np.unique(t // _PEAK_US, return_counts=True)

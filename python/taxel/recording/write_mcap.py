@@ -1,4 +1,4 @@
-"""Writes the live format: datagrams as they came, or made of events, with all that stands beside them."""
+"""Writes the live format: datagrams as received, or made of events, with all other records."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
         With datagrams, or the lines of a stream.
     compression : {"none", "lz4", "zstd"}
     counts : dict
-        What was received and lost, in the words of the live format.
+        The numbers of what was received and lost, under the names of the live format.
 
     Raises
     ------
@@ -42,8 +42,8 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
         writer.finish(json.dumps(counts))
         return
     datagrams, events = contents.datagrams, contents.events
-    assert datagrams is not None and events is not None  # noqa: PT018  `stored` gives both
-    # Before 1970 there is no time of the host: board times are moved there as a whole.
+    assert datagrams is not None and events is not None  # noqa: PT018  `stored` sets both
+    # Host times before 1970 are not possible, so all board times are shifted together.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)
     registers = contents.registers
@@ -60,11 +60,11 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
         "started_ns": int(arrived[0]) if len(arrived) else 0,
     }
     writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
-    # Before all datagrams, as the recorder does it: who plays the file looks for it there.
+    # Written before all datagrams, as the recorder does, because a player reads it there.
     if contents.held is not None:
         writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(contents.held).reshape(-1))
     done = 0
-    # Commands of the host stand between the datagrams before and after them: the decoder needs this order.
+    # Commands of the host are written between the datagrams before and after them, an order that the decoder needs.
     for change in contents.board_changes:
         upto = int(np.searchsorted(datagrams.arrived_ns, change.at_ns, side="left"))
         _add_datagrams(writer, datagrams, arrived, done, max(done, upto))
@@ -78,24 +78,24 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
 def encoded(
     events: Events, held: NDArray[np.uint16] | None, clock: Clock | None
 ) -> tuple[int, Datagrams, NDArray[np.int64]]:
-    """Return events as datagrams of wire version 2, which holds all of them.
+    """Return events as datagrams of wire version 2, without loss.
 
     Parameters
     ----------
     events : Events
     held : uint16, shape (rows, columns), ticks, optional
-        What the taxels held at the beginning.
+        The values that the taxels held at the beginning.
     clock : Clock, optional
-        Where it is known, each datagram promises a time and came when the host's clock showed it, so that a reader
-        finds the same clock; else it promises nothing, and no clock can be made of it.
+        If given, each datagram promises a time and has the host's time for it as its arrival time, so that a reader
+        computes the same clock; otherwise datagrams promise no time, and a reader finds no clock.
 
     Returns
     -------
     int, us
-        What is added to times in the datagrams.
+        Offset to be added to times in the datagrams.
     Datagrams
     int64, shape (n,)
-        The numbers of events that are repaired though no state of a taxel tells what they tell.
+        The numbers of repaired events that no state of a taxel can encode.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def encoded(
     begins = None if held is None else np.ascontiguousarray(held).reshape(-1)
     origin_us, offsets, payload, times, unmarked = _core.encode_datagrams(events._parts(), begins, clock is not None)
     at = times * 1000 if clock is None or not len(times) else np.asarray(clock.host_ns(times), np.int64)
-    # Arrivals never step back.
+    # Arrival times never decrease.
     arrived = np.maximum.accumulate(at) if len(at) else at
     return origin_us, Datagrams(arrived, np.arange(len(arrived), dtype=np.uint64), offsets, payload), unmarked
 
@@ -142,7 +142,7 @@ def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
 
 
 def cut_raw(raw: NDArray[np.uint8]) -> Datagrams:
-    """Cut raw bytes into datagrams; each has the board's time of its first stamp, as there are no arrival times."""
+    """Split raw bytes into datagrams; the arrival time of each is the board's time of its first stamp."""
     raw = np.ascontiguousarray(raw)
     offsets, times = _core.wire_cut(raw)
     return Datagrams(times * 1000, np.arange(len(times), dtype=np.uint64), offsets, raw)

@@ -95,7 +95,7 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
 
 @contextmanager
 def _quiet_about_names() -> Iterator[None]:
-    """Keep pynwb from complaining that the file beside its place has another name, and of columns of one's own."""
+    """Suppress pynwb's warnings about the name of the temporary file and about columns that NWB does not define."""
     with catch_warnings():
         filterwarnings("ignore", category=UserWarning, module="pynwb|hdmf")
         yield

@@ -48,7 +48,7 @@ class SpikeTrains(Columns):
 
     Notes
     -----
-    `times`, `offsets` and `values` are read-only: arrays of the caller's are copied once, unless they are read-only
+    `times`, `offsets` and `values` are read-only: a caller's arrays are copied once, unless they are read-only
     themselves.
 
     Examples
@@ -91,7 +91,7 @@ class SpikeTrains(Columns):
             Ascending in each train; a train may be empty.
         start : float, ms
         stop : float, ms, optional
-            The last spike's time where it is left out.
+            Default: the time of the last spike.
         values : sequence of float sequences, a polarity or bits a spike, optional
 
         Returns
@@ -100,7 +100,7 @@ class SpikeTrains(Columns):
 
         Raises
         ------
-        ProblemError : times that make no sense (names train and spike)
+        ProblemError : invalid times (names train and spike)
 
         Examples
         --------
@@ -116,7 +116,7 @@ class SpikeTrains(Columns):
             _finite_values(signed)
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
-            # What is not finite is refused below, by its place.
+            # Values that are not finite are refused below, with their positions.
             stop = float(max(number("start", start, "ms"), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
         return cls._of_own(flat, offsets, start, stop, signed)
 
@@ -168,7 +168,7 @@ class SpikeTrains(Columns):
         return self.values is not None
 
     def split_by_sign(self) -> SpikeTrains:
-        """Return all ON trains (value above 0), then all OFF trains; unsigned trains come back as they are."""
+        """Return all ON trains (value above 0), then all OFF trains; unsigned trains are returned unchanged."""
         return self._from_parts(_core.split_by_sign(self._parts()))
 
     def between(self, start: float, stop: float) -> SpikeTrains:
@@ -184,7 +184,7 @@ class SpikeTrains(Columns):
 
         Raises
         ------
-        ProblemError : a window that makes no sense
+        ProblemError : an invalid window
 
         Examples
         --------
@@ -233,7 +233,7 @@ class SpikeTrains(Columns):
         return SpikeTrains.from_lists([self[n] for n in numbers], self.start, self.stop, values)
 
     def delayed(self, delays_ms: ArrayLike) -> SpikeTrains:
-        """Return every train once at each delay: what a learner needs to choose among delays.
+        """Return every train once at each delay, so that a learner can choose among the delays.
 
         Parameters
         ----------
@@ -354,11 +354,11 @@ class SpikeTrains(Columns):
         Parameters
         ----------
         path : path
-            NWB's own tools want it to end in ``.nwb``.
+            NWB's own tools require the ending ``.nwb``.
         begun : datetime, optional
-            When time 0 was (NWB insists on it); now, where it is left out. Without a zone, local time.
+            Date and time of time 0, which NWB requires; default: now. Without a time zone, local time.
         description : str
-            What the session was (NWB insists on it).
+            Description of the session, which NWB requires.
         overwrite : bool
 
         Raises
@@ -399,7 +399,7 @@ class SpikeTrains(Columns):
         try:
             return cls.from_lists(times, first, last, values)
         except ProblemError as error:
-            # With the caller's own window the fault may be the window's, else it is the file's.
+            # With the caller's own window the window may be wrong, otherwise the file is.
             kind = FormatError if start is None and stop is None else ProblemError
             raise kind(f"{path}: {error}") from None
 
@@ -417,7 +417,7 @@ class SpikeTrains(Columns):
 
         Raises
         ------
-        ProblemError : a path that is none
+        ProblemError : an invalid path
         FileExistsError : the file is there already and `overwrite` is false
         """
         columns: dict[str, Any] = {"times": self.times, "offsets": self.offsets, "start": self.start, "stop": self.stop}
@@ -514,18 +514,19 @@ def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[
     if not entries:
         return np.empty(0, dtype), []
     try:
-        # All trains at once: a thousand of one spike each cost little more than one of a thousand.
+        # All trains are converted at once: a thousand trains of one spike cost little more than one train of a
+        # thousand.
         arrays = [np.asarray(entry, object) for entry in entries]
         return column(name, np.concatenate(arrays), dtype), [len(array) for array in arrays]
     except (ProblemError, TypeError, ValueError):
-        # One by one, which names the train.
+        # They are converted one by one, so that the error names the train.
         each = [np.atleast_1d(np.asarray(entry, object)) for entry in entries]
         columns = [column(f"{name}[{n}]", array, dtype) for n, array in enumerate(each)]
         return np.concatenate(columns), [len(values) for values in columns]
 
 
 def _finite_values(values: NDArray[np.float32] | None) -> None:
-    """Refuse a value of a spike that is not finite, by its place."""
+    """Raise an error for a value that is not finite, with the position of its spike."""
     if values is not None and not np.isfinite(values).all():
         k = int(np.flatnonzero(~np.isfinite(values))[0])
         raise ProblemError(f"values[{k}] is {values[k]}: must be finite")

@@ -1,4 +1,4 @@
-"""Between ms, the unit of spikes and neurons, and us, the unit of the wire and of events: the only place."""
+"""Conversion between ms, the unit of spikes and neurons, and us, the unit of the wire and of events."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def to_ms(us: float | np.integer[Any]) -> float: ...
 @overload
 def to_ms(us: NDArray[Any]) -> NDArray[np.float64]: ...
 def to_ms(us: Any) -> Any:
-    """Return times of the wire, us, as neurons count them, ms."""
+    """Convert times of the wire, us, to the unit of neurons, ms."""
     return us / 1000.0
 
 
@@ -24,5 +24,5 @@ def to_us(ms: float) -> float: ...
 @overload
 def to_us(ms: NDArray[Any]) -> NDArray[np.float64]: ...
 def to_us(ms: Any) -> Any:
-    """Return times of neurons, ms, as the wire counts them, us; not rounded."""
+    """Convert times of neurons, ms, to the unit of the wire, us, without rounding."""
     return ms * 1000.0

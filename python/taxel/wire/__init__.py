@@ -1,7 +1,7 @@
 """Bytes to events and back: the board's wire in both versions, its commands and its registers.
 
-Version 1 is the thesis' (Appendix 1, sections 3 to 5); version 2 is ours, in which every loss shows (docs: *Wire
-version 2*).
+Version 1 is the thesis' (Appendix 1, sections 3 to 5). Version 2 is ours, and every loss in it can be detected (docs:
+*Wire version 2*).
 """
 
 from taxel.wire.columns import Columns

@@ -1,4 +1,4 @@
-"""Memory that a decoder fills."""
+"""The memory into which a decoder writes."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from taxel.events import Events
 
 __all__ = ["Columns"]
 
-#: Rows from which on NumPy asks for large pages for the narrowest column too (from 4 MB on): the first write to each
-#: small page costs more than what is written there.
+#: From this number of rows on, NumPy requests large pages (from 4 MB on) for the narrowest column too. The page fault
+#: at the first write to each small page costs more than the write itself.
 _LARGE = 1 << 22
 
 
 def _on_a_line(n: int, dtype: Any) -> NDArray[Any]:
-    """Return memory for n values that begins on a cache line, as the decoder writes whole lines fastest."""
+    """Return memory for n values, aligned to a cache line, as the decoder writes whole cache lines fastest."""
     size = np.dtype(dtype).itemsize
     memory = np.empty(n + 64 // size, dtype)
     first = -memory.__array_interface__["data"][0] % 64 // size
@@ -31,14 +31,14 @@ def _on_a_line(n: int, dtype: Any) -> NDArray[Any]:
 
 
 class Columns:
-    """Keep memory for decoded events, to be filled again and again (`Decoder.push_into`, `decode`).
+    """Reuse memory for decoded events (`Decoder.push_into`, `decode`).
 
-    Fresh memory costs more than decoding: the first write to each page is a call of the kernel.
+    New memory costs more than decoding: the first write to each page is a page fault.
 
     Parameters
     ----------
     rows : int, 1 or more
-        How many events there is room for; ``len(data) // 5 + 2`` is enough for `data`.
+        Capacity in events; ``len(data) // 5 + 2`` is enough for `data`.
 
     Raises
     ------
@@ -87,14 +87,14 @@ class Columns:
 
     @classmethod
     def _fresh(cls, rows: int) -> Columns:
-        """Return columns with room for `rows` events, to be filled once (`_given`), which own their memory whole."""
+        """Return new columns for `rows` events, which are filled once and own their memory."""
         columns = cls.__new__(cls)
         columns._lay_out(max(rows, _LARGE) if rows >= _LARGE // 4 else rows, np.empty)
         return columns
 
     @classmethod
     def _or_fresh(cls, columns: Columns | None, rows: int) -> tuple[Columns, bool]:
-        """Return the caller's columns, or fresh ones for so many rows; and whether they are fresh."""
+        """Return the caller's columns, or new ones for this number of rows; and whether they are new."""
         return (cls._fresh(rows), True) if columns is None else (instance("columns", columns, cls), False)
 
     def _first(
@@ -118,7 +118,7 @@ class Columns:
         repaired: NDArray[np.bool_] | None,
         markers: Sequence[tuple[int, bool]],
     ) -> Events:
-        """Return the first rows as events that own the columns; memory that no event needs is given back."""
+        """Return the first rows as events that own the columns; unused memory is freed."""
         for filled in vars(self).values():
             filled.resize(rows, refcheck=False)
             frozen(filled)

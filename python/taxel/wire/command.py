@@ -74,7 +74,7 @@ class Command:
         Raises
         ------
         ProblemError : `data` is not bytes
-        FormatError : not five bytes, or a top bit out of place (names the byte)
+        FormatError : not five bytes, or a byte whose top bit is wrong (names the byte)
 
         Examples
         --------

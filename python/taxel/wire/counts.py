@@ -1,4 +1,4 @@
-"""What a decoder received, decoded, refused and missed, and the board's totals."""
+"""Counts of what a decoder received, decoded, refused and missed, and the board's totals."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ class Counts:
 
     A cause that a version of the wire does not have is 0.
 
-    The sums close at any time. Version 1: ``bytes == 5 * words + skipped``, and ``words == changes + intensities +
-    unpaired + markers + contradictory + outside``; the bytes of a word that is not complete count when it is, or is
-    given up. Version 2: ``datagrams == intact + repeated + old + short + long + foreign + checksum``.
+    These sums hold at any time. Version 1: ``bytes == 5 * words + skipped``, and ``words == changes + intensities +
+    unpaired + markers + contradictory + outside``; the bytes of an incomplete word are counted once it is complete or
+    discarded. Version 2: ``datagrams == intact + repeated + old + short + long + foreign + checksum``.
 
     Parameters
     ----------
@@ -37,27 +37,28 @@ class Counts:
     outside : int
         The number of events, states and intensities outside the array.
     back : int
-        Version 1: the number of changes and markers behind the latest time; the events have them.
+        Version 1: the number of changes and markers with a stamp behind the latest time; `Events` include them.
     datagrams, intact : int
         Version 2: the number of datagrams given to the decoder, and of those that it decoded.
     repeated, old : int
         Version 2: the number of datagrams received again, and of those whose sequence number is more than 65 536 behind
-        the highest, so that it is unknown whether they came before.
+        the highest, so that it is unknown whether they were received before.
     long, foreign, checksum : int
         Version 2: the number of datagrams refused because they are longer than 1400 bytes, are not of version 2 or come
         from another board, or have a wrong checksum.
     missing : int
-        Version 2: how many sequence numbers between the first and the last of each session were never received intact.
+        Version 2: the number of sequence numbers between the first and the last of each session that were never
+        received intact.
     unknown_kind, unknown_flags, unknown_marker : int
         Version 2: the number of datagrams of unknown kind, which are skipped; of datagrams with unknown flags, which
         are decoded; and of markers of unknown code, which are left out.
     malformed : int
-        Version 2: the number of bodies that end within a word, or have an offset above 32 511 us; what stands before
-        that place is decoded.
+        Version 2: the number of bodies that end within a word, or have an offset above 32 511 us; the words before
+        that point are decoded.
     events, repaired : int
-        Version 2: the number of events on the array, and of those among them that a state gave.
+        Version 2: the number of events on the array, and of those among them that were derived from a state.
     states, stale : int
-        Version 2: the number of states on the array, and of those among them that came too late to count.
+        Version 2: the number of states on the array, and of those among them that were out of date on arrival.
     dropped, resets : int
         Version 2: the number of datagrams that report dropped events, and of resets of the board.
     unknown_value : int
@@ -69,7 +70,7 @@ class Counts:
 
     Examples
     --------
-    A byte that begins no word, then one change.
+    A byte that does not begin a word, then one change.
 
     >>> from taxel.wire import Decoder
     >>> decoder = Decoder()
@@ -114,14 +115,14 @@ class Counts:
 
 @dataclass(frozen=True)
 class Received:
-    """Hold whether a datagram of version 2 was intact, and up to when all is received (`Decoder.last`).
+    """Hold whether a datagram of version 2 was intact, and the time that it promises (`Decoder.last`).
 
     Parameters
     ----------
     until : int, us, or None
-        No datagram of a higher sequence number holds anything before this time; None where nothing is promised.
+        No datagram of a higher sequence number holds an event before this time; None if the datagram promises no time.
     intact : bool
-        False where it was refused, or received before (`Decoder.counts` has the cause).
+        False if it was refused, or received before (`Decoder.counts` has the cause).
 
     Examples
     --------
@@ -144,8 +145,8 @@ class Status:
     Parameters
     ----------
     frames, events, dropped, datagrams, faults : int
-        The number of frames scanned, of events sent, of events dropped, of datagrams made before this one, and of
-        comparators that had not returned.
+        The number of frames scanned, of events sent, of events dropped, of datagrams sent before this one, and of
+        conversions whose comparator had not returned.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Bytes of version 1, or datagrams of version 2, to events."""
+"""Decodes bytes of version 1, or datagrams of version 2, to events."""
 
 from __future__ import annotations
 
@@ -33,27 +33,27 @@ def decode(
     lengths: ArrayLike | None = None,
     columns: Columns | None = None,
 ) -> Events:
-    """Read a whole stream; a `Decoder` also counts what is dropped.
+    """Decode a whole stream; a `Decoder` also counts what is dropped.
 
     Parameters
     ----------
     data : bytes, or anything with a contiguous buffer
-        Version 1: words, one behind the other. Version 2: datagrams of one board, each with its length before it (16
-        bits, little-endian).
+        Version 1: consecutive words. Version 2: datagrams of one board, each preceded by its length (16 bits,
+        little-endian).
     version : {1, 2}
     array : Array, optional
-        The sensor; the thesis' 64 x 64 where it is left out.
+        The sensor; default: the thesis' 64 x 64.
     pairing : {"direct", "taxel"}
         Version 1, as in `Decoder`.
     differences : bool
         Version 1, as in `Decoder`.
     lengths : array of int, shape (datagrams,), optional
-        Version 1: bytes of each datagram, where `data` is datagrams one behind the other. Each is then decoded by
-        itself, so that no intensity belongs to a change of the datagram before.
+        Version 1: the length of each datagram in bytes, if `data` is consecutive datagrams. Each is then decoded
+        separately, so that an intensity never belongs to a change of the datagram before.
     columns : Columns, optional
-        Memory that is used again, with room for ``len(data) // 5 + 2`` events, of version 2 for ``len(data) // 2 +
-        32``: the events are views of it, good until it is filled again. With pairing "taxel", and where it is left out,
-        they have memory of their own.
+        Memory to reuse, with room for ``len(data) // 5 + 2`` events, of version 2 for ``len(data) // 2 + 32``: the
+        events are views of it, valid until it is filled again. By default, and with pairing "taxel", they have memory
+        of their own.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def decode(
 
     Raises
     ------
-    ProblemError : an argument that makes no sense; damage in the bytes is no error
+    ProblemError : an invalid argument; damage in the bytes is no error
 
     Notes
     -----
@@ -96,37 +96,37 @@ def decode(
 
 
 class Decoder:
-    """Turn what a board sends into events as it comes.
+    """Decode the bytes or datagrams of a board to events as they arrive.
 
-    Damage is never an error: `counts` has all that was dropped, by cause. Of version 1 the events are the same wherever
-    the bytes are cut: the decoder finds its place again at the next first byte, and a change waits for the next word,
-    which may be its intensity, for the end of its datagram (`end_of_datagram`) or of the stream (`finish`), and no
-    longer. Of version 2 each intact datagram is decoded once, whatever was lost, repeated, reordered or damaged; the
-    decoder belongs to the first board of which it receives one.
+    Damage is never an error: `counts` has all that was dropped, by cause. The events of version 1 do not depend on how
+    the bytes are cut into pieces: the decoder resynchronises at the next first byte. A change is returned once the next
+    word (which may be its intensity), the end of its datagram (`end_of_datagram`) or of the stream (`finish`) is
+    reached. Each intact datagram of version 2 is decoded once, whatever was lost, repeated, reordered or damaged; the
+    decoder accepts datagrams of one board only, that of the first intact one.
 
     Parameters
     ----------
     version : {1, 2}
     array : Array, optional
-        The sensor; the thesis' 64 x 64 where it is left out. Events outside it are counted and dropped.
+        The sensor; default: the thesis' 64 x 64. Events outside it are counted and dropped.
     pairing : {"direct", "taxel"}
         Version 1: which change an intensity belongs to. "direct": the word before it, if that is a change of the same
-        taxel. "taxel": the latest change of that taxel that has none yet, for boards that order otherwise; all events
-        then wait for `finish`, so it is for whole recordings.
+        taxel. "taxel": the latest change of that taxel without an intensity, for boards that order words differently;
+        `finish` then returns all events, so it is meant for whole recordings.
     differences : bool
         Version 1: whether intensities are differences from the last value sent (the panel's "delta intensity"), which
-        bytes do not show. They are then added up from 0, so that `Events` hold values; right from the board's reset on
-        and until an intensity is lost. A datagram of version 2 has a flag for it.
+        the bytes do not state. They are then summed from 0, so that `Events` hold values; these are correct from the
+        board's reset until an intensity is lost. A datagram of version 2 has a flag for it.
 
     Raises
     ------
-    ProblemError : an argument that makes no sense
+    ProblemError : an invalid argument
 
     Notes
     -----
     Table 5.4, and the page *Wire version 2*. Time of version 1 is unwrapped into 64 bits: a stamp up to 0.1 s behind
-    the latest time is a step back, which is counted and stays in the events; any other lies ahead, so silences of up to
-    6.45 s are right. Arrival times show how long a longer one was.
+    the latest time is a step back, which is counted and stays in the events; any other stamp lies ahead, so that pauses
+    of up to 6.45 s are unwrapped correctly. For longer pauses arrival times are needed (`push`).
 
     Examples
     --------
@@ -172,8 +172,8 @@ class Decoder:
         ----------
         data : bytes, or anything with a contiguous buffer
         arrived : int, us, optional
-            The host's clock when they came. Of version 1 it chooses the wrap of the 16-bit time after a silence of more
-            than 6.45 s; of version 2 it shows how much time has passed at a reset of the board.
+            The host's time of arrival. For version 1 it determines the wrap of the 16-bit time after a pause of more
+            than 6.45 s; for version 2 the time that has passed at a reset of the board.
 
         Returns
         -------
@@ -193,9 +193,9 @@ class Decoder:
         return columns._owning(self.array, *self._fill(columns, stream, arrived))
 
     def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
-        """Decode into memory that is used again; return the events as views of it.
+        """Decode into memory that is reused; return the events as views of it.
 
-        The next decoding into the same columns overwrites the events: copy what is needed longer.
+        The next call with the same columns overwrites the events: copy those that are needed longer.
 
         Parameters
         ----------
@@ -225,16 +225,16 @@ class Decoder:
     def _fill(
         self, columns: Columns, data: NDArray[np.uint8], arrived: int | None
     ) -> tuple[int, bool, NDArray[np.bool_] | None, list[tuple[int, bool]]]:
-        """Fill columns; return rows, whether with intensities, which of them states gave, markers."""
+        """Fill columns; return the number of rows, whether they have intensities, repaired rows, and markers."""
         when = None if arrived is None else whole("arrived", arrived)
         return self._core.fill(data, when, columns._parts(), False)
 
     def end_of_datagram(self) -> Events:
-        """End a datagram of version 1; return the change that waited for its intensity, if there is one.
+        """End a datagram of version 1; return the change that was pending for its intensity, if there is one.
 
         Returns
         -------
-        Events, at most one; none of version 2, in which no event waits
+        Events, at most one; none for version 2, in which no event is pending
 
         Examples
         --------
@@ -245,11 +245,11 @@ class Decoder:
         return Events._from_parts(self._core.end_of_datagram(), self.array)
 
     def finish(self) -> Events:
-        """End a stream of version 1; return the rest. The decoder is then as new, but for its counts.
+        """End a stream of version 1; return the pending events and reset the decoder except for its counts.
 
         Returns
         -------
-        Events, none of version 2, in which no event waits
+        Events, none for version 2, in which no event is pending
 
         Examples
         --------
@@ -261,26 +261,26 @@ class Decoder:
 
     @property
     def counts(self) -> Counts:
-        """What was read, dropped and missed so far."""
+        """The numbers of what was read, dropped and missed so far."""
         return Counts(**json.loads(self._core.counts()))
 
     @property
     def last(self) -> Received | None:
-        """What the last datagram of version 2 was; None before the first, and of version 1."""
+        """The status of the last datagram of version 2; None before the first one, and for version 1."""
         last = self._core.last()
         return None if last is None else Received(*last)
 
     @property
     def status(self) -> Status | None:
-        """The totals that a board of version 2 last sent; None before, and of version 1."""
+        """The totals that a board of version 2 last sent; None before the first ones, and for version 1."""
         status = self._core.status()
         return None if status is None else Status(**json.loads(status))
 
     @property
     def held(self) -> NDArray[np.int32]:
-        """What each taxel holds, shape (rows, columns), ticks; -1 where that is not known.
+        """The value that each taxel holds, shape (rows, columns), ticks; -1 if unknown.
 
-        Of version 1 it is known with `differences` alone: without them the latest intensity of a taxel is in the
+        For version 1 it is known only with `differences`; without them the latest intensity of a taxel is in the
         events.
         """
         return self._core.held().reshape(self.array.rows, self.array.columns)

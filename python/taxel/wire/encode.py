@@ -1,4 +1,4 @@
-"""Events to bytes of version 1 (thesis, Appendix 1, Table 5.4)."""
+"""Encodes events as bytes of version 1 (thesis, Appendix 1, Table 5.4)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["encode"]
 
 
 def encode(events: Events) -> bytes:
-    """Write events as bytes: each change, its intensity next to it, markers before the first event not earlier.
+    """Return events as bytes: each change followed by its intensity, each marker before the first event not earlier.
 
     Parameters
     ----------
@@ -27,8 +27,8 @@ def encode(events: Events) -> bytes:
 
     Notes
     -----
-    Thesis, Appendix 1, Table 5.4. Version 1 holds times to 100 us, cut down as the board counts, and modulo 6.5536 s:
-    a reader gets back whole silences of up to 6.45 s.
+    Thesis, Appendix 1, Table 5.4. Version 1 holds times in steps of 100 us, rounded down as the board does, and modulo
+    6.5536 s: a reader restores pauses of up to 6.45 s.
 
     Examples
     --------

@@ -19,19 +19,19 @@ __all__ = ["FRAME_US", "PRESETS", "QUOTED_PRESETS", "Registers", "described"]
 #: The names of the presets (`Registers.preset`).
 PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
 
-#: The names of all presets, for a text.
+#: The names of all presets, for error messages.
 QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
 
-#: The fields as registers.toml has them, by name.
+#: The fields of registers.toml by name.
 _FIELDS: dict[str, Any] = {field["name"]: field for field in json.loads(_core.registers_fields())}
-#: Fields in units of 10 ns in the registers, in us here.
+#: The fields that the registers hold in units of 10 ns; here they are in us.
 _TIMES = tuple(name for name, field in _FIELDS.items() if field["unit"] == "10 ns")
 _FLAGS = tuple(name for name, field in _FIELDS.items() if field["unit"] == "flag")
 _MANUAL = {field["manual"]: name for name, field in _FIELDS.items() if field["manual"] != name}
 
 
 class Registers:
-    """Hold the values of the board's registers; a set that breaks a rule cannot be made.
+    """Hold the values of the board's registers, checked against the rules.
 
     "Line" is the driven line, the outer step of the scan; "step" the inner one, the multiplexer's. The manual's names
     (`row_change_period`, `ramp_time`, `nrows` ...) are aliases, in the manual's units (10 ns, ticks, lines less one).
@@ -39,31 +39,32 @@ class Registers:
     Parameters
     ----------
     array : Array, optional
-        The sensor; the thesis' 64 x 64 where it is left out.
+        The sensor; default: the thesis' 64 x 64.
     **fields : float
         The fields that differ from those of a board at reset, by the names below or the manual's.
 
     Other Parameters
     ----------------
     line_period, line_read : float, us
-        Time from one driven line to the next, and the part of it in which the line is read.
+        Time from one driven line to the next, and the part of that time in which the line is read.
     step_period, step_read : float, us
-        Time from one multiplexer step to the next, and the part of it in which the channels are read.
+        Time from one multiplexer step to the next, and the part of that time in which the channels are read.
     ramp : int, ticks of 1/300 us
-        How long the ramp rises.
+        Duration of the ramp.
     noise_floor : int, ticks
-        A difference above it makes an event.
+        A difference above it causes an event.
     lines : int, 1 to 256
         Driven lines.
     random_lines, mechanoreceptor, invert_comparator, frame_sync, record : bool
         Whether the lines are driven in random order, each taxel is an FA-1 afferent, a falling edge ends a sample, all
-        events of a frame carry the time of its start, and a recording runs.
+        events of a frame have the time of its start, and the board is recording.
     wire_version : {1, 2}
-        Version 1 names 64 x 64 taxels at most.
+        Version 1 can address 64 x 64 taxels at most.
     threshold_rest, threshold_jump, threshold_decay : int, in 1/1024, 1/256 theta_0, 1/1024 theta_0
         FA-1 on the board, where `mechanoreceptor` is set.
     channels : {16, 64}
-        Of the converter: the board's build, not a register. A line of 64 taxels has 4 steps with 16, one with 64.
+        Number of channels of the converter, a property of the board and not a register. A line of 64 taxels has 4 steps
+        with 16 channels, one with 64.
 
     Raises
     ------
@@ -72,7 +73,7 @@ class Registers:
 
     Notes
     -----
-    Table 5.5 and the page *Registers*; what is left out is as a board of this array holds it at reset: up to 64 x 64
+    Table 5.5 and the page *Registers*. Default values are those of a board of this array at reset: up to 64 x 64
     taxels the preset "5.2 kHz".
 
     Examples
@@ -107,7 +108,7 @@ class Registers:
         ----------
         name : str, one of `PRESETS`
         array : Array, optional
-            The sensor; the thesis' 64 x 64 where it is left out.
+            The sensor; default: the thesis' 64 x 64.
 
         Returns
         -------
@@ -136,7 +137,7 @@ class Registers:
 
     @classmethod
     def _of_source(cls, array: Array, rate_hz: float, bits: int) -> tuple[Registers, int]:
-        """Return what a board holds that scans another sensor's frames, and how often it halves their values."""
+        """Return the registers of a board that scans another sensor's frames, and how often it halves their values."""
         held, halved = _core.registers_of_source(array._parts(), rate_hz, bits)
         return cls._of(json.loads(held), array), halved
 
@@ -148,9 +149,9 @@ class Registers:
         ----------
         words : sequence of int, shape (8,), 0 to 2**32 - 1
         array : Array, optional
-            The sensor; the thesis' 64 x 64 where it is left out.
+            The sensor; default: the thesis' 64 x 64.
         channels : {16, 64}
-            Of the converter: the board's build, not a register.
+            The number of channels of the converter, a property of the board and not a register.
 
         Returns
         -------
@@ -199,10 +200,10 @@ class Registers:
         return registers
 
     def with_preset(self, name: str) -> Registers:
-        """Return a set that took over one of `PRESETS`, with as many lines as the array has.
+        """Return a set with the values of one of `PRESETS`, with as many lines as the array has.
 
-        A preset has neither the version of the wire nor whether a recording runs: these stay, as do the channels, which
-        are the board's build.
+        A preset sets neither the version of the wire nor `record`: these stay, as do the channels, which are a property
+        of the board.
 
         Parameters
         ----------
@@ -215,7 +216,7 @@ class Registers:
         Raises
         ------
         ProblemError : no such preset for boards of that size (names those that there are)
-        DeviceError : the board could not hold it (names the rule)
+        DeviceError : the result breaks a rule (names it)
 
         Examples
         --------
@@ -239,11 +240,11 @@ class Registers:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is allowed but hardly meant (rules 5 and 6), a line each."""
+        """Values that are allowed but probably mistakes (rules 5 and 6), a line each."""
         return tuple(_core.registers_check(self._json(), self.array._parts()))
 
     def commands_to(self, target: Registers) -> list[Command]:
-        """Return the writes that lead from this set to another, in an order in which none is refused on the way.
+        """Return the writes that change this set into another, in an order in which the board refuses none.
 
         `record` stays as it is: starting a recording is a command of its own.
 
@@ -296,7 +297,7 @@ class Registers:
 
 
 def described(registers: Registers) -> list[tuple[str, float, str, str, str]]:
-    """Return each field of a set: its name, value, unit, place in the registers, and what it is for.
+    """Return each field of a set: its name, value, unit, place in the registers, and description.
 
     Parameters
     ----------
@@ -338,7 +339,7 @@ def _raw(name: str, value: object) -> int:
     try:
         return whole(name, value, 0, 2**32 - 1)
     except ProblemError:
-        # A number that a register's word could hold is judged by the rules, others here.
+        # The rules check numbers that fit a register's word; others are refused here.
         field = _FIELDS.get(_MANUAL.get(name, name))
         if field is None:
             raise

@@ -1,4 +1,4 @@
-"""Streams of version 2: datagrams, each with its length before it."""
+"""Streams of version 2: datagrams, each preceded by its length."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ __all__ = ["StreamReader"]
 
 
 class StreamReader:
-    """Cut a file or stream into datagrams, each of which has its length before it (16 bits, little-endian).
+    """Split a file or stream into datagrams, each preceded by its length (16 bits, little-endian).
 
-    Bytes that are no datagram are skipped one by one, up to the next place where length, magic and checksum agree (the
-    page *Wire version 2*).
+    Bytes outside a datagram are skipped one by one, up to the next position with a valid length, magic and checksum
+    (the page *Wire version 2*).
 
     Examples
     --------
@@ -54,7 +54,7 @@ class StreamReader:
         return self._core.push(buffer_bytes(data))
 
     def finish(self) -> list[bytes]:
-        """End the stream; return the datagrams within bytes that seemed to begin a longer one.
+        """End the stream; return the datagrams found in bytes that seemed to begin a longer one.
 
         Returns
         -------
@@ -70,5 +70,5 @@ class StreamReader:
 
     @property
     def skipped(self) -> int:
-        """Bytes that belonged to no datagram; those that may still become one count once the stream has ended."""
+        """Number of bytes outside datagrams; bytes that may still begin one are counted at the end of the stream."""
         return self._core.skipped()

@@ -9,7 +9,7 @@ pub struct Registers {
     /// Lines are driven in random order.
     #[serde(alias = "use_rand_row")]
     pub random_lines: bool,
-    /// Each taxel is an FA-1 afferent (5.4.2): an event is its spike, the intensity word its integral; else a change.
+    /// Each taxel is an FA-1 afferent (5.4.2): events are its spikes, intensities its integral; else changes.
     #[serde(alias = "comparator_mode")]
     pub mechanoreceptor: bool,
     /// A falling edge ends a sample.
@@ -17,40 +17,40 @@ pub struct Registers {
     /// All events of a frame carry the time of its start.
     #[serde(alias = "use_frame_sync")]
     pub frame_sync: bool,
-    /// Which version of the wire the board speaks (read: the manual has one).
+    /// Version of the wire protocol that the board uses (read: the manual has only one).
     #[serde(default = "at_reset::wire_version")]
     pub wire_version: u8,
-    /// FA-1: by how much a spike raises the threshold, T A of Table 5.3. In units of 1/256 theta_0.
+    /// FA-1: increase of the threshold by a spike, T A of Table 5.3. In units of 1/256 theta_0.
     #[serde(default = "at_reset::threshold_jump")]
     pub threshold_jump: u16,
     /// Time from one driven line to the next. In units of 10 ns.
     #[serde(alias = "row_change_period")]
     pub line_period: u32,
-    /// Part of it in which the line is read. In units of 10 ns.
+    /// Part of line_period in which the line is read. In units of 10 ns.
     #[serde(alias = "row_read_duration")]
     pub line_read: u32,
     /// Time from one multiplexer step to the next. In units of 10 ns.
     #[serde(alias = "col_change_period")]
     pub step_period: u16,
-    /// Part of it in which the channels are read. In units of 10 ns.
+    /// Part of step_period in which the channels are read. In units of 10 ns.
     #[serde(alias = "col_read_duration")]
     pub step_read: u16,
-    /// How long the ramp rises. In units of ticks.
+    /// Duration of the ramp. In units of ticks.
     #[serde(alias = "ramp_time")]
     pub ramp: u16,
     /// FA-1: theta_0, in ticks after the power law. In units of 1/1024.
     #[serde(default = "at_reset::threshold_rest")]
     pub threshold_rest: u16,
-    /// FA-1: by how much a quiet frame lowers the threshold, B of Table 5.3. In units of 1/1024 theta_0.
+    /// FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3. In units of 1/1024 theta_0.
     #[serde(default = "at_reset::threshold_decay")]
     pub threshold_decay: u8,
-    /// Largest difference that makes no event. In units of ticks.
+    /// Largest difference that does not cause an event. In units of ticks.
     pub noise_floor: u8,
-    /// Driven lines (the register holds one less; the manual's field has 6 bits, read: 8).
+    /// Number of driven lines (the register holds one less; the manual's field has 6 bits, read: 8).
     pub lines: u16,
-    /// A recording runs: setting and clearing it sends a marker and moves the sync line.
+    /// Recording: setting and clearing it sends a marker and switches the sync line.
     pub record: bool,
-    /// Channels of the converter, 16 or 64: the board's build, not a register.
+    /// Channels of the converter, 16 or 64: a property of the board, not a register.
     pub channels: u8,
 }
 
