@@ -77,7 +77,7 @@ def modules() -> list[Any]:
 
 
 def public() -> dict[str, Any]:
-    """Every public callable once, by its shortest name: functions, classes, and what classes define themselves."""
+    """Every public callable once, by its shortest name: functions, classes, methods of these and of private bases."""
     names: dict[int, str] = {}
     found: dict[str, Any] = {}
     for module in modules():
@@ -89,7 +89,8 @@ def public() -> dict[str, Any]:
             names[id(value)] = full
             found[full] = value
             if inspect.isclass(value) and not issubclass(value, BaseException):
-                for part, member in vars(value).items():
+                own = [base for base in reversed(value.__mro__) if base is value or base.__name__.startswith("_")]
+                for part, member in {part: member for base in own for part, member in vars(base).items()}.items():
                     held = member.__func__ if isinstance(member, classmethod | staticmethod) else member
                     if not part.startswith("_") and part != "plot" and inspect.isfunction(held):
                         found[f"{full}.{part}"] = held

@@ -26,7 +26,8 @@ def of(kind: type[Parameters]) -> Iterator[type[Parameters]]:
         yield from of(one)
 
 
-#: Every class with parameters.
+#: Every class with parameters, of rooms that are imported at their first use too.
+ROOMS = (taxel.calibration, taxel.encode, taxel.learn, taxel.metrics, taxel.information)
 KINDS = sorted(set(of(Parameters)), key=lambda kind: kind.__name__)
 #: Values for parameters without a default.
 REQUIRED: dict[str, Any] = {

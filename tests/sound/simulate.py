@@ -131,6 +131,12 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.circuit.Divider": plain(
         CIRCUIT.Divider, supply_v=5.0, resistor_kohm=10.0, switch_ohm=2.5, wire_ohm=1.0, idle="floating"
     ),
+    "taxel.simulate.circuit.VirtualGround.volts": method(CIRCUIT.VirtualGround(), "volts", conductance_us=[[1.0, 2.0]]),
+    "taxel.simulate.circuit.VirtualGround.volts_alone": method(
+        CIRCUIT.VirtualGround(), "volts_alone", conductance_us=[[1.0, 2.0]]
+    ),
+    "taxel.simulate.circuit.Divider.volts": method(CIRCUIT.Divider(), "volts", conductance_us=[[1.0, 2.0]]),
+    "taxel.simulate.circuit.Divider.volts_alone": method(CIRCUIT.Divider(), "volts_alone", conductance_us=[[1.0, 2.0]]),
     "taxel.simulate.circuit.Converter": plain(
         CIRCUIT.Converter,
         shape="linear",
