@@ -72,6 +72,8 @@ def copy(tmp_path: Path) -> Path:
     shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=unneeded)
     for room in ("formats", "learn"):
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
+    for shared in (ROOT / "tests").glob("[!t]*.py"):
+        shutil.copy(shared, tmp_path / "tests")
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     # Studies refer to pages of the documentation.
     shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("_build", "pictures"))

@@ -214,7 +214,7 @@ def test_held_intensities_are_the_last_that_came_at_each_time() -> None:
 
 @given(some())
 def test_repr_is_one_line_and_names_the_count(events: Events) -> None:
-    assert repr(events).startswith(f"Events({len(events)} events, ")
+    assert repr(events).startswith(f"Events({len(events)} event{'s' * (len(events) != 1)}, ")
     assert "\n" not in repr(events)
 
 

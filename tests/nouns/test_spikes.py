@@ -196,7 +196,9 @@ def test_changed_trains_are_not_equal(trains: SpikeTrains) -> None:
 
 @given(some())
 def test_repr_is_one_line(trains: SpikeTrains) -> None:
-    assert repr(trains).startswith(f"SpikeTrains({len(trains)} trains, {len(trains.times)} spikes")
+    inputs = "1 train" if len(trains) == 1 else f"{len(trains)} trains"
+    spikes = "1 spike" if len(trains.times) == 1 else f"{len(trains.times)} spikes"
+    assert repr(trains).startswith(f"SpikeTrains({inputs}, {spikes},")
     assert "\n" not in repr(trains)
 
 
