@@ -3,11 +3,12 @@
 Every room is tried; `python tests/test_docstrings.py taxel.learn` lists what a room lacks.
 """
 
+import importlib
 import inspect
 import re
 import sys
 from pathlib import Path
-from pkgutil import resolve_name
+from pkgutil import resolve_name, walk_packages
 from typing import Any
 
 import pytest
@@ -132,6 +133,15 @@ def test_what_the_readings_list_names_its_source() -> None:
             if about is not None and sources and not any(source in about for source in sources):
                 missing.append(f"{option}: {', '.join(sources)}")
     assert not missing
+
+
+def test_each_all_is_there() -> None:
+    """Each name of each module's `__all__` can be imported, so that a star import works."""
+    for module in walk_packages(taxel.__path__, "taxel."):
+        if not module.name.endswith("__main__"):
+            some = importlib.import_module(module.name)
+            missing = [name for name in getattr(some, "__all__", ()) if not hasattr(some, name)]
+            assert not missing, f"{module.name}.__all__: {missing}"
 
 
 def test_all_names_what_is_public() -> None:

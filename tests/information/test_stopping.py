@@ -24,7 +24,8 @@ if sys.argv[1] == "numbers":
 else:
     truth = random.integers(0, 3, 6_000_000).astype(str)
 estimate(["a", "b"] * 20, ["a", "b"] * 20)  # modules that load late are there
-# What Ctrl-C does to Python, at a processor time: another process could only send it at a time of the clock.
+# SIGPROF raises KeyboardInterrupt after a given processor time; a signal from another process could only be timed by
+# the wall clock.
 signal.signal(signal.SIGPROF, signal.default_int_handler)
 signal.setitimer(signal.ITIMER_PROF, float(sys.argv[2]))
 begun = time.process_time()

@@ -205,7 +205,7 @@ def test_cut_and_merge_as_a_shell_sees_them(tmp_path: Path) -> None:
 
 # notes while recording
 
-#: Makes its standard input the terminal that it belongs to, and becomes taxel.
+#: Program of a child process: makes its standard input the controlling terminal, then executes taxel.
 AT_A_TERMINAL = """
 import fcntl, os, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)

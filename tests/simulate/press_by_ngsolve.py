@@ -87,7 +87,7 @@ free = space.FreeDofs()
 given = np.array([not one for one in free])
 moved, rest = now.vec.FV().NumPy(), before.vec.FV().NumPy()
 residual, step, start = (now.vec.CreateVector() for _ in range(3))
-# Of second order only the vertices' functions hold a shift; the edges' are added to them.
+# In the hierarchical basis of second order a rigid shift involves the vertices' functions only.
 of_disc = np.array(space.GetDofs(mesh.Materials("disc")))
 disc = [of_disc & (np.arange(2 * count) // count == k) & (np.arange(2 * count) % count < len(vertices)) for k in (0, 1)]
 

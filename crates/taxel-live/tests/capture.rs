@@ -9,7 +9,7 @@ use taxel_live::capture::{Batch, Counts, Receiver, ReceiverOptions, SendCounts, 
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
-/// A receiver whose thread takes in what comes while nobody takes it.
+/// A receiver with a thread of its own, which queues datagrams until they are read.
 fn bind(options: ReceiverOptions) -> Receiver {
     let receiver = Receiver::bind(ANY, options).expect("loopback binds");
     receiver.apart(Duration::from_millis(1)).expect("a thread");
@@ -167,7 +167,7 @@ fn what_the_kernel_drops_closes_the_sum_at_the_socket() {
 fn what_our_queue_drops_closes_the_sum_behind_it_and_leaves_a_gap_in_the_numbers() {
     let receiver = bind(ReceiverOptions { queue_bytes: 1 << 16, ..ReceiverOptions::default() });
     let sent = send(receiver.address(), 2000, true);
-    // Nobody takes until all has come.
+    // No datagram is read before all have arrived.
     let begun = Instant::now();
     while receiver.counts().datagrams < sent.datagrams && begun.elapsed() < Duration::from_secs(10) {
         std::thread::sleep(Duration::from_millis(1));

@@ -141,7 +141,7 @@ async fn read_presets(hub: &Hub) -> Answer {
 
 async fn write_presets(hub: &Hub, turn: OwnedMutexGuard<()>) -> Answer {
     let UserPresets { presets, .. } = hub.presets().clone();
-    // The turn goes with the writing, which goes on where the client leaves.
+    // The lock is held until the file is written, also if the client disconnects.
     let (written, turn) = hub.ask(move |handler| Ok((handler.write_presets(&presets), turn))).await?;
     written?;
     drop(turn);

@@ -199,7 +199,7 @@ async fn change_label(hub: &Hub, shown: Option<&str>, change: LabelChange) -> An
     let table = hub.folder.file(&file_of(name))?;
     let turn = hub.file_turn().await;
     let (before, rows) = hub.labels.change(name, change)?;
-    // The turn goes with the writing, which goes on where the client leaves.
+    // The lock is held until the file is written, also if the client disconnects.
     let (written, _turn) = hub.ask(move |handler| Ok((handler.write_labels(&table, &rows), turn))).await?;
     if let Err(reason) = written {
         hub.labels.restore(name, before);

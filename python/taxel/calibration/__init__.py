@@ -42,7 +42,7 @@ class Load(NamedTuple):
     Parameters
     ----------
     frames : Frames
-        While it lies; the mean of each taxel counts.
+        Recorded under the load; the mean of each taxel is used.
     load : float, above 0
     unit : {"N", "kPa"}
         Force in all, however it is spread, or the same pressure at every taxel.

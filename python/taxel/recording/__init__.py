@@ -16,7 +16,6 @@ __all__ = [
     "Clock",
     "Datagrams",
     "Health",
-    "Note",
     "Recording",
     "Zeroing",
     "convert",

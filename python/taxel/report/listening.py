@@ -227,7 +227,7 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
 def _planes(weights: NDArray[np.float64], readout: Readout, taxels: int) -> list[tuple[str, NDArray[np.float64]]]:
     """Return weights by taxel, with the names of what else tells trains apart; none where trains are not taxels'.
 
-    For each delay all ON trains stand before all OFF ones, in each taxel by taxel the levels, then the tonic ones.
+    Trains are ordered by delay, then ON before OFF, then by taxel and level; the tonic trains come last.
     """
     if readout.encoder.trains(Array(taxels, 1)) == readout.encoder.trains(Array(taxels, 2)):
         return []

@@ -124,7 +124,7 @@ impl Push {
         self.force(self.down_of_depth_mm(depth_mm)).0
     }
 
-    /// How deep the face of a body lies that has come down so far, mm; above the foam as it is.
+    /// Depth of the body's face in the foam at a displacement, mm; equal to the displacement above the foam.
     #[must_use]
     pub fn depth_mm(&self, down_mm: f64) -> f64 {
         match self {

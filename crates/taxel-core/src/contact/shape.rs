@@ -190,10 +190,10 @@ impl Shape {
     }
 }
 
-/// The longer side of a height map is looked at in so many places.
+/// Number of samples along the longer side of a height map.
 const SAMPLES: usize = 400;
 
-/// Shortens what is known of each place of a line to the run of places below that it lies in.
+/// Limits the width at each sample of a line to the length of the run of samples, below or not, that contains it.
 fn runs(below: &[bool], line: Vec<usize>, narrow: &mut [usize]) {
     for run in line.chunk_by(|a, b| below[*a] == below[*b]) {
         for k in run {

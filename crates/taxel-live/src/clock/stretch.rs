@@ -65,7 +65,7 @@ impl Stretch {
         self.quick.iter().copied().min_by_key(|quick| quick.1)
     }
 
-    /// How many points may lie below the line: where so many came that few were stored, as many as the stored ones can show.
+    /// Number of points that may lie below the line: the share `EARLY` of all, at most half of the points that are stored.
     #[allow(clippy::cast_precision_loss)]
     pub(super) fn early(&self) -> f64 {
         (EARLY * self.points as f64).min(self.quick.len() as f64 / 2.0)

@@ -7,7 +7,7 @@ use crate::limits::MOST_CREDITS;
 /// Minimum time from picture to picture.
 pub(super) const FRAME: Duration = Duration::from_micros(16_000);
 
-/// Counters are sent so often per second, and the pictures between two of them are counted.
+/// Counter messages per second; each states how many pictures were sent since the one before.
 const COUNTERS_PER_S: f64 = 4.0;
 
 /// See the module.

@@ -13,7 +13,7 @@ pub struct Source {
     pub(super) own: &'static [&'static str],
     /// Their ranges.
     pub(super) ranges: &'static [&'static [Parameter]],
-    /// The values that the source gives; the caller must give those that stand neither here nor among those of all rules.
+    /// The published defaults; a parameter without a default here or among those of all rules is required.
     pub(super) defaults: fn() -> Value,
     /// Computes parameters that are left out; may name `law` and `current` itself.
     pub(super) arrange: fn(&mut Map<String, Value>) -> Result<()>,
