@@ -139,6 +139,14 @@ class _Lines(Value):
     def volts_alone(self, conductance_us: ArrayLike) -> Values:
         """Return what taxels would make by themselves on ideal lines, V, of the same shape: no crosstalk.
 
+        Parameters
+        ----------
+        conductance_us : float64, uS, of any shape
+
+        Returns
+        -------
+        float64, V, of the same shape
+
         Raises
         ------
         ProblemError : conductances that are not finite
