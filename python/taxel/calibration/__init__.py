@@ -51,7 +51,7 @@ class Load(NamedTuple):
 
     Raises
     ------
-    ProblemError : values that make no sense, when `Calibration.fit` gets it
+    ProblemError : values that are invalid, when `Calibration.fit` gets it
     """
 
     frames: Frames
@@ -178,7 +178,7 @@ class Calibration:
 
         Raises
         ------
-        ProblemError : a parameter that makes no sense, or a tare of another array
+        ProblemError : a parameter that is invalid, or a tare of another array
 
         Notes
         -----

@@ -39,7 +39,7 @@ class Example(NamedTuple):
 
     Raises
     ------
-    ProblemError : values that make no sense, when `train`, `judge` or `choose` gets it
+    ProblemError : values that are invalid, when `train`, `judge` or `choose` gets it
 
     Examples
     --------
@@ -78,7 +78,7 @@ def checked(examples: Sequence[Example]) -> list[Example]:
 
     Raises
     ------
-    ProblemError : no example at all, or one that makes no sense (names its place)
+    ProblemError : no example at all, or one that is invalid (names its place)
     """
     if not isinstance(examples, Sequence) or not len(examples):
         raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")

@@ -41,7 +41,7 @@ class Part(NamedTuple):
 
     Raises
     ------
-    ProblemError : values that make no sense, when `judge` or `choose` gets it
+    ProblemError : values that are invalid, when `judge` or `choose` gets it
 
     Examples
     --------
@@ -65,7 +65,7 @@ class Fold(NamedTuple):
 
     Raises
     ------
-    ProblemError : values that make no sense, when `judge` or `choose` gets it
+    ProblemError : values that are invalid, when `judge` or `choose` gets it
 
     Examples
     --------
@@ -151,7 +151,7 @@ def judge(
 
     Raises
     ------
-    ProblemError : more folds than recordings, or than one recording's events allow; folds that make no sense; an event
+    ProblemError : more folds than recordings, or than one recording's events allow; folds that are invalid; an event
         that is in one fold only
 
     Examples

@@ -68,7 +68,7 @@ class Readout:
 
     Raises
     ------
-    ProblemError : parts that make no sense or do not belong together (names the label)
+    ProblemError : parts that are invalid or do not belong together (names the label)
 
     Notes
     -----
@@ -190,7 +190,7 @@ class Readout:
 
         Raises
         ------
-        FormatError : no readout, one of another version, or parts that make no sense
+        FormatError : no readout, one of another version, or parts that are invalid
         """
         if not isinstance(text, str):
             raise ProblemError(f"text is {shown(text)}: must be the text of a readout")

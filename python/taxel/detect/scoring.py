@@ -200,7 +200,7 @@ def score(
 
     Raises
     ------
-    ProblemError : times that are not whole us, a window that makes no sense, times alone for several labels
+    ProblemError : times that are not whole us, a window that is invalid, times alone for several labels
 
     Notes
     -----

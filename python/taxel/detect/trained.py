@@ -24,7 +24,7 @@ class TrainedNeuron(NamedTuple):
 
     Raises
     ------
-    ProblemError : values that make no sense, when `Readout` gets it
+    ProblemError : values that are invalid, when `Readout` gets it
     """
 
     neuron: Neuron

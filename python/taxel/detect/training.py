@@ -52,7 +52,7 @@ class Recipe:
 
     Raises
     ------
-    ProblemError : a parameter that is not known (names it) or makes no sense
+    ProblemError : a parameter that is not known (names it) or is invalid
 
     Examples
     --------
@@ -196,7 +196,7 @@ class Recipe:
         Raises
         ------
         FormatError : neither TOML nor JSON
-        ProblemError : a name or key that is not known, or a value that makes no sense
+        ProblemError : a name or key that is not known, or a value that is invalid
         FileNotFoundError : no such file
 
         Examples
@@ -261,7 +261,7 @@ def train(
 
     Raises
     ------
-    ProblemError : no event at all of a label, an event outside its example, or examples that make no sense
+    ProblemError : no event at all of a label, an event outside its example, or examples that are invalid
 
     Warns
     -----

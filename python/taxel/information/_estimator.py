@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from taxel.information._labels import words
 __all__ = ["Classifier", "labelled"]
 
 
-class Classifier(Parameters):
+class Classifier(Parameters, ABC):
     """Base of classifiers that scikit-learn's `clone` and `cross_val_score` accept; Python checks the parameters."""
 
     classes_: NDArray[np.generic]
@@ -24,9 +25,9 @@ class Classifier(Parameters):
     def __init__(self) -> None:
         self._check()
 
+    @abstractmethod
     def predict(self, x: Any) -> NDArray[Any]:
-        """Return a label a trial."""
-        raise NotImplementedError
+        """Return a label for each trial."""
 
     def score(self, x: Any, y: ArrayLike) -> float:
         """Return the share of trials that are classified correctly."""

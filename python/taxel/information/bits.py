@@ -93,7 +93,7 @@ def label_entropy(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 
     Raises
     ------
-    ProblemError : counts that make no sense
+    ProblemError : counts that are invalid
 
     Examples
     --------
@@ -116,7 +116,7 @@ def plug_in(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 
     Raises
     ------
-    ProblemError : counts that make no sense
+    ProblemError : counts that are invalid
 
     Notes
     -----
@@ -150,7 +150,7 @@ def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
 
     Raises
     ------
-    ProblemError : counts that make no sense
+    ProblemError : counts that are invalid
 
     Notes
     -----
@@ -205,7 +205,7 @@ def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
 
     Raises
     ------
-    ProblemError : counts that make no sense
+    ProblemError : counts that are invalid
 
     Notes
     -----
@@ -244,7 +244,7 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
 
     Raises
     ------
-    ProblemError : counts that make no sense, or of fewer than four trials
+    ProblemError : invalid counts, or fewer than four trials
 
     Notes
     -----
@@ -291,7 +291,7 @@ def local_information(counts: ArrayLike) -> NDArray[np.float64]:
 
     Raises
     ------
-    ProblemError : counts that make no sense
+    ProblemError : counts that are invalid
 
     Examples
     --------

@@ -32,7 +32,7 @@ class Code(ABC):
 
     Raises
     ------
-    ProblemError : a window or a resolution that makes no sense
+    ProblemError : a window or a resolution that is invalid
     """
 
     window_ms: float
@@ -133,7 +133,7 @@ class RateCode(Code):
 
     Raises
     ------
-    ProblemError : a window, a resolution or a rate that makes no sense
+    ProblemError : a window, a resolution or a rate that is invalid
 
     Examples
     --------
@@ -175,7 +175,7 @@ class FirstSpikeLatency(Code):
 
     Raises
     ------
-    ProblemError : a window or a resolution that makes no sense
+    ProblemError : a window or a resolution that is invalid
 
     Examples
     --------
@@ -208,7 +208,7 @@ class RelativeLatency(FirstSpikeLatency):
 
     Raises
     ------
-    ProblemError : a window or a resolution that makes no sense
+    ProblemError : a window or a resolution that is invalid
 
     Examples
     --------
@@ -237,7 +237,7 @@ class RankOrder(RelativeLatency):
 
     Raises
     ------
-    ProblemError : a window or a resolution that makes no sense
+    ProblemError : a window or a resolution that is invalid
 
     Examples
     --------

@@ -244,7 +244,7 @@ def zero_test(
 
     Raises
     ------
-    ProblemError : labels that make no sense
+    ProblemError : labels that are invalid
 
     Examples
     --------

@@ -64,7 +64,7 @@ def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: Array
 
     Raises
     ------
-    ProblemError : estimates of other trials, or a share that makes no sense
+    ProblemError : estimates of other trials, or a share that is invalid
 
     Notes
     -----

@@ -39,7 +39,7 @@ class LDA(Classifier):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Notes
     -----
@@ -78,7 +78,7 @@ class LDA(Classifier):
 
         Raises
         ------
-        ProblemError : trials or labels that make no sense
+        ProblemError : trials or labels that are invalid
 
         Examples
         --------
@@ -199,7 +199,7 @@ class GramLDA(Classifier):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Notes
     -----
@@ -241,7 +241,7 @@ class GramLDA(Classifier):
 
         Raises
         ------
-        ProblemError : a matrix that is not square, or labels that make no sense
+        ProblemError : a matrix that is not square, or labels that are invalid
 
         Examples
         --------

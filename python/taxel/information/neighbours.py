@@ -28,7 +28,7 @@ class NearestNeighbours(Classifier):
 
     Raises
     ------
-    ProblemError : a number of neighbours that makes no sense
+    ProblemError : a number of neighbours that is invalid
 
     Notes
     -----
@@ -64,7 +64,7 @@ class NearestNeighbours(Classifier):
 
         Raises
         ------
-        ProblemError : a matrix that is not square, or labels that make no sense
+        ProblemError : a matrix that is not square, or labels that are invalid
         """
         square = numbers("distances", distances, np.float64)
         if square.ndim != 2 or square.shape[0] != square.shape[1]:

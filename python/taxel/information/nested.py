@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -81,7 +82,7 @@ def nested_predictions(
 
     Raises
     ------
-    ProblemError : as `taxel.information.folds`, or matrices that make no sense
+    ProblemError : as `taxel.information.folds`, or matrices that are invalid
 
     Notes
     -----
@@ -190,18 +191,18 @@ def _inside(
     return [np.flatnonzero(fold == k) for k in range(int(fold.max()) + 1)]
 
 
-class _Ways:
+class _Ways(ABC):
     """The classifiers to choose among ("ways"): their predictions of trials that are left out."""
 
     count: int
 
+    @abstractmethod
     def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
         """Return the predictions of `test` and `held` when both are left out, by way; shape (ways, trials)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def way(self, number: int) -> tuple[int, float]:
         """Return the matrix and the ridge or number of neighbours of a way."""
-        raise NotImplementedError
 
 
 class _Discriminants(_Ways):

@@ -1,7 +1,8 @@
-"""Spiking neurons as classifiers, one a class: the class of the highest potential is predicted."""
+"""Spiking neurons as classifiers, one per class."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, Self
 
@@ -19,13 +20,13 @@ from taxel.spikes import SpikeTrains, to_ms
 __all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
 
 
-class _NeuronAClass(Classifier):
-    """Classify by a neuron a class: the one whose potential comes highest names the trial."""
+class _NeuronPerClass(Classifier):
+    """Classify by one neuron per class: the class of the highest potential is predicted."""
 
     learners_: list[Any]
 
     def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
-        """Train a neuron a class.
+        """Train one neuron per class.
 
         Parameters
         ----------
@@ -35,13 +36,11 @@ class _NeuronAClass(Classifier):
 
         Raises
         ------
-        ProblemError : patterns or labels that make no sense
+        ProblemError : patterns or labels that are invalid
         """
         trains = _listed(patterns)
         self.classes_, row = labelled(y, len(trains))
-        self.learners_ = []
-        for k in range(len(self.classes_)):
-            self.learners_.append(self._taught(trains, row == k))
+        self.learners_ = [self._trained(trains, row == k) for k in range(len(self.classes_))]
         return self
 
     def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
@@ -53,7 +52,7 @@ class _NeuronAClass(Classifier):
 
         Raises
         ------
-        ProblemError : not fitted, or patterns that make no sense
+        ProblemError : not fitted, or patterns that are invalid
         """
         learners = self._fitted("learners_")
         trains = _listed(patterns)
@@ -62,7 +61,7 @@ class _NeuronAClass(Classifier):
         )
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
-        """Return a label a pattern.
+        """Return a label for each pattern.
 
         Parameters
         ----------
@@ -74,19 +73,20 @@ class _NeuronAClass(Classifier):
 
         Raises
         ------
-        ProblemError : not fitted, or patterns that make no sense
+        ProblemError : not fitted, or patterns that are invalid
         """
         return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
 
-    def _taught(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> Any:
-        """Return a learner of one class, which names its own patterns."""
-        raise NotImplementedError
+    @abstractmethod
+    def _trained(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> Any:
+        """Return the trained neuron of one class, given which patterns are of that class."""
 
+    @abstractmethod
     def _potential(self, learner: Any, trains: SpikeTrains) -> float:
-        raise NotImplementedError
+        """Return the potential that is compared between classes, mV."""
 
 
-class ConeRReadout(_NeuronAClass):
+class ConeRReadout(_NeuronPerClass):
     """Classify by a neuron a class, which `ConeR` teaches to fire at the window's end on its own class and never else.
 
     Parameters
@@ -105,7 +105,7 @@ class ConeRReadout(_NeuronAClass):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Notes
     -----
@@ -125,7 +125,7 @@ class ConeRReadout(_NeuronAClass):
             if not 0 < number(name, getattr(self, name)) < np.inf:
                 raise ProblemError(f"{name} is {shown(getattr(self, name))}: must be above 0, and finite")
 
-    def _taught(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> ConeR:
+    def _trained(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> ConeR:
         targets = [[one.stop] if mine else [] for one, mine in zip(trains, own, strict=True)]
         neuron = Neuron(tau=self.tau, after_spike="keep", step_ms=1.0)
         learner = ConeR(neuron=neuron, lb=-self.bound, ub=self.bound, max_seconds=self.max_seconds)
@@ -135,7 +135,7 @@ class ConeRReadout(_NeuronAClass):
         return float(learner.neuron_.potential(learner.weights_, trains, [trains.stop])[0])
 
 
-class TempotronReadout(_NeuronAClass):
+class TempotronReadout(_NeuronPerClass):
     """Classify by a `Tempotron` a class, taught to fire on its own class and on no other.
 
     Parameters
@@ -153,7 +153,7 @@ class TempotronReadout(_NeuronAClass):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Notes
     -----
@@ -175,7 +175,7 @@ class TempotronReadout(_NeuronAClass):
     def _learner(self) -> Tempotron:
         return Tempotron(tau=self.tau, epochs=self.epochs, max_seconds=self.max_seconds, seed=self.seed)
 
-    def _taught(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> Tempotron:
+    def _trained(self, trains: list[SpikeTrains], own: NDArray[np.bool_]) -> Tempotron:
         return self._learner().fit(trains, own)
 
     def _potential(self, learner: Tempotron, trains: SpikeTrains) -> float:

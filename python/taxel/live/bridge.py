@@ -57,7 +57,7 @@ class Bridge:
     Raises
     ------
     DeviceError : the address cannot be bound; the wheel is not installed
-    ProblemError : arguments that make no sense
+    ProblemError : arguments that are invalid
     """
 
     def __init__(

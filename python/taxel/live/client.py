@@ -157,7 +157,7 @@ class PanelClient:
     ------
     ImportError : the package `websockets` is not installed
     OSError : no server listens there
-    ProblemError : arguments that make no sense; an address whose token the server refuses
+    ProblemError : arguments that are invalid; an address whose token the server refuses
 
     See Also
     --------

@@ -109,7 +109,7 @@ class Live:
     ------
     OSError : the port is taken; the file cannot be created, or is being recorded by another program
     FileExistsError : the file is there already and `overwrite` is false
-    ProblemError : arguments that make no sense; a readout that needs a tare and has none
+    ProblemError : arguments that are invalid; a readout that needs a tare and has none
     DeviceError : registers that break a rule
 
     Notes

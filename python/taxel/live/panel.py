@@ -41,7 +41,7 @@ class Panel:
     Raises
     ------
     OSError : the port is taken, the folder or the recording is not there, the serial line cannot be opened
-    ProblemError : arguments that make no sense
+    ProblemError : arguments that are invalid
 
     Examples
     --------

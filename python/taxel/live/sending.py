@@ -55,7 +55,7 @@ def send(
     Raises
     ------
     OSError : the system refuses to send
-    ProblemError : arguments that make no sense
+    ProblemError : arguments that are invalid
 
     Examples
     --------

@@ -43,7 +43,7 @@ class Source:
 
     Raises
     ------
-    ProblemError : arguments that make no sense
+    ProblemError : arguments that are invalid
     OSError : a socket cannot be opened
 
     Examples

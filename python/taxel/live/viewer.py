@@ -87,7 +87,7 @@ class Viewer:
     ------
     ImportError : the viewer's library is not installed (``pip install taxel[rerun]`` or ``taxel[foxglove]``)
     OSError : Foxglove's port is taken, the recording is not there
-    ProblemError : arguments that make no sense
+    ProblemError : arguments that are invalid
 
     Examples
     --------

@@ -94,7 +94,7 @@ class Silence:
 
     Raises
     ------
-    SceneError : a time that makes no sense, when it is played
+    SceneError : a time that is invalid, when it is played
 
     Examples
     --------
@@ -134,7 +134,7 @@ class Scene:
 
     Raises
     ------
-    SceneError : when it is played, and a parameter makes no sense, a body is off the array or bottoms out
+    SceneError : when it is played, and a parameter is invalid, a body is off the array or bottoms out
 
     Warns
     -----
@@ -250,7 +250,7 @@ class Scene:
 
         Raises
         ------
-        SceneError : a parameter of the scene that makes no sense, a body off the array, or more than 2e7 steps
+        SceneError : a parameter of the scene that is invalid, a body off the array, or more than 2e7 steps
         ProblemError : a step that is no number
 
         Examples

@@ -131,7 +131,7 @@ class Board:
 
     Raises
     ------
-    ProblemError, DeviceError : arguments or registers that make no sense
+    ProblemError, DeviceError : arguments or registers that are invalid
 
     Notes
     -----

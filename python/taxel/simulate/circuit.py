@@ -46,7 +46,7 @@ class Fabric(Value):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Notes
     -----
@@ -184,7 +184,7 @@ class VirtualGround(_Lines):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Notes
     -----
@@ -237,7 +237,7 @@ class Divider(_Lines):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Notes
     -----
@@ -311,7 +311,7 @@ class Converter(Value):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense, a step too short for its ramp, a column too short for its steps
+    ProblemError : a parameter that is invalid, a step too short for its ramp, a column too short for its steps
 
     Notes
     -----
@@ -480,7 +480,7 @@ class AdaptiveRamp(Value):
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense, or `steepest` above `gentlest`
+    ProblemError : a parameter that is invalid, or `steepest` above `gentlest`
 
     Notes
     -----

@@ -122,7 +122,7 @@ def play(
 
     Raises
     ------
-    SceneError : an act or a sensor that makes no sense
+    SceneError : an act or a sensor that is invalid
     ProblemError : acts too short for the tare; a circuit of another voltage or resistor; asynchronous on version 1
     DeviceError : the array has more lines than the preset, or that version of the wire, reads
 
@@ -224,8 +224,8 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
 
     Raises
     ------
-    SceneError : an act or a sensor that makes no sense
-    ProblemError : options that make no sense, or a circuit of another voltage or resistor
+    SceneError : an act or a sensor that is invalid
+    ProblemError : options that are invalid, or a circuit of another voltage or resistor
     DeviceError : the array has more lines than the preset, or that version of the wire, reads
     OSError : a socket, line or file cannot be opened
 
@@ -260,7 +260,7 @@ def emulate(options: EmulateOptions) -> EmulatorReport:
 
 
 def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
-    """Return the parts of acts, one after the other; an act that makes no sense is refused when its turn comes.
+    """Return the parts of acts, one after the other; an act that is invalid is refused when its turn comes.
 
     Of a sequence all are checked at once.
     """

@@ -54,7 +54,7 @@ class Layer:
 
     Raises
     ------
-    SceneError : foam that makes no sense; so many cells on so large an array
+    SceneError : foam that is invalid; so many cells on so large an array
     ProblemError : a number of cells or a tolerance that is none
 
     Notes

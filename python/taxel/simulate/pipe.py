@@ -35,7 +35,7 @@ class Pipe:
     Raises
     ------
     FormatError : another first line
-    ProblemError : numbers in it that make no sense
+    ProblemError : numbers in it that are invalid
     """
 
     def __init__(self, source: IO[bytes], noise_floor: int = 3) -> None:

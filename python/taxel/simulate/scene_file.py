@@ -101,7 +101,7 @@ class SceneFile:
 
         Raises
         ------
-        SceneError : no TOML, an unknown key, a value that makes no sense; names the file and the place
+        SceneError : no TOML, an unknown key, a value that is invalid; names the file and the place
         OSError : a file that cannot be read
 
         Warns
@@ -135,7 +135,7 @@ class SceneFile:
             {name: document[name] for name in _SCENE if name in document}
             | {"bodies": _bodies(document["bodies"], folder)}
         )
-        # Refuses what makes no sense here, instead of when the scene is played.
+        # Refuses what is invalid here, instead of when the scene is played.
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
         if not np.isfinite(scene.motion(array=array).force_n).all():
             raise SceneError("foam: the force on it is beyond what a float32 holds; must be softer")

@@ -79,7 +79,7 @@ def paths(conditions: Iterable[Condition], **settings: Any) -> list[Indentation]
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
     """
     deepest: dict[tuple[float, float, float], float] = {}
     for c in conditions:

@@ -36,7 +36,7 @@ class SamplingGrid:
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Examples
     --------

@@ -56,7 +56,7 @@ class Indentation:
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that is invalid
 
     Examples
     --------
