@@ -11,10 +11,6 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
-#: Results whose commit is not in the history (rewritten, or not clean): to be measured again; none may be added.
-TO_BE_RERUN: dict[str, str] = {
-    "demo.json": "325fc11",
-}
 
 
 def stated(value: Any) -> Iterator[str]:
@@ -48,14 +44,8 @@ def test_there_are_results_that_name_commits() -> None:
 
 @pytest.mark.parametrize(("file", "commit"), NAMED)
 def test_a_result_names_a_clean_commit_of_this_history(file: str, commit: str) -> None:
-    if TO_BE_RERUN.get(file) == commit:
-        pytest.skip("to be rerun")
     assert re.fullmatch(r"[0-9a-f]{7,40}", commit), f"{file}: {commit}"
     shallow = git("rev-parse", "--is-shallow-repository")
     if shallow.stdout.strip() != "false":
         pytest.skip("the history is not whole here")
     assert git("merge-base", "--is-ancestor", commit, "HEAD").returncode == 0, f"{file}: {commit} is not in the history"
-
-
-def test_what_is_to_be_rerun_is_still_there() -> None:
-    assert set(TO_BE_RERUN.items()) <= set(NAMED), "rerun already: take it off"
