@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from taxel._base.arguments import callback, instance, several, text, whole
 from taxel.encode import ChangeEvents, Encoder
+from taxel.information._threads import threads
 from taxel.information.answers import Answer, Point, is_above_chance
 from taxel.information.controls import controls
 from taxel.information.estimate import Estimate, estimate, zero_test
 from taxel.information.keeping import Verdict, keeps
-from taxel.information.nested import Nested, training_curve
+from taxel.information.nested import WORTH_THREADS, Matrices, Nested, predictions, training_curve
 from taxel.information.question import Question
-from taxel.information.rasters import features, frame_grams
+from taxel.information.rasters import frame_grams
 from taxel.information.sampling import (
     Spikes,
     pictures_of,
@@ -34,8 +34,6 @@ __all__ = ["CLASSIFIERS", "answer"]
 CLASSIFIERS = ("neighbours", "cone_r", "tempotron")
 #: Numbers of neighbours that are tried.
 NEIGHBOURS = (1, 3, 5, 9, 15)
-#: Number of trials from which several threads are used for their matrices.
-_WORTH_THREADS = 1000
 #: Pictures are compared with events only where they have at most so many values.
 _MOST_VALUES = 2**28
 
@@ -105,7 +103,7 @@ def answer(
     answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed), progress)
     answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms, len(also), int(shuffles))
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.
-    with threadpool_limits(1 if len(listed) < _WORTH_THREADS else None):
+    with threads(several=len(listed) >= WORTH_THREADS):
         return answering.answer(also, int(shuffles))
 
 
@@ -119,27 +117,26 @@ class _Answering(Question):
         about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
         frames: dict[int, list[Any]] = {}
         by_column: dict[tuple[str, int], list[Any]] = {}
-        reference: tuple[Spikes, list[NDArray[np.float64]], list[int], Nested] | None = None
+        reference: tuple[Spikes, Matrices, Nested] | None = None
         missing: set[str] = set()
-        for period in self.periods:
-            for draw in range(self.draws):
+        for draw in range(self.draws):
+            for period in self.periods:
                 self.tell(f"{to_ms(period):g} ms, draw {draw + 1}")
                 spikes = self.spikes(period, draw)
-                for window, grams in zip(self.windows, self.grams(spikes, self.windows), strict=True):
-                    sizes = [features(spikes, window)] * len(grams)
-                    nested = self.nested(grams, sizes, draw=draw)
+                for window, matrices in zip(self.windows, self.matrices(spikes, self.windows), strict=True):
+                    nested = self.nested(matrices, draw=draw)
                     responses_at.setdefault((period, window), []).append(nested.responses)
                     about.setdefault((period, window), []).append(_about(spikes, window, values))
                     missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
                     if reference is None and window == self.windows[-1]:
-                        reference = spikes, grams, sizes, nested
-                for name, column in self.columns.items():
+                        reference = spikes, matrices, nested
+                for name in self.columns:
                     self.tell(f"{to_ms(period):g} ms, {name}")
-                    by_column.setdefault((name, period), []).append(self.nested(grams, sizes, column, draw).responses)
+                    by_column.setdefault((name, period), []).append(self.nested(matrices, name, draw).responses)
                 self.tell(f"{to_ms(period):g} ms, pictures")
                 picture = self._pictures(spikes)
                 if picture is not None:
-                    frames.setdefault(period, []).append(self.nested(*picture, draw=draw).responses)
+                    frames.setdefault(period, []).append(self.nested(picture, draw=draw).responses)
         assert reference is not None  # there are a period, a draw and a window at least
         estimates = {key: self.estimate(responses) for key, responses in responses_at.items()}
         everything = len(self.active)
@@ -150,10 +147,10 @@ class _Answering(Question):
                 verdict = keeps(one, estimates[self.periods[0], window], groups=self.groups)
             points.append(_point(period, window, everything, "all", one, about[period, window], verdict))
         full = next(p for p in points if p.verdict is None and p.window_ms == to_ms(self.windows[-1]))
-        spikes, grams, sizes, first = reference
+        spikes, matrices, first = reference
         self.tell("labels shuffled", 0)
         zero = zero_test(
-            lambda labels: self._shuffled(grams, sizes, labels),
+            lambda labels: self._shuffled(matrices, labels),
             self.labels,
             full.found.bits,
             groups=self.groups,
@@ -175,26 +172,26 @@ class _Answering(Question):
             frames={to_ms(period): self.estimate(responses) for period, responses in frames.items()},
             controls=controls(self),
             zero=zero,
-            training=self._training(grams, sizes, first),
-            classifiers={name: self._classified(name, spikes, grams, sizes) for name in classifiers},
+            training=self._training(matrices, first),
+            classifiers={name: self._classified(name, spikes, matrices) for name in classifiers},
             parameters=self._columns_answered(by_column, about, everything),
             notes=tuple(self.notes),
             draws=self.draws,
             seed=self.seed,
         )
 
-    def _shuffled(self, grams: list[NDArray[np.float64]], sizes: list[int], labels: Any) -> NDArray[np.generic]:
+    def _shuffled(self, matrices: Matrices, labels: Any) -> NDArray[np.generic]:
         self.tell("labels shuffled")
-        return self.nested(grams, sizes, labels).responses
+        return predictions(matrices, self.split(labels)).responses
 
-    def _pictures(self, spikes: Spikes) -> tuple[list[NDArray[np.float64]], list[int]] | None:
+    def _pictures(self, spikes: Spikes) -> Matrices | None:
         """Return the pictures' inner products to the whole window; None without values, or where they are too many."""
         bins = int(spikes.bins_to(self.window_us).max(initial=0))
         active = len(np.unique(spikes.taxel))
         if not all(held.has_values for held in self.held) or not 0 < bins * active * spikes.trials <= _MOST_VALUES:
             return None
         values = pictures_of(self.trials, self.held, spikes, self.contact, bins)
-        return frame_grams(values, spikes, [self.window_us]), [bins * active]
+        return Matrices(frame_grams(values, spikes, [self.window_us]), [bins * active])
 
     def _by_taxels(self, full: Point, values: bool) -> tuple[Point, ...]:
         """Return the points with fewer or larger taxels."""
@@ -212,31 +209,27 @@ class _Answering(Question):
                 else:
                     spikes = self.spikes(period, draw, size)
                     taxels = spikes.taxels
-                grams = self.grams(spikes, [window])[0]
-                responses.append(self.nested(grams, [features(spikes, window)] * len(grams), draw=draw).responses)
+                responses.append(self.nested(self.matrices(spikes, [window])[0], draw=draw).responses)
                 about.append(_about(spikes, window, values))
             one = self.estimate(responses)
             points.append(_point(period, window, taxels, kind, one, about, keeps(one, full.found, groups=self.groups)))
         return tuple(points)
 
-    def _training(
-        self, grams: list[NDArray[np.float64]], sizes: list[int], first: Nested
-    ) -> tuple[tuple[int, float], ...]:
+    def _training(self, matrices: Matrices, first: Nested) -> tuple[tuple[int, float], ...]:
         self.tell("by number of training trials")
         least = int(np.unique(self.labels, return_counts=True)[1].min())
         most = least - -(-least // self.folds)
         steps = sorted({max(2, most // k) for k in (12, 6, 3, 2)} - {most})
         steps = [n for n in steps if n < most]
-        responses = training_curve(grams, sizes, self.labels, first, steps, seed=self.seed)
+        responses = training_curve(matrices.squares, matrices.features, self.labels, first, steps, seed=self.seed)
         curve = [(n, estimate(self.labels, one, redraws=2).bits) for n, one in zip(steps, responses, strict=True)]
         return (*curve, (most, estimate(self.labels, first.responses, redraws=2).bits))
 
-    def _classified(self, name: str, spikes: Spikes, grams: list[NDArray[np.float64]], sizes: list[int]) -> Estimate:
+    def _classified(self, name: str, spikes: Spikes, matrices: Matrices) -> Estimate:
         self.tell(name)
         if name == "neighbours":
-            return self.estimate(self.nested(grams, sizes, neighbours=NEIGHBOURS).responses)
-        fold = self.nested([grams[-1]], [sizes[-1]], ridges=[1.0]).folds
-        return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, fold))
+            return self.estimate(self.nested(matrices, neighbours=NEIGHBOURS).responses)
+        return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, self.split(self.labels).fold))
 
     def _columns_answered(
         self, by_column: dict[tuple[str, int], list[Any]], about: dict[Any, Any], everything: int

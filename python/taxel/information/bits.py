@@ -7,7 +7,6 @@ takes one table or a stack of them, and all trials count alike.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -267,12 +266,11 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
     means = [float(plug_in(table))]
     for parts in (2, 4):
         ends = np.linspace(0, trials, parts + 1).astype(int)
-        values: list[Any] = []
+        tables = []
         for _ in range(rounds):
             dealt = random.permutation(cells)
-            tables = (np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends))
-            values += [plug_in(one.reshape(table.shape)) for one in tables]
-        means.append(float(np.mean(values)))
+            tables += [np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends)]
+        means.append(float(np.mean(plug_in(np.reshape(tables, (-1, *table.shape))))))
     # The value at 0 of the parabola through (1, whole), (2, half) and (4, quarter), in units of 1/N.
     at_zero = (8 * means[0] - 6 * means[1] + means[2]) / 3
     return float(np.clip(at_zero, 0.0, label_entropy(table)))

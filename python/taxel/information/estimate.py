@@ -192,10 +192,10 @@ def estimate(
     prior, wrong = n[n > 0] / len(truth), int((row != counts.sum(0).argmax(0)[column]).any(0).sum())
     if wrong <= len(prior):
         # With so few errors, redraws do not show where others would lie.
-        low = min(low, most - bits - _left_open(prior, wrong, len(truth), share))
+        low = min(low, most - bits - float(_left_open(prior, np.array(wrong), np.array(len(truth)), share)))
         times = np.geomspace(1, 100, 400)
-        needed = (len(truth) * m for m in times if _left_open(prior, m * wrong, m * len(truth), 0.95) <= _FIFTH)
-        tenth = max(tenth, int(np.ceil(next(needed, 100 * len(truth)))))
+        few = np.flatnonzero(_left_open(prior, times * wrong, times * len(truth), 0.95) <= _FIFTH)
+        tenth = max(tenth, int(np.ceil(len(truth) * (times[few[0]] if len(few) else 100))))
     relevant = relevant_responses(counts)[:, np.unique(row)].mean()
     interval = max(0.0, bits + low), min(most, bits + high)
     return Estimate(
@@ -291,14 +291,16 @@ def _shuffled(row: NDArray[np.int64], belongs: NDArray[np.int64] | None, random:
 def _tables(cells: NDArray[np.int64], weights: NDArray[Any], classes: int) -> NDArray[np.int64]:
     """Return the tables of each redraw and draw, shape (redraws, draws, labels, labels)."""
     draws = np.atleast_2d(cells)
-    tables = np.empty((len(weights), len(draws), classes, classes), np.int64)
-    for k, weight in enumerate(weights):
-        for d, cell in enumerate(draws):
-            # In pieces, as one NumPy call does not answer Ctrl-C; sums of whole numbers are exact.
-            pieces = (slice(first, first + _DRAWN) for first in range(0, len(cell), _DRAWN))
-            table = sum(np.bincount(cell[piece], weight[piece], classes**2) for piece in pieces)
-            tables[k, d] = np.rint(table).reshape(classes, classes)
-    return tables if cells.ndim == 2 else tables[:, 0]
+    tables = np.zeros((len(draws), len(weights) * classes**2))
+    # In pieces, as one NumPy call does not answer Ctrl-C; sums of whole numbers are exact.
+    step = max(1, _DRAWN // len(weights))
+    for d, cell in enumerate(draws):
+        for first in range(0, len(cell), step):
+            piece = slice(first, first + step)
+            place = np.arange(len(weights))[:, None] * classes**2 + cell[piece]
+            tables[d] += np.bincount(place.ravel(), weights[:, piece].ravel(), tables.shape[1])
+    shaped = np.rint(tables).astype(np.int64).reshape(len(draws), len(weights), classes, classes).swapaxes(0, 1)
+    return np.ascontiguousarray(shaped if cells.ndim == 2 else shaped[:, 0])
 
 
 def _interval(
@@ -361,18 +363,19 @@ def _redrawn(random: np.random.Generator, units: int, count: int) -> NDArray[np.
     return draws
 
 
-def _left_open(prior: NDArray[np.float64], wrong: float, trials: float, confidence: float) -> float:
-    """Return how many bits the labels may lose where so few of the trials were named wrongly.
+def _left_open(
+    prior: NDArray[np.float64], wrong: NDArray[Any], trials: NDArray[Any], confidence: float
+) -> NDArray[np.float64]:
+    """Return how many bits the labels may lose where so few of so many trials were named wrongly.
 
     By Fano's inequality, with Clopper and Pearson's upper end for the share of errors.
     """
     from scipy.special import betaincinv  # noqa: PLC0415  loads slowly
 
-    share = float(betaincinv(wrong + 1, max(trials - wrong, 1e-9), (1 + confidence) / 2))
-    even = np.full((len(prior), len(prior)), share / (len(prior) - 1))
-    np.fill_diagonal(even, 1 - share)
+    share = betaincinv(wrong + 1, np.maximum(trials - wrong, 1e-9), (1 + confidence) / 2)[..., None, None]
+    even = np.where(np.eye(len(prior), dtype=bool), 1 - share, share / (len(prior) - 1))
     table = np.rint(_FINE * prior[:, None] * even)
-    return float(label_entropy(table) - plug_in(table))
+    return np.asarray(label_entropy(table) - plug_in(table))
 
 
 def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth: int) -> tuple[str, ...]:

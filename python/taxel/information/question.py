@@ -15,8 +15,9 @@ from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.frames import Frames
 from taxel.information.estimate import Estimate, estimate
-from taxel.information.nested import Nested, nested_predictions
-from taxel.information.rasters import event_grams
+from taxel.information.folds import Split, split
+from taxel.information.nested import Matrices, Nested, predictions
+from taxel.information.rasters import event_grams, features
 from taxel.information.sampling import (
     STEP_US,
     HeldValues,
@@ -51,6 +52,7 @@ class Question:
     notes: list[str] = field(default_factory=list)
     done: int = 0
     steps: int = 1
+    _splits: dict[tuple[str, int], Split] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
@@ -179,25 +181,28 @@ class Question:
             pool=pool,
         )
 
-    def nested(
-        self, grams: list[NDArray[np.float64]], sizes: list[int], y: Any = None, draw: int = 0, **ways: Any
-    ) -> Nested:
-        """Return the predictions for all trials in nested folds; `y` replaces the question's labels."""
-        labels = self.labels if y is None else y
-        return nested_predictions(
-            grams, sizes, labels, groups=self.groups, count=self.folds, seed=self.seed + draw, **ways
-        )
+    def nested(self, matrices: Matrices, column: str = "", draw: int = 0, **ways: Any) -> Nested:
+        """Return the predictions for all trials in nested folds, of the labels or of a column of parameters."""
+        if (column, draw) not in self._splits:
+            self._splits[column, draw] = self.split(self.columns[column] if column else self.labels, draw)
+        return predictions(matrices, self._splits[column, draw], **ways)
+
+    def split(self, labels: Any, draw: int = 0) -> Split:
+        """Return labels dealt out to folds."""
+        return split(labels, len(self.trials), count=self.folds, groups=self.groups, seed=self.seed + draw)
 
     def estimate(self, responses: Any, labels: Any = None) -> Estimate:
         """Return the information of responses (or draws of them) about the labels."""
         truth = self.labels if labels is None else labels
         return estimate(truth, responses, groups=self.groups, seed=self.seed)
 
-    def grams(self, spikes: Spikes, windows: Sequence[float]) -> list[list[NDArray[np.float64]]]:
+    def matrices(self, spikes: Spikes, windows: Sequence[float]) -> list[Matrices]:
         """Return by window the matrices of all smoothings that a period can tell apart."""
         taus = [to_ms(share * self.window_us) for share in SMOOTHINGS]
         taus = [tau for tau in taus if tau == 0 or to_us(tau) > spikes.period_us / 2]
-        return [list(one) for one in zip(*(event_grams(spikes, windows, tau) for tau in taus), strict=True)]
+        by_tau = [event_grams(spikes, windows, tau) for tau in taus]
+        sizes = features(spikes, windows)
+        return [Matrices(grams, [size] * len(taus)) for size, *grams in zip(sizes, *by_tau, strict=True)]
 
     def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
         """Return the columns of parameters that can stand in for the labels; the notes name the others."""
