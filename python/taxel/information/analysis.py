@@ -197,22 +197,28 @@ class _Answering(Question):
         """Return the points with fewer or larger taxels."""
         period = self.taxels_at
         window = self.window_us
-        points = []
-        for kind, size in [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]:
-            responses, about, taxels = [], [], size
-            for draw in range(self.draws):
+        settings = [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]
+        responses: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
+        about: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
+        taxels = {setting: setting[1] for setting in settings}
+        for draw in range(self.draws):
+            every = self.spikes(period, draw)
+            for kind, size in settings:
                 self.tell(f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}")
                 if kind == "random":
                     random = np.random.default_rng([self.seed, draw, size, 1])
-                    chosen = np.sort(random.choice(self.active, size, replace=False))
-                    spikes = self.spikes(period, draw).of(chosen)
+                    spikes = every.of(np.sort(random.choice(self.active, size, replace=False)))
                 else:
                     spikes = self.spikes(period, draw, size)
-                    taxels = spikes.taxels
-                responses.append(self.nested(self.matrices(spikes, [window])[0], draw=draw).responses)
-                about.append(_about(spikes, window, values))
-            one = self.estimate(responses)
-            points.append(_point(period, window, taxels, kind, one, about, keeps(one, full.found, groups=self.groups)))
+                    taxels[kind, size] = spikes.taxels
+                nested = self.nested(self.matrices(spikes, [window])[0], draw=draw)
+                responses[kind, size].append(nested.responses)
+                about[kind, size].append(_about(spikes, window, values))
+        points = []
+        for kind, size in settings:
+            one, mine = self.estimate(responses[kind, size]), (kind, size)
+            verdict = keeps(one, full.found, groups=self.groups)
+            points.append(_point(period, window, taxels[mine], kind, one, about[mine], verdict))
         return tuple(points)
 
     def _training(self, matrices: Matrices, first: Nested) -> tuple[tuple[int, float], ...]:

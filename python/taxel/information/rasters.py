@@ -37,9 +37,9 @@ def event_grams(spikes: Spikes, windows_us: Sequence[float], tau_ms: float) -> l
     """
     sums = _Sums(spikes, windows_us)
     decay = np.float32(np.exp(to_ms(-spikes.period_us) / tau_ms)) if tau_ms > 0 else np.float32(0)
-    active, taxel = np.unique(spikes.taxel, return_inverse=True)
-    state = np.zeros((spikes.trials, len(active)), np.float32)
-    place = spikes.trial * len(active) + taxel
+    there = np.bincount(spikes.taxel, minlength=1) > 0
+    state = np.zeros((spikes.trials, int(there.sum())), np.float32)
+    place = spikes.trial * state.shape[1] + (np.cumsum(there) - 1)[spikes.taxel]
     begins = np.searchsorted(spikes.bin, np.arange(sums.bins + 1))
     for b in range(sums.bins):
         state *= decay
