@@ -14,9 +14,10 @@ from taxel.encode import ChangeEvents, Encoder
 from taxel.information._threads import threads
 from taxel.information.answers import Answer, Point, is_above_chance
 from taxel.information.controls import controls
-from taxel.information.estimate import Estimate, estimate, zero_test
+from taxel.information.estimate import Estimate, bits_of, estimate, zero_test
 from taxel.information.keeping import Verdict, keeps
 from taxel.information.nested import WORTH_THREADS, Matrices, Nested, predictions, training_curve
+from taxel.information.pace import Pace, Work
 from taxel.information.question import Question
 from taxel.information.rasters import frame_grams
 from taxel.information.sampling import (
@@ -54,6 +55,7 @@ def answer(
     classifiers: Sequence[str] = ("neighbours",),
     seed: int = 0,
     progress: Callable[[str, int, int], object] | None = None,
+    watch: Callable[[float, float, float], object] | None = None,
 ) -> Answer:
     """Estimate how many bits the events of labelled trials hold about the labels, by period, time, taxels and cost.
 
@@ -83,7 +85,10 @@ def answer(
         Beside the discriminants, at the full setting.
     seed : int, 0 or more
     progress : function of (what, done, all), optional
-        What it raises ends the work.
+        What is computed next, and how much of the expected time of all has passed, in ms of one core. The first call
+        comes before the work (done is 0); what it raises ends the work.
+    watch : function of (period_ms, window_ms, bits), optional
+        Called whenever a draw of a setting of all taxels is done, with the bits by the draws so far.
 
     Returns
     -------
@@ -95,23 +100,32 @@ def answer(
         in any trial
     """
     listed = [instance(f"trials[{k}]", one, LabelledTrial) for k, one in enumerate(several("trials", trials))]
-    if progress is not None:
-        callback("progress", progress)
+    for name, function in (("progress", progress), ("watch", watch)):
+        if function is not None:
+            callback(name, function)
     for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
         whole(name, value, least)
     also = [text("classifiers", one, CLASSIFIERS) for one in several("classifiers", classifiers)]
-    answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed), progress)
-    answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms, len(also), int(shuffles))
+    answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed))
+    answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms)
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.
     with threads(several=len(listed) >= WORTH_THREADS):
-        return answering.answer(also, int(shuffles))
+        return answering.answer(also, int(shuffles), Pace(progress), watch)
 
 
 class _Answering(Question):
     """Computes the answer to a question, setting by setting."""
 
-    def answer(self, classifiers: list[str], shuffles: int) -> Answer:
+    def answer(
+        self,
+        classifiers: list[str],
+        shuffles: int,
+        pace: Pace,
+        watch: Callable[[float, float, float], object] | None,
+    ) -> Answer:
         """Return the answer for all settings."""
+        self.pace, self.work = pace, Work(self)
+        pace.expect(self.work.all(classifiers, shuffles))
         values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
         responses_at: dict[tuple[int, float], list[Any]] = {}
         about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
@@ -121,24 +135,31 @@ class _Answering(Question):
         missing: set[str] = set()
         for draw in range(self.draws):
             for period in self.periods:
-                self.tell(f"{to_ms(period):g} ms, draw {draw + 1}")
+                pace.begin(f"{to_ms(period):g} ms, draw {draw + 1}", self.work.rasters(period))
                 spikes = self.spikes(period, draw)
                 for window, matrices in zip(self.windows, self.matrices(spikes, self.windows), strict=True):
+                    at = f"{to_ms(period):g} ms to {to_ms(window):g} ms"
+                    pace.begin(f"{at}, draw {draw + 1}", self.work.prediction(period))
                     nested = self.nested(matrices, draw=draw)
                     responses_at.setdefault((period, window), []).append(nested.responses)
                     about.setdefault((period, window), []).append(_about(spikes, window, values))
                     missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
                     if reference is None and window == self.windows[-1]:
                         reference = spikes, matrices, nested
+                    if watch is not None:
+                        watch(to_ms(period), to_ms(window), bits_of(self.labels, responses_at[period, window]))
                 for name in self.columns:
-                    self.tell(f"{to_ms(period):g} ms, {name}")
+                    pace.begin(f"{to_ms(period):g} ms, {name}", self.work.prediction(period))
                     by_column.setdefault((name, period), []).append(self.nested(matrices, name, draw).responses)
-                self.tell(f"{to_ms(period):g} ms, pictures")
+                pace.begin(f"{to_ms(period):g} ms, pictures", self.work.pictures(period))
                 picture = self._pictures(spikes)
                 if picture is not None:
                     frames.setdefault(period, []).append(self.nested(picture, draw=draw).responses)
         assert reference is not None  # there are a period, a draw and a window at least
-        estimates = {key: self.estimate(responses) for key, responses in responses_at.items()}
+        estimates = {}
+        for key, responses in responses_at.items():
+            pace.begin("intervals", self.work.estimate())
+            estimates[key] = self.estimate(responses)
         everything = len(self.active)
         points = []
         for (period, window), one in estimates.items():
@@ -148,7 +169,6 @@ class _Answering(Question):
             points.append(_point(period, window, everything, "all", one, about[period, window], verdict))
         full = next(p for p in points if p.verdict is None and p.window_ms == to_ms(self.windows[-1]))
         spikes, matrices, first = reference
-        self.tell("labels shuffled", 0)
         zero = zero_test(
             lambda labels: self._shuffled(matrices, labels),
             self.labels,
@@ -159,6 +179,9 @@ class _Answering(Question):
         )
         self._warn(missing)
         taxels = self._by_taxels(full, values)
+        answered = self._columns_answered(by_column, about, everything)
+        pace.begin("controls", self.work.controls())
+        beside = controls(self)
         if not is_above_chance(full.found, zero):
             points = [_with_nothing(p) if p.window_ms == full.window_ms else p for p in points]
             taxels = tuple(map(_with_nothing, taxels))
@@ -170,18 +193,18 @@ class _Answering(Question):
             points=tuple(points),
             taxels=taxels,
             frames={to_ms(period): self.estimate(responses) for period, responses in frames.items()},
-            controls=controls(self),
+            controls=beside,
             zero=zero,
             training=self._training(matrices, first),
             classifiers={name: self._classified(name, spikes, matrices) for name in classifiers},
-            parameters=self._columns_answered(by_column, about, everything),
+            parameters=answered,
             notes=tuple(self.notes),
             draws=self.draws,
             seed=self.seed,
         )
 
     def _shuffled(self, matrices: Matrices, labels: Any) -> NDArray[np.generic]:
-        self.tell("labels shuffled")
+        self.pace.begin("labels shuffled", self.work.prediction(self.periods[0]))
         return predictions(matrices, self.split(labels)).responses
 
     def _pictures(self, spikes: Spikes) -> Matrices | None:
@@ -204,7 +227,8 @@ class _Answering(Question):
         for draw in range(self.draws):
             every = self.spikes(period, draw)
             for kind, size in settings:
-                self.tell(f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}")
+                what = f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}"
+                self.pace.begin(what, self.work.taxels(kind, size))
                 if kind == "random":
                     random = np.random.default_rng([self.seed, draw, size, 1])
                     spikes = every.of(np.sort(random.choice(self.active, size, replace=False)))
@@ -222,7 +246,7 @@ class _Answering(Question):
         return tuple(points)
 
     def _training(self, matrices: Matrices, first: Nested) -> tuple[tuple[int, float], ...]:
-        self.tell("by number of training trials")
+        self.pace.begin("by number of training trials", self.work.prediction(self.periods[0]))
         least = int(np.unique(self.labels, return_counts=True)[1].min())
         most = least - -(-least // self.folds)
         steps = sorted({max(2, most // k) for k in (12, 6, 3, 2)} - {most})
@@ -232,7 +256,7 @@ class _Answering(Question):
         return (*curve, (most, estimate(self.labels, first.responses, redraws=2).bits))
 
     def _classified(self, name: str, spikes: Spikes, matrices: Matrices) -> Estimate:
-        self.tell(name)
+        self.pace.begin(name, self.work.classifier(name))
         if name == "neighbours":
             return self.estimate(self.nested(matrices, neighbours=NEIGHBOURS).responses)
         return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, self.split(self.labels).fold))
@@ -242,6 +266,7 @@ class _Answering(Question):
     ) -> dict[str, tuple[Point, ...]]:
         by_name: dict[str, list[Point]] = {}
         for (name, period), responses in by_column.items():
+            self.pace.begin(f"intervals, {name}", self.work.estimate())
             one = self.estimate(responses, self.columns[name])
             by_name.setdefault(name, []).append(
                 _point(period, self.windows[-1], everything, "all", one, about[period, self.windows[-1]], None)

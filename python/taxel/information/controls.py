@@ -23,7 +23,6 @@ __all__ = ["controls"]
 
 def controls(question: Question) -> tuple[Control, ...]:
     """Return the bits of the stretch before the contact, the length, the count of events and the first picture."""
-    question.tell("controls")
     finest, window = question.periods[0], question.window_us
     spikes = question.spikes(finest, 0)
     count = spikes.counts(window).astype(np.float64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -213,6 +213,13 @@ def estimate(
         trials_for_tenth=tenth,
         warnings=_warnings(int(n[n > 0].min()), float(relevant), interval, tenth),
     )
+
+
+def bits_of(labels: NDArray[Any], responses: Sequence[NDArray[Any]]) -> float:
+    """Return the bits of draws of responses, each one of the labels, without an interval."""
+    classes = distinct(labels)
+    cells = numbered(classes, labels) * len(classes) + numbered(classes, np.stack(responses))
+    return float(np.mean(panzeri_treves(_tables(cells, np.ones((1, len(labels)), np.int64), len(classes))[0])))
 
 
 def zero_test(

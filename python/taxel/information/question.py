@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -48,10 +48,7 @@ class Question:
     draws: int
     folds: int
     seed: int
-    progress: Callable[[str, int, int], object] | None
     notes: list[str] = field(default_factory=list)
-    done: int = 0
-    steps: int = 1
     _splits: dict[tuple[str, int], Split] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -115,8 +112,6 @@ class Question:
         taxels: Sequence[int] | None,
         pools: Sequence[int] | None,
         taxels_at_ms: float | None,
-        classifiers: int,
-        shuffles: int,
     ) -> None:
         """Choose the settings."""
         window = self.window_us
@@ -146,7 +141,8 @@ class Question:
             if not self.taxels_at:
                 listed = ", ".join(f"{to_ms(p):g}" for p in self.periods)
                 raise ProblemError(f"taxels_at_ms is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
-        self.active = np.unique(self.spikes(self.taxels_at, 0).taxel)
+        spikes = self.spikes(self.taxels_at, 0)
+        self.active, self.events = np.unique(spikes.taxel), len(spikes.taxel)
         there = len(self.active)
         numbers = [whole("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
         if taxels is not None and any(n > there for n in numbers):
@@ -158,14 +154,6 @@ class Question:
             raise ProblemError(f"pools is {shown(pools)}: the array is {rows} x {columns}")
         self.pools = [n for n in sides if n <= max(rows, columns)]
         self.columns = self._parameter_columns()
-        settings = len(self.random_taxels) + len(self.pools)
-        self.steps = self.draws * (len(self.periods) * (2 + len(self.columns)) + settings) + shuffles + classifiers + 8
-
-    def tell(self, what: str, steps: int = 1) -> None:
-        """Report the next piece of work, and count the steps that are done."""
-        self.done += steps
-        if self.progress is not None:
-            self.progress(what, min(self.done, self.steps), self.steps)
 
     def spikes(self, period: int, draw: int, pool: int = 1) -> Spikes:
         """Return the spikes of all trials at a period (us), in one draw of the sampling phases."""
@@ -196,10 +184,14 @@ class Question:
         truth = self.labels if labels is None else labels
         return estimate(truth, responses, groups=self.groups, seed=self.seed)
 
+    def smoothings(self, period: int) -> list[float]:
+        """Return the smoothings, ms, that a period (us) can tell apart."""
+        taus = [to_ms(share * self.window_us) for share in SMOOTHINGS]
+        return [tau for tau in taus if tau == 0 or to_us(tau) > period / 2]
+
     def matrices(self, spikes: Spikes, windows: Sequence[float]) -> list[Matrices]:
         """Return by window the matrices of all smoothings that a period can tell apart."""
-        taus = [to_ms(share * self.window_us) for share in SMOOTHINGS]
-        taus = [tau for tau in taus if tau == 0 or to_us(tau) > spikes.period_us / 2]
+        taus = self.smoothings(spikes.period_us)
         by_tau = [event_grams(spikes, windows, tau) for tau in taus]
         sizes = features(spikes, windows)
         return [Matrices(grams, [size] * len(taus)) for size, *grams in zip(sizes, *by_tau, strict=True)]
