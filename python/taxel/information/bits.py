@@ -17,6 +17,7 @@ from taxel.information._labels import words
 
 __all__ = [
     "confusion_matrix",
+    "corrected",
     "label_entropy",
     "local_information",
     "panzeri_treves",
@@ -218,11 +219,30 @@ def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
     (0.191, 0.155)
     """
     table = _table(counts)
+    return np.asarray(np.clip(corrected(table), 0.0, label_entropy(table)))
+
+
+def corrected(counts: ArrayLike) -> NDArray[np.float64]:
+    """Return the corrected information in bits as `panzeri_treves` does, but not held within 0 and the labels' entropy.
+
+    Parameters
+    ----------
+    counts : int, shape (..., labels, responses), 0 or more
+
+    Returns
+    -------
+    float64, shape (...), bits
+
+    Raises
+    ------
+    ProblemError : counts that are invalid
+    """
+    table = _table(counts)
     trials = table.sum((-1, -2))
     by_label = table.sum(-1)
     occupied = np.where(by_label > 0, relevant_responses(table) - 1, 0).sum(-1)
     bias = (occupied - (relevant_responses(table.sum(-2)) - 1)) / (2 * trials * np.log(2))
-    return np.asarray(np.clip(plug_in(table) - bias, 0.0, label_entropy(table)))
+    return np.asarray(plug_in(table) - bias)
 
 
 def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: int = 0) -> float:

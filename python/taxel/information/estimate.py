@@ -13,6 +13,7 @@ from taxel._base.arguments import callback, number, shown, whole
 from taxel._core import ProblemError
 from taxel.information._labels import belonging, distinct, numbered, one_label_a_group, words
 from taxel.information.bits import (
+    corrected,
     label_entropy,
     local_information,
     panzeri_treves,
@@ -42,7 +43,7 @@ class Estimate:
     Attributes
     ----------
     bits : float, bits
-        Corrected (`panzeri_treves`), the mean over draws.
+        `corrected`, held within 0 and `most` as the interval is.
     interval : (float, float), bits
         Where trials, or whole groups, redrawn put it, shifted onto `bits`. Where trials are few it holds the truth less
         often than it says: of 95 % some 55 to 99 at 20 trials a label, 78 to 95 at 40. Where fewer trials were named
@@ -50,6 +51,8 @@ class Estimate:
         of the largest share of errors that so few allow (Clopper and Pearson, trial by trial).
     plug_in, extrapolated : float, bits
         As counted, and by `quadratic_extrapolation`. That the three agree does not mean that they are right.
+    corrected : float, bits
+        As counted less the bias of Panzeri and Treves, the mean over draws; of few trials below 0 or above `most`.
     most : float, bits
         The labels' entropy: the most there can be.
     right : float, from 0 to 1
@@ -68,6 +71,7 @@ class Estimate:
     interval: tuple[float, float]
     plug_in: float
     extrapolated: float
+    corrected: float
     most: float
     right: float
     counts: NDArray[np.int64]
@@ -83,6 +87,7 @@ class Estimate:
             "interval": [round(end, 4) for end in self.interval],
             "plug_in": round(self.plug_in, 4),
             "extrapolated": round(self.extrapolated, 4),
+            "corrected": round(self.corrected, 4),
             "most": round(self.most, 4),
             "right": round(self.right, 4),
             "trials_for_tenth": self.trials_for_tenth,
@@ -183,8 +188,8 @@ def estimate(
     belongs = None if groups is None else belonging(groups, len(truth))
     cells = row * len(classes) + column
     counts = _tables(cells, np.ones((1, len(truth)), np.int64), len(classes))[0]
-    bits = float(np.mean(panzeri_treves(counts)))
     most = float(label_entropy(counts[0]))
+    bits = float(_held(counts[None])[0])
     local = np.mean([local_information(table).ravel()[cell] for table, cell in zip(counts, cells, strict=True)], 0)
     low, high = _interval(cells, row, belongs, len(classes), rounds, share, random)
     n = np.bincount(row)
@@ -205,6 +210,7 @@ def estimate(
         extrapolated=float(np.mean([quadratic_extrapolation(c, repetitions=5, seed=seed) for c in counts]))
         if len(truth) >= 4
         else bits,
+        corrected=float(np.mean(corrected(counts))),
         most=most,
         right=float(np.mean(answered == truth)),
         counts=counts,
@@ -219,7 +225,7 @@ def bits_of(labels: NDArray[Any], responses: Sequence[NDArray[Any]]) -> float:
     """Return the bits of draws of responses, each one of the labels, without an interval."""
     classes = distinct(labels)
     cells = numbered(classes, labels) * len(classes) + numbered(classes, np.stack(responses))
-    return float(np.mean(panzeri_treves(_tables(cells, np.ones((1, len(labels)), np.int64), len(classes))[0])))
+    return float(_held(_tables(cells, np.ones((1, len(labels)), np.int64), len(classes)))[0])
 
 
 def zero_test(
@@ -310,6 +316,21 @@ def _tables(cells: NDArray[np.int64], weights: NDArray[Any], classes: int) -> ND
     return np.ascontiguousarray(shaped if cells.ndim == 2 else shaped[:, 0])
 
 
+def _held(tables: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the corrected bits of draws, the mean over these, within 0 and the labels' entropy.
+
+    Parameters
+    ----------
+    tables : int64, shape (redraws, draws, labels, labels)
+        All draws of a redraw are of the same labels.
+
+    Returns
+    -------
+    float64, shape (redraws,), bits
+    """
+    return np.asarray(np.clip(corrected(tables).mean(axis=1), 0.0, label_entropy(tables[:, 0])))
+
+
 def _interval(
     cells: NDArray[np.int64],
     row: NDArray[np.int64],
@@ -334,7 +355,7 @@ def _interval(
         weights = np.zeros((count, len(owner)), np.int64)
         for mine in members:
             weights[:, mine] = _redrawn(random, len(mine), count)
-        estimates.append(np.mean(panzeri_treves(_tables(cells, weights[:, units], classes)), axis=1))
+        estimates.append(_held(_tables(cells, weights[:, units], classes)))
     redrawn = np.concatenate(estimates)
     ends = np.quantile(redrawn, [(1 - confidence) / 2, (1 + confidence) / 2]) - redrawn.mean()
     if belongs is not None:

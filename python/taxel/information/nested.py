@@ -96,7 +96,8 @@ def nested_predictions(
     if levels.ndim != 1 or not len(levels) or not ((levels > 0) & np.isfinite(levels)).all():
         raise ProblemError(f"ridges is {shown(ridges)}: must be numbers above 0")
     nearest = tuple(whole("neighbours", k, 1) for k in several("neighbours", neighbours))
-    dealt = split(y, matrices.trials, count=count, inner=inner, groups=groups, seed=seed)
+    parts = whole("inner", inner, 2)
+    dealt = split(y, matrices.trials, count=count, inner=parts, groups=groups, seed=seed)
     with threads(several=matrices.trials >= WORTH_THREADS):
         return predictions(matrices, dealt, ridges=tuple(levels.tolist()), neighbours=nearest)
 
