@@ -126,11 +126,10 @@ def test_inner_products_by_bins_are_those_of_whole_rasters(tau):
     windows = [4_000.0, 20_000.0, 50_000.0, 200_000.0]
     for window, gram in zip(windows, event_grams(spikes, windows, tau), strict=True):
         assert np.allclose(gram, grams_by_hand(spikes, window, tau), atol=1e-4)
-    held = [
-        {(x, b) for k, x, b in zip(spikes.trial, spikes.taxel, spikes.bin, strict=True) if b < spikes.bins_to(window)[k]}
-        for window in windows
-    ]
-    assert features(spikes, windows) == [max(1, len(pairs)) for pairs in held]
+    for window, size in zip(windows, features(spikes, windows), strict=True):
+        bins = spikes.bins_to(window)
+        rows = zip(spikes.trial, spikes.taxel, spikes.bin, strict=True)
+        assert size == max(1, len({(x, b) for k, x, b in rows if b < bins[k]}))
 
 
 def test_pictures_are_taken_at_the_times_of_the_events():
