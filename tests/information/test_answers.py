@@ -217,6 +217,31 @@ def test_order_is_known_at_a_fast_period_and_lost_at_a_slow_one(answered):
     assert answered.classifiers["neighbours"].bits > 0.9
 
 
+def test_progress_is_in_proportion_to_the_expected_time_and_settings_are_told_as_they_are_done():
+    steps, told = [], []
+    found = answer(
+        trials_of(60),
+        encoder=ENCODER,
+        window_ms=60,
+        windows_ms=[10],
+        periods_ms=[1, 10],
+        taxels=[1],
+        pools=[2],
+        draws=3,
+        shuffles=4,
+        classifiers=["neighbours", "tempotron"],
+        progress=lambda what, done, of: steps.append((what, done, of)),
+        watch=lambda *point: told.append(point),
+    )
+    assert steps[0][1] == 0
+    assert len({of for _, _, of in steps}) == 1
+    done = [one for _, one, _ in steps]
+    assert done == sorted(done)
+    assert 0.8 * steps[0][2] < done[-1] <= steps[0][2]  # what is counted beforehand is what is done, but for the last
+    assert [point[:2] for point in told] == [(1, 10), (1, 60), (10, 10), (10, 60)] * 3
+    assert {point[:2]: point[2] for point in told} == {(p.period_ms, p.window_ms): p.found.bits for p in found.points}
+
+
 def test_pictures_and_controls_stand_beside_it(answered):
     controls = {c.name: c for c in answered.controls}
     assert set(controls) == {"before contact", "length", "event count"}
