@@ -231,8 +231,11 @@ class Matrices:
     def residuals(self, ridges: tuple[float, ...]) -> NDArray[np.float64]:
         """Return the residual matrices of all matrices and ridges, shape (matrices * ridges, trials, trials)."""
         if ridges not in self._residuals:
-            ways = [self.residual(matrix, ridge) for matrix in range(len(self.squares)) for ridge in ridges]
-            self._residuals[ridges] = np.stack(ways)
+            ways = [(matrix, ridge) for matrix in range(len(self.squares)) for ridge in ridges]
+            table = np.empty((len(ways), self.trials, self.trials))
+            for k, way in enumerate(ways):
+                table[k] = self.residual(*way)
+            self._residuals[ridges] = table
         return self._residuals[ridges]
 
 
