@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import taxel
 from taxel import ProblemError
 from taxel.cli import app, main
-from taxel.cli._bar import duration
+from taxel.cli._bar import bar, duration
 from taxel.information import read_trials
 from taxel.labels import beside, write_labels
 
@@ -67,9 +67,12 @@ def test_the_expected_time_stands_first_and_a_bar_shows_what_is_left(tmp_path, m
     monkeypatch.setenv("TTY_COMPATIBLE", "1")  # as a terminal
     with pytest.raises(SystemExit):
         main([*asked, *report])
-    shown = capsys.readouterr().err
-    assert "reading" in shown
-    assert re.search(r"\d s left", shown)
+    assert "drawing" in capsys.readouterr().err
+    with bar(quiet=False) as update:
+        update("reading", 0, 0)
+        update("1 ms", 0, 40)
+        update("2 ms", 10, 40)
+    assert re.search(r"2 ms .*\d s left", capsys.readouterr().err)
     with pytest.raises(SystemExit):
         main([*asked, *report, "--json"])
     assert capsys.readouterr().err == ""
