@@ -207,8 +207,8 @@ def test_means_of_squares_and_rates_are_those_of_loops():
     exists[1, 1] = False
     values = np.cumsum(random.integers(-9, 10, (40, 4, 5)), 0).astype(np.float32)
     frames = taxel.Frames(values, 1000 * np.arange(40), array=taxel.Array(4, 5, exists=exists))
-    trials, encoder = [LabelledTrial(frames, "a", 1000, 39_000)], ChangeEvents(noise_floor=2.0)
-    held = [HeldValues(frames)]
+    starts, encoder = (1000, 3000), ChangeEvents(noise_floor=2.0)
+    trials, held = [LabelledTrial(frames, "a", start, 39_000) for start in starts], [HeldValues(frames)] * 2
     at = contacts(trials, held, encoder, 1000, 30_000.0)
     asked = {"period_us": 2000, "contact_us": at, "window_us": 30_000.0, "pool": 2}
     found = spikes_of(trials, held, encoder, random=np.random.default_rng(0), **asked)
@@ -222,15 +222,16 @@ def test_means_of_squares_and_rates_are_those_of_loops():
         ]
     ).T[:, None, :]
     pooled = taxel.Frames(means, 1000 * np.arange(40), array=taxel.Array(1, len(squares)))
-    plain = [LabelledTrial(pooled, "a", 1000, 39_000)]
-    alone = spikes_of(plain, [HeldValues(pooled)], encoder, random=np.random.default_rng(0), **(asked | {"pool": 1}))
+    plain, other = [LabelledTrial(pooled, "a", start, 39_000) for start in starts], [HeldValues(pooled)] * 2
+    alone = spikes_of(plain, other, encoder, random=np.random.default_rng(0), **(asked | {"pool": 1}))
     assert found.taxels == len(squares)
     for name in ("trial", "taxel", "bin", "value"):
         assert np.array_equal(getattr(found, name), getattr(alone, name)), name
-    bins = found.bins_to(30_000.0)[0]
-    at_once = [int((found.bin[found.bin < bins] == b).sum()) for b in range(bins)]
-    sent = sum(16 * n + 192 * -(-2 * n // 1376) for n in at_once)
-    assert kilobits_per_second(found, 30_000.0, values=False) == pytest.approx(sent / 30.0)
+    sent = 0
+    for trial, bins in enumerate(found.bins_to(30_000.0)):
+        at_once = [int(((found.trial == trial) & (found.bin == b)).sum()) for b in range(bins)]
+        sent += sum(16 * n + 192 * -(-2 * n // 1376) for n in at_once)
+    assert kilobits_per_second(found, 30_000.0, values=False) == pytest.approx(sent / 60.0)
 
 
 def test_shuffled_labels_are_answered_as_labels_of_their_own():
