@@ -110,10 +110,11 @@ def train(
         labelled = references(labels, "--labels", opened)
         if not any(labelled):
             raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
+        names = sorted({label for events in labelled for label in events})
         if recipe is None and "encoder.name" not in changes:
-            recipe = recipes.fitting(_source(opened[0]))
+            recipe = recipes.fitting(_source(opened[0]), names)
         if recipe is not None:
-            plan = Recipe.load(recipe, changes, sorted({label for events in labelled for label in events}))
+            plan = Recipe.load(recipe, changes, names)
             update(f"starting from the recipe {recipe}")
         examples = _examples(opened, labelled, tare, plan)
         if search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):

@@ -18,12 +18,11 @@ from taxel._core import ProblemError
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import Readout, run
 from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import Fitting, Recipe, encoded, fit, readout_of
+from taxel.detect.training import Fitting, Recipe, Trained, encoded, learn, readout_of
 from taxel.detections import Detections
-from taxel.learn import ConeR
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["Fold", "Judged", "Part", "Trained", "choose", "judge"]
+__all__ = ["Fold", "Judged", "Part", "choose", "judge"]
 
 #: Into how many folds the training data of a fold are split for a search, where nothing else is stated.
 _INNER = 3
@@ -76,23 +75,6 @@ class Fold(NamedTuple):
     train: Sequence[Part]
     test: Sequence[Part]
     inner: Sequence[Fold] = ()
-
-
-class Trained(NamedTuple):
-    """What one fold trained.
-
-    Attributes
-    ----------
-    recipe : Recipe
-        With the points that a search chose.
-    learners : mapping of str to ConeR
-        The fitted learners, by label.
-    readout : Readout
-    """
-
-    recipe: Recipe
-    learners: Mapping[str, ConeR]
-    readout: Readout
 
 
 @dataclass(frozen=True)
@@ -179,8 +161,7 @@ def judge(
             inner = fold.inner or _split(examples, fold.train, _INNER)
             plan = _chosen(examples, patterns, recipe, inner, window, frame_us, report)
         with _quiet():
-            learners = fit([_of(part, patterns) for part in fold.train], plan, report)
-        trained.append(Trained(plan, learners, readout_of(learners, plan, array)))
+            trained.append(learn([_of(part, patterns) for part in fold.train], plan, array, report))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, frame_us))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
