@@ -75,7 +75,8 @@ class Alignment:
         example : int, from 0 on
         """
         mine = (self.example == example) & ~self.unpaired
-        return self.given[mine] + np.rint(to_us(self.moved_ms[mine])).astype(np.int64)
+        felt: NDArray[np.int64] = self.given[mine] + np.rint(to_us(self.moved_ms[mine])).astype(np.int64)
+        return felt
 
     def to_dict(self) -> dict[str, Any]:
         """Return train, median and largest move (ms), and the labels without a pair (example, us) as plain values."""
@@ -130,11 +131,11 @@ def align(
         spikes = [t[one.offsets[train] : one.offsets[train + 1]] for t, one in zip(times, patterns, strict=True)]
         fired = np.concatenate(spikes)
         scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, _WINDOW_MS)
-    train = _best(scores, len(truth))
-    moved = np.zeros(len(truth)) if train is None else np.full(len(truth), np.nan)
-    if train is not None:
-        moved[scores[train].pairs[:, 1]] = scores[train].errors_ms
-    return Alignment(label, train, example, np.concatenate([*given]), moved)
+    best = _best(scores, len(truth))
+    moved = np.zeros(len(truth)) if best is None else np.full(len(truth), np.nan)
+    if best is not None:
+        moved[scores[best].pairs[:, 1]] = scores[best].errors_ms
+    return Alignment(label, best, example, np.concatenate([*given]), moved)
 
 
 def _best(scores: Mapping[int, Score], labels: int) -> int | None:

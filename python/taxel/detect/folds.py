@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
@@ -25,7 +25,9 @@ from taxel.spikes import SpikeTrains, to_ms
 __all__ = ["Fold", "Judged", "Part", "choose", "judge"]
 
 #: Into how many folds the training data of a fold are split for a search, where nothing else is stated.
-_INNER = 3
+INNER = 3
+#: Into how many folds examples are split at most, where nobody states it.
+_MOST = 5
 
 
 class Part(NamedTuple):
@@ -158,7 +160,7 @@ def judge(
         report(f"fold {n + 1} of {len(ways)}")
         plan = recipe
         if search:
-            inner = fold.inner or _split(examples, fold.train, _INNER)
+            inner = fold.inner or _split(examples, fold.train, INNER)
             plan = _chosen(examples, patterns, recipe, inner, window, frame_us, report)
         with _quiet():
             trained.append(learn([_of(part, patterns) for part in fold.train], plan, array, report))
@@ -174,7 +176,7 @@ def choose(
     examples: Sequence[Example],
     recipe: Recipe,
     *,
-    k: int | Sequence[Fold] = _INNER,
+    k: int | Sequence[Fold] = INNER,
     window_ms: float = 50.0,
     frame_us: float | None = None,
     progress: Callable[[str], object] | None = None,
@@ -323,6 +325,37 @@ def _truths(
 
 def _only(examples: Sequence[Example], label: str) -> list[Example]:
     return [one._replace(labels={name: t for name, t in one.labels.items() if name == label}) for one in examples]
+
+
+def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
+    """Return into how many folds (checked) examples are split where nobody states it; 0 where they cannot be, and why.
+
+    At most five, not more than half the events of the rarest label, of several examples not more than these. Each
+    label must be in the training data of every fold.
+    """
+    counts = {label: 0 for example in examples for label in example.labels}
+    for example in examples:
+        for label, times in example.labels.items():
+            counts[label] += len(times)
+    rarest = min(counts, key=lambda label: counts[label])
+    most = min(_MOST, counts[rarest] // 2, *([len(examples)] if len(examples) > 1 else []))
+    if most < 2:
+        return 0, f"of {rarest} there {'is' if counts[rarest] == 1 else 'are'} {counts[rarest]}, and two folds need 4"
+    parts = [Part(n) for n in range(len(examples))]
+    for count in range(most, 1, -1):
+        lacking = [_lacks(examples, fold.train, counts) for fold in _split(examples, parts, count)]
+        if not any(lacking):
+            return count, ""
+    where = "recording" if len(examples) > 1 else "stretch of the recording"
+    return 0, f"every {next(filter(None, lacking))} is in one {where}"
+
+
+def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[str]) -> str | None:
+    """Return a label of which no event is in any of these parts, if there is one."""
+    for label in labels:
+        if not any(label in (of := examples[one.example].labels) and len(_inside(of[label], one)) for one in parts):
+            return label
+    return None
 
 
 def _reporting(progress: Callable[[str], object] | None) -> Callable[[str], object]:
