@@ -59,15 +59,25 @@ def test_a_label_of_which_nothing_was_felt_is_named_by_recording_and_time(tmp_pa
     assert result["alignment"]["contact"]["unpaired"] == [{"recording": str(second), "t_us": alone}]
     assert result["alignment"]["lift"]["unpaired"] == []
     assert (result["held_out"], result["score"]["missed"]) == (True, 1)
-    code, out, _ = call(capsys, *arguments, "--no-align")
-    assert (
-        code,
-        "sensor felt" in out,
-        "alignment" in json.loads(call(capsys, *arguments, "--no-align", "--json")[1]),
-    ) == (
-        0,
-        False,
-        False,
+    assert "contact: 8% missed, 0% false; what may help is another tare: nothing was felt of 1" in out
+
+
+def test_labels_are_learnt_as_given_where_that_is_asked_for(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1)
+    arguments = ("train", recording, "--labels", labels, "--no-align", "--overwrite", "-o", tmp_path / "r.json")
+    code, out, _ = call(capsys, *arguments)
+    assert (code, "sensor felt" in out) == (0, False)
+    assert "alignment" not in json.loads(call(capsys, *arguments, "--json")[1])
+
+
+def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1)
+    labels.write_text(labels.read_text() + "contact,90000\ncontact,95000\n")
+    out = tmp_path / "r.json"
+    code, _, error = call(capsys, "train", recording, "--labels", labels, "--no-align", "--tare", 0.03, "-o", out)
+    assert (code, error.count("\n"), out.exists()) == (2, 1, False)
+    assert re.search(
+        r"contact: pattern 0, target \d \(95.1\d* ms\): 5\S* ms after target \d, inside the refractory", error
     )
 
 
@@ -98,18 +108,35 @@ def test_one_fold_is_refused(tmp_path: Path, capsys) -> None:
     assert (code, error) == (2, "taxel: --folds 1: must be 2 or more, or 0 for none\n")
 
 
-def test_a_recording_without_a_spike_is_learnt_from_and_says_so(tmp_path: Path, capsys) -> None:
+def test_a_recording_without_a_spike_is_refused_in_one_line(tmp_path: Path, capsys) -> None:
     frames = taxel.Frames(np.full((500, 4, 4), 60.0), np.arange(500) * 10_000, unit="ticks")
     taxel.convert(frames, tmp_path / "still.npz")
     (tmp_path / "labels.csv").write_text(
         "label,t_us\n" + "".join(f"contact,{t}\n" for t in range(10**6, 4 * 10**6, 10**6))
     )
     arguments = ("train", tmp_path / "still.npz", "--labels", tmp_path / "labels.csv", "--recipe", "touch")
-    code, out, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
+    code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
+    assert (code, error) == (2, "taxel: contact: pattern 0: has no spike, so no weight can matter at its target\n")
+
+
+def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Path, capsys) -> None:
+    """Of a second recording nothing was felt: it teaches silence, but not alone."""
+    first, labels = recorded(tmp_path, 1)
+    events = taxel.Events(
+        [0] * 64, np.arange(64) % 8, np.arange(64) // 8, [True] * 64, array=ARRAY, intensity=[60] * 64
+    )
+    taxel.convert(events, tmp_path / "still.npz")
+    lines = [f"1,{line}" for line in labels.read_text().splitlines()[1:]]
+    labels.write_text("\n".join(["recording,label,t_us", *lines, "still,contact,50000", "still,lift,90000"]) + "\n")
+    tared = ("--tare", tmp_path / "tare.json")
+    tare().save(tmp_path / "tare.json")
+    arguments = ("train", first, tmp_path / "still.npz", "--labels", labels, *tared, "--overwrite")
+    code, out, _ = call(capsys, *arguments, "-o", tmp_path / "r.json")
     assert code == 0
-    assert "contact: no input follows the labels, so they were learnt as given" in out
-    assert "contact, neuron: 0 of 3 found, 3 missed, 0 false, never known" in out
-    assert "3 of 3 events are out of reach" in error
+    assert out.startswith("not held out, on its own training data (window 50 ms): a part of the training data cannot")
+    assert "contact, neuron: 6 of 7 found, 1 missed, 0 false" in out
+    code, _, error = call(capsys, *arguments, "--folds", 2, "-o", tmp_path / "r.json")
+    assert (code, "has no spike" in error) == (2, True), "folds that were asked for are not left out"
 
 
 def test_a_page_draws_labels_as_given_and_as_felt(tmp_path: Path, capsys) -> None:
@@ -120,10 +147,34 @@ def test_a_page_draws_labels_as_given_and_as_felt(tmp_path: Path, capsys) -> Non
     assert page.count('<div class="charts">') == 2 * 4
     assert page.count("labels were moved to what the sensor felt: median -") == 2
     assert '"felt"' in page
+    recording, _ = recorded(tmp_path, 2)
+    options = ("--labels", tmp_path / "2.csv", *options[2:])
     assert call(capsys, "train", recording, *options, tmp_path / "without", "--no-align")[0] == 0
     page = (tmp_path / "without" / "report.html").read_text()
-    assert page.count('<div class="charts">') == 2 * 3
     assert "felt" not in page
+
+
+def test_a_recording_without_one_of_the_labels_has_a_row_on_the_page(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1)
+    tare().save(tmp_path / "tare.json")
+    taxel.convert(touches(2)[0].between(0, 70_000), tmp_path / "2.npz")
+    rows = [f"1,{line}" for line in labels.read_text().splitlines()[1:]]
+    labels.write_text("\n".join(["recording,label,t_us", *rows, "2,contact,9000"]) + "\n")
+    arguments = (
+        "train",
+        recording,
+        tmp_path / "2.npz",
+        "--labels",
+        labels,
+        "--tare",
+        tmp_path / "tare.json",
+        "-o",
+        tmp_path / "r.json",
+    )
+    code, out, error = call(capsys, *arguments, "--report", tmp_path / "page")
+    assert code == 0, error
+    assert (code, out.splitlines()[0].rpartition(": ")[2]) == (0, "every lift is in one recording")
+    assert '2.npz</td><td class="left">lift</td><td>0</td>' in (tmp_path / "page" / "report.html").read_text()
 
 
 def scored(found: int, missed: int, false: int) -> taxel.detect.Score:
@@ -155,7 +206,7 @@ def test_what_may_help_is_named_where_many_are_missed_or_false(made, held, own, 
     advice = advised(made[0], [made[1]], scored(*held), scored(*own), search_s)
     assert ({} if helps is None else {"contact": helps}) == {label: one.helps for label, one in advice.items()}
     if helps == "--search":
-        assert advice["contact"].because == "it tries 5 points a label, in about 10 s"
+        assert advice["contact"].because == "it tries 5 sets of parameters, in about 10 s"
 
 
 def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:

@@ -190,15 +190,15 @@ class _Training:
         scored = None
         if count:
             registers = self.opened[0].registers
-            scored = judge(
-                self.examples,
-                plan,
-                count,
-                search=self.search,
-                window_ms=self.window_ms,
-                frame_us=None if registers is None else registers.frame_us,
-                progress=self.update,
-            )
+            frame_us = None if registers is None else registers.frame_us
+            how: dict[str, Any] = {"search": self.search, "window_ms": self.window_ms, "frame_us": frame_us}
+            try:
+                scored = judge(self.examples, plan, count, **how, progress=self.update)
+            except ProblemError as error:
+                # Nobody asked for these folds, and all of the data may still be learnt from.
+                if folds is not None:
+                    raise
+                count, why = 0, f"a part of the training data cannot be learnt from: {error}"
         if self.search:
             plan = choose(self.examples, plan, window_ms=self.window_ms, progress=self.update)
         begun = perf_counter()

@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel.detect.examples import Example
 from taxel.detect.scoring import Score
-from taxel.detect.training import Recipe, Trained
+from taxel.detect.training import Trained
 from taxel.encode import Encoder
 from taxel.events import Events
 from taxel.frames import Frames
@@ -40,9 +40,9 @@ def advised(
 ) -> dict[str, Advice]:
     """Return what may help each label of which more than 5 % are missed or false.
 
-    Another tare where taxels read above their rest before touches begin. Else more labels, where on its own training
-    data the readout makes at most half the mistakes, as it learnt by heart what these data have. Else a search of other
-    parameters, if the recipe lists any.
+    Another tare where taxels read above their rest before touches begin, or nothing was felt of most labels that are
+    missed. Else more labels, where on its own training data the readout makes at most half the mistakes, as it learnt
+    by heart what these data have. Else a search of other parameters, if the recipe lists any.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def advised(
     scored, own : Score
         Held out, and on the training data.
     search_s : float, s, optional
-        How long trying one other point of each label takes; None after a search.
+        How long a search tries one set of parameters of every label; None after a search.
     """
     many = [
         label
@@ -60,16 +60,19 @@ def advised(
         if label in made.readout.labels and max(one.missed, one.false) > _MANY * one.events
     ]
     loaded = loaded_at_rest(examples, made.recipe.encoder) if many else 0
-    return {label: _advice(made.recipe, label, scored[label], own[label], loaded, search_s) for label in many}
+    return {label: _advice(made, label, scored[label], own[label], loaded, search_s) for label in many}
 
 
-def _advice(recipe: Recipe, label: str, scored: Score, own: Score, loaded: int, search_s: float | None) -> Advice:
-    points = max(len(recipe.points_of(one)) for one in recipe.neurons) if recipe.neurons else 1
+def _advice(made: Trained, label: str, scored: Score, own: Score, loaded: int, search_s: float | None) -> Advice:
+    points = len(made.recipe.points_of(label))
     wrong, learnt = scored.missed + scored.false, own.missed + own.false
+    unfelt = int(made.alignments[label].unpaired.sum()) if label in made.alignments else 0
     if loaded >= _TOUCH:
         return Advice("another tare", f"{loaded} taxels read above theirs while nothing touches them")
-    if search_s is not None and 2 * learnt > wrong and len(recipe.points_of(label)) > 1:
-        return Advice("--search", f"it tries {points} points a label, in about {points * search_s:.0f} s")
+    if 2 * unfelt > wrong:
+        return Advice("another tare", f"nothing was felt of {unfelt}, unless these labels are wrong")
+    if search_s is not None and 2 * learnt > wrong and points > 1:
+        return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
     return Advice("more labels", f"of those that it learnt {own.missed} are missed, and {own.false} are false")
 
 

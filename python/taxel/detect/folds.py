@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -260,22 +261,39 @@ def _marks(
     frame_us: float | None,
     report: Callable[[str], object],
 ) -> list[tuple[int, float]]:
-    """Return the `Score.rank` over all folds of each of several recipes for one label."""
+    """Return the `Score.rank` over all folds of each of several recipes for one label.
+
+    One that cannot be learnt from a fold's training data, but for the first, ranks behind all others.
+    """
     array = array_of(examples)
     detections: list[dict[int, list[Detections]]] = [{} for _ in plans]
+    refused: set[int] = set()
     for n, fold in enumerate(folds):
         training = [_of(part, patterns) for part in fold.train]
         rows: Fitting | None = None
         for m, plan in enumerate(plans):
             report(f"trying point {m + 1} of {len(plans)} for {label}, fold {n + 1} of {len(folds)}")
+            if m in refused:
+                continue
             if rows is None or not rows.fits(plan):
-                rows = Fitting(training, plan, label, lambda _: None)
+                try:
+                    rows = Fitting(training, plan, label, lambda _: None)
+                except ProblemError:  # as where two labels lie within a longer refractory time
+                    if m == 0:
+                        raise
+                    refused.add(m)
+                    continue
             with _quiet():
                 readout = readout_of({label: rows.fit(plan)}, plan, array)
             for part in fold.test:
                 detections[m].setdefault(part.example, []).append(_detected(readout, examples, part, frame_us))
     truths = _truths(examples, folds, (label,))
-    return [score_together([reduce(add, of[place]) for place in sorted(of)], truths, window).rank for of in detections]
+    return [
+        (sys.maxsize, np.inf)
+        if m in refused
+        else score_together([reduce(add, of[place]) for place in sorted(of)], truths, window).rank
+        for m, of in enumerate(detections)
+    ]
 
 
 def _quiet() -> Any:

@@ -390,7 +390,10 @@ class Fitting:
         self._what = f"learning {label} from {counted(count, 'event')}"
         self._report = report
         report(self._what)
-        self._rows = learner.prepare(trains, self._targets)
+        try:
+            self._rows = learner.prepare(trains, self._targets)
+        except ProblemError as error:
+            raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
 
     def fits(self, recipe: Recipe) -> bool:

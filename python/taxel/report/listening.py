@@ -132,7 +132,7 @@ def _drawn(figure: Figure | None) -> Markup | None:
 
 
 def _row(one: Outcome, label: str, score: Score | None) -> dict[str, Any]:
-    own = None if score is None else score[label]
+    own = None if score is None else score.by_label.get(label)
     count = len(one.found[label]) if own is None else own.found + own.false
     return {"recording": one.name, "label": label, "detections": count, "score": own}
 
@@ -143,6 +143,8 @@ def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
     for k, one in enumerate(listened):
         if one.score is None:
             moments += [_Moment(k, label, float(t), "detected", 0.0) for t in one.found[label].t]
+            continue
+        if label not in one.score.by_label:
             continue
         own, times = one.score[label], one.found.t
         happened = times[own.pairs[:, 0]] - np.rint(to_us(own.errors_ms)).astype(np.int64)
@@ -284,7 +286,8 @@ def _nth(what: str, count: int, n: int) -> str:
 
 def _errors(listened: Sequence[Outcome], label: str) -> Figure | None:
     """Draw how far detections lay from their events."""
-    errors = [one.score[label].errors_ms for one in listened if one.score is not None]
+    scores = [one.score.by_label.get(label) for one in listened if one.score is not None]
+    errors = [own.errors_ms for own in scores if own is not None]
     if not errors or not sum(map(len, errors)):
         return None
     figure, axis = plt.subplots(figsize=(4.2, 2.2), layout="constrained")
