@@ -114,6 +114,17 @@ def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
         assert "pattern" not in said
 
 
+def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
+    """Two labels lie within its refractory time."""
+    plan = recipe()
+    neurons = {label: {**own, "search": [{"refractory": 9000.0}]} for label, own in plan.neurons.items()}
+    best = choose(examples(1, 2), dataclasses.replace(plan, neurons=neurons), window_ms=10.0)
+    assert best.neurons == {label: dict(own) for label, own in plan.neurons.items()}
+    first = {label: {**own, "refractory": 9000.0, "search": [dict(own)]} for label, own in plan.neurons.items()}
+    with pytest.raises(taxel.ProblemError, match="contact: pattern 0, target 1 .* inside the refractory"):
+        choose(examples(1, 2), dataclasses.replace(plan, neurons=first))
+
+
 def test_the_first_of_equal_points_is_kept() -> None:
     plan = recipe()
     same = {label: {**own, "search": [dict(own)]} for label, own in plan.neurons.items()}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.arguments import whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.detect.scoring import APART_US, Score, score
@@ -73,8 +74,16 @@ class Alignment:
         Parameters
         ----------
         example : int, from 0 on
+
+        Returns
+        -------
+        int64, shape (events,), us
+
+        Raises
+        ------
+        ProblemError : a number that is no whole one, or below 0
         """
-        mine = (self.example == example) & ~self.unpaired
+        mine = (self.example == whole("example", example, 0)) & ~self.unpaired
         felt: NDArray[np.int64] = self.given[mine] + np.rint(to_us(self.moved_ms[mine])).astype(np.int64)
         return felt
 
