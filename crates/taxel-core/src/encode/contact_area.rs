@@ -104,7 +104,7 @@ struct Area {
 impl Area {
     /// Ends the stamp at `t` us: emits a spike for each level that the area has crossed since the previous stamp.
     fn say(&mut self, t: i64, out: &mut Vec<Spike>) {
-        let (before, now) = (self.reported, self.loaded.area());
+        let (before, now) = (self.reported, self.loaded.places().area());
         if before == now {
             return;
         }

@@ -201,14 +201,14 @@ struct Passing {
 impl Passing {
     /// Area, total, peak, and the displacement of the centre in x and y, mm.
     fn moments(&mut self, held: &[Block]) -> [f64; 5] {
-        if self.loaded.area() == 0 {
+        if self.loaded.places().area() == 0 {
             self.origin = None;
             return [0.0; 5];
         }
         let (mut total, mut peak, mut x, mut y) = (0.0, 0.0_f64, 0.0, 0.0);
-        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.loaded.any(block)) {
+        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.loaded.places().any(block)) {
             for (place, &value) in (block * BLOCK..self.places).zip(values) {
-                if self.loaded.counts(place) {
+                if self.loaded.places().counts(place) {
                     let above = self.loaded.above(place, value);
                     total += above;
                     peak = peak.max(above);
@@ -220,7 +220,7 @@ impl Passing {
         let centre = [x / total, y / total];
         let origin = *self.origin.get_or_insert(centre);
         let way = |axis: usize| (centre[axis] - origin[axis]) * self.pitch_mm;
-        [f64::from(self.loaded.area()), total, peak, way(0), way(1)]
+        [f64::from(self.loaded.places().area()), total, peak, way(0), way(1)]
     }
 
     /// Notes that a level is reached: its tonic spikes begin.

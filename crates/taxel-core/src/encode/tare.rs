@@ -81,6 +81,18 @@ impl Tare {
         Ok(Rest::measured(self.rest.iter().enumerate().map(of_place).collect()))
     }
 
+    /// The noise of each place; 0 where it is not known.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if the tare has no noise.
+    pub(super) fn noise_of_places(&self) -> Result<Vec<f64>> {
+        let Some(noise) = &self.noise else {
+            return Err(problem!("the tare has no noise of the taxels (an older taxel saved it): take it anew"));
+        };
+        Ok(noise.iter().map(|noise| noise.unwrap_or(0.0)).collect())
+    }
+
     /// Computes a tare from events in order of time, from `start` to `stop` us, or from all of them.
     ///
     /// # Errors

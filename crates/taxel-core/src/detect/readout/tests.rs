@@ -98,8 +98,14 @@ fn another_array_and_a_missing_tare_are_refused() {
     let said = readout().stream(&Array::thesis(), 192.0, None).err().unwrap().to_string();
     assert!(said.contains("tare"), "{said}");
     // A readout without an array of its own accepts every array with the same number of trains.
-    let tare =
-        Tare { array: array.clone(), rest: vec![Some(0.0); 63 * 64], noise: None, start_us: 0, stop_us: 1, note: String::new() };
+    let tare = Tare {
+        array: array.clone(),
+        rest: vec![Some(0.0); 63 * 64],
+        noise: None,
+        start_us: 0,
+        stop_us: 1,
+        note: String::new(),
+    };
     assert!(Readout { array: None, ..readout() }.stream(&array, 192.0, Some(&tare)).is_ok());
 }
 
