@@ -118,7 +118,7 @@ def some_tare(rng, array, noise, holes):
     pictures = rng.normal(rng.uniform(40, 60, array.shape), of_each, (20, *array.shape))
     pictures = np.where(array.exists, pictures, 0)
     tare = json.loads(Tare.take(Frames(pictures, 192 * np.arange(20), unit="ticks", array=array)).to_json())
-    unknown = rng.random(array.taxels) < holes
+    unknown = rng.random(array.exists.size) < holes
     for name in ("rest", "noise"):
         tare[name] = [None if hole else value for hole, value in zip(unknown, tare[name], strict=True)]
     return Tare.from_json(json.dumps(tare))

@@ -57,6 +57,11 @@ impl Paired {
         self.from[place / BLOCK][place % BLOCK] = round_up(from);
     }
 
+    /// Number of blocks of places.
+    pub(super) fn blocks(&self) -> usize {
+        self.loaded.len()
+    }
+
     /// Number of loaded places with a loaded neighbour.
     pub(super) fn area(&self) -> u32 {
         self.area

@@ -259,7 +259,7 @@ impl Side {
         let above = self.baseline.take(t, values);
         let total =
             clip(in_blocks(above), in_blocks(&noise.clip), in_blocks(&noise.large), self.clipped.as_chunks_mut().0);
-        for (block, above) in in_blocks(above).iter().enumerate() {
+        for (block, above) in in_blocks(above)[..self.above.blocks()].iter().enumerate() {
             self.above.take_block(block, above);
             if let Some(below) = &mut self.below {
                 below.take_block(block, &above.map(|value| -value));
