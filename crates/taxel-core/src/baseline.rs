@@ -24,20 +24,12 @@ pub fn stands_out_from(times: f64, noise: f64, noise_floor: f64) -> f64 {
 }
 
 wide! {
-    /// Moves the baselines towards the values that held until now.
-    fn follow(baselines: &mut [f64], above: &[f32], far: &[f32], near_step: f32, far_step: f32) {
-        for ((baseline, &above), &far) in baselines.iter_mut().zip(above).zip(far) {
+    /// Moves the baselines towards the values that held until now, and subtracts them from the new values.
+    fn follow(values: &[f32], baselines: &mut [f64], above: &mut [f32], far: &[f32], near_step: f32, far_step: f32) {
+        for (((&value, baseline), above), &far) in values.iter().zip(baselines).zip(above).zip(far) {
             let step = if above.abs() < far { near_step } else { far_step };
-            *baseline += f64::from(step * above);
-        }
-    }
-}
-
-wide! {
-    /// The values above their baselines.
-    fn subtract(values: &[f32], baselines: &[f64], above: &mut [f32]) {
-        for ((above, &value), &baseline) in above.iter_mut().zip(values).zip(baselines) {
-            *above = (f64::from(value) - baseline) as f32;
+            *baseline += f64::from(step * *above);
+            *above = (f64::from(value) - *baseline) as f32;
         }
     }
 }
@@ -87,25 +79,20 @@ impl Baseline {
 
     /// Reads the next values, at `t` us; returns them above their baselines.
     pub fn take(&mut self, t: i64, values: &[f32]) -> &[f32] {
-        match self.t {
-            None => {
-                for (baseline, &value) in self.baselines.iter_mut().zip(values) {
-                    if *baseline == f64::NO_REST {
-                        *baseline = f64::from(value);
-                    }
+        if self.t.is_none() {
+            for (baseline, &value) in self.baselines.iter_mut().zip(values) {
+                if *baseline == f64::NO_REST {
+                    *baseline = f64::from(value);
                 }
-            }
-            Some(last) => {
-                let time = t.saturating_sub(last);
-                if time != self.steps.0 {
-                    self.steps = (time, self.tau_us.map(|tau| -(-(time as f64) / tau).exp_m1() as f32));
-                }
-                let [near, far] = self.steps.1;
-                follow(&mut self.baselines, &self.above, &self.far, near, far);
             }
         }
+        let time = t.saturating_sub(self.t.unwrap_or(t));
+        if time != self.steps.0 {
+            self.steps = (time, self.tau_us.map(|tau| -(-(time as f64) / tau).exp_m1() as f32));
+        }
         self.t = Some(t);
-        subtract(values, &self.baselines, &mut self.above);
+        let [near, far] = self.steps.1;
+        follow(values, &mut self.baselines, &mut self.above, &self.far, near, far);
         &self.above
     }
 

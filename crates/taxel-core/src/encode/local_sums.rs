@@ -130,17 +130,17 @@ impl Noise {
         self.large[cell] = self.sd[cell].map_or(f32::INFINITY, |sd| (FAR_NOISE * sd) as f32);
     }
 
+    /// 1 over the noise of the sum around each cell.
     fn of_sums(&self, stride: usize) -> Vec<f32> {
-        let squares: Vec<f64> = (0..self.sd.len()).map(|cell| self.unit(cell).powi(2)).collect();
         let around = |cell: usize| {
-            [cell - stride, cell, cell + stride]
-                .iter()
-                .map(|&c| squares[c - 1] + squares[c] + squares[c + 1])
-                .sum::<f64>()
+            let row = |cell: usize| {
+                let [left, here, right] = [cell - 1, cell, cell + 1].map(|cell| self.unit(cell).powi(2));
+                (left + right) + here
+            };
+            (row(cell - stride) + row(cell + stride)) + row(cell)
         };
-        (0..self.sd.len())
-            .map(|cell| if self.sd[cell].is_some() { around(cell).sqrt().recip() as f32 } else { 0.0 })
-            .collect()
+        let per_noise = |(cell, sd): (usize, &Option<f64>)| sd.map_or(0.0, |_| around(cell).sqrt().recip() as f32);
+        self.sd.iter().enumerate().map(per_noise).collect()
     }
 
     /// From where a cell stands out by `times` its noise; infinite in cells left out.
@@ -174,25 +174,37 @@ pub(super) struct Sums {
 wide! {
     /// Clips the values; returns the sums of those that are large, above and below.
     fn clip(above: &[Block], limits: &[Block], large: &[Block], clipped: &mut [Block]) -> [f64; 2] {
-        let (mut over, mut under) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+        // Added in f64, in which sums of f32 hardly ever round: they do not depend on the order of the taxels.
+        let (mut over, mut under) = ([0.0; LANES], [0.0; LANES]);
         for (((above, limits), large), clipped) in above.iter().zip(limits).zip(large).zip(clipped) {
+            let mut any = 0;
             for lane in 0..BLOCK {
                 let (value, limit) = (above[lane], limits[lane]);
-                over[lane] += if value >= large[lane] { value } else { 0.0 };
-                under[lane] += if -value >= large[lane] { -value } else { 0.0 };
+                any |= u32::from(value.abs() >= large[lane]);
                 let least = if value > -limit { value } else { -limit };
                 clipped[lane] = if least < limit { least } else { limit };
             }
+            if any == 0 {
+                continue;
+            }
+            for (above, large) in above.as_chunks::<LANES>().0.iter().zip(large.as_chunks::<LANES>().0) {
+                for lane in 0..LANES {
+                    let value = above[lane];
+                    over[lane] += f64::from(if value >= large[lane] { value } else { 0.0 });
+                    under[lane] += f64::from(if -value >= large[lane] { -value } else { 0.0 });
+                }
+            }
         }
-        [over, under].map(|lanes| lanes.iter().map(|&lane| f64::from(lane)).sum())
+        [over, under].map(|lanes| lanes.iter().sum())
     }
 }
 
 wide! {
-    /// The sum of each cell, the one above it and the one below it.
+    /// The sum of each cell, the one above it and the one below it; the outer ones first, so that a turned array has the
+    /// same sums.
     fn vertically(up: &[f32], here: &[f32], down: &[f32], sums: &mut [f32]) {
         for (((sum, up), here), down) in sums.iter_mut().zip(up).zip(here).zip(down) {
-            *sum = up + here + down;
+            *sum = (up + down) + here;
         }
     }
 }
@@ -208,7 +220,7 @@ wide! {
         let groups = groups.zip(right.as_chunks::<LANES>().0).zip(per_noise.as_chunks::<LANES>().0);
         for (((left, here), right), per_noise) in groups {
             for lane in 0..LANES {
-                let sum = (left[lane] + here[lane] + right[lane]) * per_noise[lane];
+                let sum = ((left[lane] + right[lane]) + here[lane]) * per_noise[lane];
                 largest[lane] = if sum > largest[lane] { sum } else { largest[lane] };
                 smallest[lane] = if sum < smallest[lane] { sum } else { smallest[lane] };
                 outstanding[lane] += u32::from(sum > OUTSTANDING);
