@@ -17,6 +17,13 @@ from taxel.encode import LocalLoad
 LEAST = 0.3
 
 
+def noisy(tare: Tare) -> Tare:
+    """Return the tare of the scene's taxels with the noise that they have in it."""
+    rng = np.random.default_rng(192)
+    pictures = np.rint(tare.rest + rng.normal(0, 0.5, (250, *tare.array.shape)))
+    return Tare.take(Frames(pictures, np.arange(250) * PERIOD_US, unit="ticks", array=tare.array))
+
+
 def around(values: Any) -> Any:
     """Return the sums over 3 x 3 places."""
     wide = np.pad(values, 1)
@@ -55,7 +62,8 @@ def numpy_load(frames: Frames, tare: Tare) -> list[Any]:
 def run(*, quick: bool) -> dict[str, Any]:
     """Measure; return seconds, real-time factors and ratios."""
     seconds = 0.25 if quick else 1.0
-    ticks, _, tare, events = scene(seconds)
+    ticks, _, still, events = scene(seconds)
+    tare = noisy(still)
     load = LocalLoad(noise_floor=FLOOR, least_noise=LEAST, tare=tare)
     local = LocalLoad(noise_floor=FLOOR, least_noise=LEAST, local_ms=(50.0, 300.0), tare=tare)
     ours = {
