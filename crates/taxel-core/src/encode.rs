@@ -29,7 +29,7 @@ use law::Law;
 use crate::parameters::Described;
 use crate::reading::{self, Unfit};
 use crate::spikes::ms;
-use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeTrains, Stop, problem};
+use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The registry: one line per encoder, `NAME: Kind`; the encoder's file is `encode/NAME.rs`, and its name in JSON is
 /// `NAME`.
@@ -161,10 +161,10 @@ impl Encoder {
         self.law().trains(array)
     }
 
-    /// Whether the spikes carry a signed value, so that a neuron receives each train as two, ON and OFF.
+    /// The meaning of the spikes' values; a neuron receives each signed train as two, ON and OFF.
     #[must_use]
-    pub fn signed(&self) -> bool {
-        self.law().signed()
+    pub fn kind(&self) -> SpikeKind {
+        self.law().kind()
     }
 
     /// The same encoder with this tare; an encoder that uses no tare is returned unchanged.
@@ -220,5 +220,5 @@ impl Encoder {
 fn collect(mut stream: Box<dyn Stream>, mut out: Vec<Spike>, first: Option<i64>) -> Result<SpikeTrains> {
     let start = first.map_or(0.0, ms);
     let end = stream.finish(&mut out).unwrap_or(start);
-    SpikeTrains::from_spikes(&out, stream.trains(), stream.signed(), start, end)
+    SpikeTrains::from_spikes(&out, stream.trains(), stream.kind(), start, end)
 }
