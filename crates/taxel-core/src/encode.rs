@@ -32,7 +32,7 @@ use law::Law;
 use crate::parameters::Described;
 use crate::reading::{self, Unfit};
 use crate::spikes::ms;
-use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeTrains, Stop, problem};
+use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The registry: one line per encoder, `NAME: Kind`; the encoder's file is `encode/NAME.rs`, and its name in JSON is
 /// `NAME`.
@@ -166,10 +166,10 @@ impl Encoder {
         self.law().trains(array)
     }
 
-    /// Whether the spikes carry a signed value, so that a neuron receives each train as two, ON and OFF.
+    /// The meaning of the spikes' values; a neuron receives each signed train as two, ON and OFF.
     #[must_use]
-    pub fn signed(&self) -> bool {
-        self.law().signed()
+    pub fn kind(&self) -> SpikeKind {
+        self.law().kind()
     }
 
     /// The same encoder with this tare; an encoder that uses no tare is returned unchanged.
@@ -246,5 +246,5 @@ fn spikes_of_frames(
 
 fn collect(stream: &dyn Stream, out: &[Spike], first: Option<i64>, end: Option<f64>) -> Result<SpikeTrains> {
     let start = first.map_or(0.0, ms);
-    SpikeTrains::from_spikes(out, stream.trains(), stream.signed(), start, end.unwrap_or(start))
+    SpikeTrains::from_spikes(out, stream.trains(), stream.kind(), start, end.unwrap_or(start))
 }

@@ -43,4 +43,4 @@ pub use array::Array;
 pub use error::{Error, Result, Stop};
 pub use events::{Events, EventsView, Intensities, IntensitiesView, Marker};
 pub use frames::FramesView;
-pub use spikes::{Spike, SpikeTrains};
+pub use spikes::{Spike, SpikeKind, SpikeTrains};

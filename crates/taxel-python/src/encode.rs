@@ -25,11 +25,11 @@ fn encoder_names() -> Vec<&'static str> {
     taxel_core::encode::NAMES.to_vec()
 }
 
-/// Trains for an array, whether they are signed, and the latency in ms.
+/// Trains for an array, their kind, and the latency in ms.
 #[pyfunction]
-fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, bool, f64)> {
+fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, &'static str, f64)> {
     let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
-    Ok((encoder.trains(&array), encoder.signed(), encoder.latency_ms()))
+    Ok((encoder.trains(&array), encoder.kind().name(), encoder.latency_ms()))
 }
 
 /// Type and place (x, y in mm) of each afferent of a skin on an array, a train each.

@@ -18,6 +18,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains
+from taxel.spikes.exchange import Kind
 from taxel.tare import Tare
 
 __all__ = ["Encoder", "EncoderStream"]
@@ -118,9 +119,14 @@ class Encoder(Value):
         return _core.encoder_about(self._json(), instance("array", array, Array)._parts())[0]
 
     @property
+    def kind(self) -> Kind:
+        """The meaning of its spikes' values, as in `SpikeTrains`: "unsigned", "signed" or "graded"."""
+        return _core.encoder_about(self._json(), Array(1, 1)._parts())[1]  # type: ignore[return-value]
+
+    @property
     def signed(self) -> bool:
         """Whether spikes carry a signed value, so that each train is two inputs of a neuron, ON and OFF."""
-        return _core.encoder_about(self._json(), Array(1, 1)._parts())[1]
+        return self.kind == "signed"
 
     @property
     def latency_ms(self) -> float:

@@ -147,11 +147,6 @@ impl Loaded {
         Ok(fresh)
     }
 
-    /// The places, for their number and which of them count.
-    pub(super) fn places(&self) -> &Paired {
-        &self.places
-    }
-
     /// Changes the rest of a place; the caller must pass its value again.
     pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
         self.rest.set(place, rest);
@@ -180,6 +175,14 @@ impl Loaded {
     /// Updates the values of a block of places.
     pub(super) fn take_block(&mut self, block: usize, values: &Block) {
         self.places.take_block(block, values);
+    }
+}
+
+impl std::ops::Deref for Loaded {
+    type Target = Paired;
+
+    fn deref(&self) -> &Paired {
+        &self.places
     }
 }
 

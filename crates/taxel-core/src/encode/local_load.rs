@@ -13,7 +13,7 @@ use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::spikes::{ms, us};
-use crate::{Array, EventsView, FramesView, Result, Spike, Stop};
+use crate::{Array, EventsView, FramesView, Result, Spike, SpikeKind, Stop};
 
 /// The quantities of what is above the rest.
 const OF_REST: [&str; 4] = ["area", "largest", "places", "total"];
@@ -183,6 +183,10 @@ impl Law for LocalLoad {
 
     fn trains(&self, _array: &Array) -> usize {
         self.quantities().len()
+    }
+
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Graded
     }
 
     fn set_tare(&mut self, tare: &Tare) {
