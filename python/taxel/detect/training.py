@@ -24,7 +24,7 @@ from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.encode import Encoder
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
-from taxel.spikes import SpikeTrains, to_ms
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
 __all__ = ["Recipe", "Trained", "train"]
 
@@ -58,7 +58,8 @@ class Recipe:
 
     Raises
     ------
-    ProblemError : a parameter that is not known (names it) or is invalid
+    ProblemError : a parameter that is not known (names it) or is invalid; a `delay_ms` that is none of the encoder's
+        `ages_ms`
 
     Examples
     --------
@@ -89,7 +90,8 @@ class Recipe:
         for label in self.neurons:
             self.learner_of(text("label", label))
             for point in self.points_of(label):
-                learner_from(f"neurons.{label}.search", {**self.learner, **point})
+                place = f"neurons.{label}.search"
+                _check_age(place, learner_from(place, {**self.learner, **point})[1], self.encoder)
 
     def learner_of(self, label: str) -> tuple[ConeR, float]:
         """Return the learner of a label, not yet fitted, and the delay with which it is trained.
@@ -105,7 +107,7 @@ class Recipe:
 
         Raises
         ------
-        ProblemError : a label that the recipe does not know
+        ProblemError : a label that the recipe does not know, or a delay that is none of the encoder's `ages_ms`
 
         Examples
         --------
@@ -116,7 +118,9 @@ class Recipe:
         own = self.neurons.get(text("label", label), {})
         if not isinstance(own, Mapping):
             raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
-        return learner_from(f"neurons.{label}", {**self.learner, **self.points_of(label)[0]})
+        learner, delay_ms = learner_from(f"neurons.{label}", {**self.learner, **self.points_of(label)[0]})
+        _check_age(f"neurons.{label}", delay_ms, self.encoder)
+        return learner, delay_ms
 
     def points_of(self, label: str) -> list[dict[str, Any]]:
         """Return the parameters of a label's neuron, and behind them the others that the recipe lists for a search.
@@ -457,8 +461,18 @@ def _remarks(
 
 def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:
     """Return the trains with an end after the last target, which may come after the last spike."""
-    stop = max(trains.stop, *targets, trains.start)
-    return SpikeTrains(trains.times, trains.offsets, trains.start, stop, trains.values)
+    return trains.lasting(max(trains.stop, *targets, trains.start))
+
+
+def _check_age(place: str, delay_ms: float, encoder: Encoder) -> None:
+    """Refuse a delay at which none of the encoder's trains of ages begins: such a neuron fires late, or never."""
+    ages = getattr(encoder, "ages_ms", None)
+    if ages is not None and round(to_us(delay_ms)) not in {round(to_us(age)) for age in ages}:
+        listed = ", ".join(f"{age:g}" for age in ages)
+        raise ProblemError(
+            f"{place}: delay_ms is {delay_ms:g}, and the encoder's ages_ms are {listed}: must be one of them, as a neuron"
+            " is trained to fire where an age begins"
+        )
 
 
 def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
