@@ -66,7 +66,7 @@ def test_labels_are_learnt_as_given_where_that_is_asked_for(tmp_path: Path, caps
     recording, labels = recorded(tmp_path, 1)
     arguments = ("train", recording, "--labels", labels, "--no-align", "--overwrite", "-o", tmp_path / "r.json")
     code, out, _ = call(capsys, *arguments)
-    assert (code, "sensor felt" in out) == (0, False)
+    assert (code, "labels moved" in out) == (0, False)
     assert "alignment" not in json.loads(call(capsys, *arguments, "--json")[1])
 
 
