@@ -78,7 +78,7 @@ def test_a_label_for_which_nothing_was_felt_has_no_pair(drawn, data) -> None:
 def test_of_trains_that_are_alike_the_nearest_is_taken_and_of_these_the_first() -> None:
     onsets = np.arange(10) * 1000.0 + 500.0
     labels = [np.rint(1000 * onsets).astype(np.int64)]
-    trains = [onsets + 9.0, onsets[:7], onsets + 1.5, onsets, np.arange(0.0, 10_000.0, 10.0), []]
+    trains = [onsets + 9.0, onsets[:8], onsets + 1.5, onsets, np.arange(0.0, 10_000.0, 10.0), []]
     patterns = [taxel.SpikeTrains.from_lists(trains, stop=10_000.0)]
     assert align(patterns, "a", labels, 0.0).train == 2
     without = [taxel.SpikeTrains.from_lists([*trains[:2], *trains[4:]], stop=10_000.0)]

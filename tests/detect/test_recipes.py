@@ -69,10 +69,16 @@ def test_every_kind_of_recording_has_one_recipe() -> None:
         ([], "touch", []),
     ],
 )
-def test_for_events_the_labels_choose_the_recipe(labels: list[str], name: str, neurons: list[str]) -> None:
+def test_for_events_the_labels_choose_the_recipe(
+    monkeypatch: pytest.MonkeyPatch, labels: list[str], name: str, neurons: list[str]
+) -> None:
     """Contact and lift alone by their own, any other label, also beside them, by that of kinds, as before."""
     events = Events([0], [0], [0], [True], array=Array(1, 1))
     assert recipes.fitting(events, labels) == name
+    backwards = recipes.names()[::-1]
+    monkeypatch.setattr(recipes, "names", lambda: backwards)
+    assert recipes.fitting(events, labels) == name, "whatever their order"
+    monkeypatch.undo()
     assert sorted(Recipe.load(name, labels=labels).neurons) == neurons
     assert recipes.fitting(Frames(np.zeros((1, 1, 1)), [0], unit="N"), labels) == "gait_insole"
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from taxel._base.messages import counted
 from taxel.detect import Judged, Score, Trained
 from taxel.detect.advice import Advice
 from taxel.recording import Recording
@@ -116,8 +117,9 @@ class Result:
             places = [f"{self.opened[k].path} at {t / 1e6:.3f} s" for k, t in one.to_dict()["unpaired"]]
             if places:
                 more = f" and {len(places) - _NAMED} more" if len(places) > _NAMED else ""
+                of = counted(len(places), "label")
                 named = ", ".join(places[:_NAMED]) + more
-                yield f"{label}: nothing was felt within 50 ms of {len(places)}, not learnt: {named}"
+                yield f"{label}: nothing was felt within 50 ms of {of}, not learnt: {named}"
 
 
 def _line(label: str, by: str, one: Score) -> str:

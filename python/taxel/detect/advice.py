@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from taxel._base.messages import counted
 from taxel.detect.examples import Example
 from taxel.detect.scoring import Score
 from taxel.detect.training import Trained
@@ -70,7 +71,7 @@ def _advice(made: Trained, label: str, scored: Score, own: Score, loaded: int, s
     if loaded >= _TOUCH:
         return Advice("another tare", f"{loaded} taxels read above theirs while nothing touches them")
     if 2 * unfelt > wrong:
-        return Advice("another tare", f"nothing was felt of {unfelt}, unless these labels are wrong")
+        return Advice("another tare", f"nothing was felt of {counted(unfelt, 'label')}, unless they are wrong")
     if search_s is not None and 2 * learnt > wrong and points > 1:
         return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
     return Advice("more labels", f"of those that it learnt {own.missed} are missed, and {own.false} are false")
