@@ -69,12 +69,14 @@ def test_a_target_that_only_negative_weights_reach_is_reachable():
 @pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
 @pytest.mark.parametrize("decades", [1, 6])
 def test_what_is_solved_fires_at_its_targets_and_what_is_not_is_proven(time, after_spike, decades):
-    solved = 0
-    for seed in range(8):
-        patterns, targets = stated.examples(seed, trains=12 + 4 * seed, patterns=4, targets=1, whole_ms=time == "grid")
+    solved = refuted = 0
+    for seed in (0, 3, 5):
+        patterns, targets = stated.examples(seed, trains=5 + 8 * seed, patterns=3, targets=1, whole_ms=time == "grid")
         values = wide if decades == 6 else lambda random, n: random.choice([-1, 1], n) * 10 ** random.uniform(-1, 1, n)
         patterns = stated.graded(patterns, seed, values)
-        cone = made(ConeX, time=time, after_spike=after_spike, lb=-2, ub=2).fit(patterns, targets)
+        # On a grid a margin keeps the points beside targets below the threshold.
+        margin = {"margin": 1e-3} if time == "grid" else {}
+        cone = made(ConeX, time=time, after_spike=after_spike, lb=-2, ub=2, **margin).fit(patterns, targets)
         if cone.status_ == "solved":
             solved += 1
             for pattern, wanted in zip(patterns, targets, strict=True):
@@ -83,18 +85,20 @@ def test_what_is_solved_fires_at_its_targets_and_what_is_not_is_proven(time, aft
                 else:
                     assert np.allclose(cone.neuron_.run(cone.weights_, pattern), wanted, rtol=0, atol=1e-6)
         else:
+            refuted += 1
             assert cone.status_ == "infeasible", (seed, cone.status_)
             proof, problem = cone.certificate_, cone.problem_
             assert check_certificate(problem, proof)
             for row in proof.rows:
                 coefficients, _ = problem.row(row)
                 own = patterns[row.pattern]
-                at = row.t if row.kind == "silence" else targets[row.pattern][row.target]
+                at = row.at if row.kind == "silence" else targets[row.pattern][int(row.at)]
                 if row.kind != "slope":
                     fired = [t for t in targets[row.pattern] if t < at]
                     plain = stated.row(cone, own, at, fired)
                     assert np.allclose(coefficients, plain, rtol=1e-9, atol=1e-12 * abs(own.values).max())
     assert solved
+    assert refuted
 
 
 def test_inputs_with_other_values_are_other_inputs():
