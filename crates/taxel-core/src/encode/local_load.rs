@@ -239,11 +239,12 @@ impl Load {
         quantities.push(1.0);
         for (train, &quantity) in quantities.iter().enumerate() {
             let value = match self.emit {
-                Emit::Spikes if quantity == 0.0 => continue,
-                Emit::Spikes => quantity.ln_1p(),
-                Emit::Values => quantity,
+                Emit::Spikes => quantity.ln_1p() as f32,
+                Emit::Values => quantity as f32,
             };
-            out.push(Spike { t: ms(t), train: train as u32, value: value as f32 });
+            if value != 0.0 || self.emit == Emit::Values {
+                out.push(Spike { t: ms(t), train: train as u32, value });
+            }
         }
     }
 }
