@@ -105,7 +105,7 @@ class SpikeTrains(Columns):
         start : float, ms
         stop : float, ms, optional
             Default: the time of the last spike.
-        values : sequence of float sequences, a value a spike, optional
+        values : sequence of float sequences, a polarity or bits, or a factor of the weight, a spike, optional
         kind : "unsigned", "signed" or "graded", optional
             As in `SpikeTrains`.
 
