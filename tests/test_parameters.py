@@ -92,7 +92,7 @@ def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
     default = described(kind._kind)["defaults"].get(name)
     hint = get_type_hints(kind)[name]
     whole = hint in (int, int | None)
-    entries = len(default) if isinstance(default, list) else int(hint == Sequence[float] | None)
+    entries = max(1, len(default)) if isinstance(default, list) else int(hint == Sequence[float] | None)
     for value in wrong:
         given = int(value) if whole and math.isfinite(value) else value
         with pytest.raises(taxel.ProblemError) as error:

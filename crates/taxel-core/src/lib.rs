@@ -19,6 +19,7 @@ pub mod reading;
 pub mod vectors;
 
 pub mod array;
+pub mod baseline;
 pub mod events;
 pub mod frames;
 pub mod held;

@@ -190,7 +190,7 @@ class Encoder(Value):
         x = recorded(x)
         if isinstance(x, Events):
             return SpikeTrains._from_parts(_core.encode_events(self._json(), x._parts()))
-        return SpikeTrains._from_parts(_core.encode_frames(self._json(), _frames(x)._parts()))
+        return SpikeTrains._from_parts(_core.encode_frames(self._json(), frames_of(x)._parts()))
 
     def fit(self, recordings: object = None, targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
         """Return the encoder itself, which learns nothing; a scikit-learn pipeline calls `fit` of each step.
@@ -326,7 +326,7 @@ class EncoderStream:
         """
         if isinstance(x, Events):
             return SpikeTrains._from_parts(self._begin(x.array).push_events(x._parts()))
-        frames = _frames(x)
+        frames = frames_of(x)
         return SpikeTrains._from_parts(self._begin(frames.array).push_frames(frames._parts()))
 
     def advance(self, t_us: int) -> SpikeTrains:
@@ -380,7 +380,8 @@ class EncoderStream:
         return SpikeTrains.from_lists([]) if parts is None else SpikeTrains._from_parts(parts)
 
 
-def _frames(x: object) -> Frames:
+def frames_of(x: object) -> Frames:
+    """Return `x` if it is frames; raise a ProblemError otherwise."""
     if not isinstance(x, Frames):
         raise ProblemError(f"{type(x).__name__}: encoders take taxel.Events or taxel.Frames")
     return x
