@@ -254,7 +254,7 @@ def test_it_begins_settled():
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"levels": 0}, "levels is 0: must be from 1 to 1000"),
+        ({"levels": 1001}, "levels is 1001: must be from 0 to 1000"),
         ({"levels": 2.5}, "levels is 2.5: must be a whole number"),
         ({"area": (0, 5)}, r"area\[0\] is 0: must be above 0"),
         ({"total": (5, 5)}, "total is 5 to 5"),

@@ -100,7 +100,9 @@ def test_many_neurons_fire_as_each_does_by_itself(problem):
 def test_values_of_1_give_the_bits_of_unsigned_trains(problem):
     neuron, weights, trains = problem
     unsigned = SpikeTrains(trains.times, trains.offsets, trains.start, trains.stop)
-    ones = SpikeTrains(trains.times, trains.offsets, trains.start, trains.stop, np.ones(len(trains.times)), kind="graded")
+    ones = SpikeTrains(
+        trains.times, trains.offsets, trains.start, trains.stop, np.ones(len(trains.times)), kind="graded"
+    )
     times = np.linspace(0, 150, 40)
     matrix = weights * np.linspace(-1, 2, 5)[:, None]
     assert np.array_equal(neuron.run(weights, ones), neuron.run(weights, unsigned))

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from .test_spikes import some
 
 from taxel import SpikeTrains
 from taxel._core import FormatError, ProblemError
+
+from .test_spikes import some
 
 
 def graded(*values: float) -> SpikeTrains:

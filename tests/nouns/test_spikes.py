@@ -179,7 +179,7 @@ def test_selected_trains_come_in_the_order_given(trains: SpikeTrains) -> None:
 @given(some())
 def test_splitting_by_sign_keeps_every_spike_once(trains: SpikeTrains) -> None:
     if trains.kind == "graded":
-        with pytest.raises(ProblemError, match="graded.* never split by sign"):
+        with pytest.raises(ProblemError, match="never split by sign"):
             trains.split_by_sign()
         return
     split = trains.split_by_sign()

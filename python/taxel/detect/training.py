@@ -470,8 +470,8 @@ def _check_age(place: str, delay_ms: float, encoder: Encoder) -> None:
     if ages is not None and round(to_us(delay_ms)) not in {round(to_us(age)) for age in ages}:
         listed = ", ".join(f"{age:g}" for age in ages)
         raise ProblemError(
-            f"{place}: delay_ms is {delay_ms:g}, and the encoder's ages_ms are {listed}: must be one of them, as a neuron"
-            " is trained to fire where an age begins"
+            f"{place}: delay_ms is {delay_ms:g}, and the encoder's ages_ms are {listed}: must be one of them, as a "
+            "neuron is trained to fire where an age begins"
         )
 
 

@@ -29,12 +29,12 @@ class Moments(Tared):
     first the trains of levels reached, then those of levels left, then (with `tonic_ms`) those that fire while beyond
     the level. The first sample is not a crossing. Computed in float64.
 
-    With `graded` all trains are graded. Those of the levels, whose spikes have the value 1, are followed by one for each
-    moment in the order area, total, peak, x, y. During a touch it fires at every sample with the value log(1 + moment),
-    of a displacement log(1 + its size) with its sign; where the value is 0 there is no spike. With `ages_ms` the last
-    trains are one an age. During a touch, at every sample, one of them fires: that of the largest of the ages that the
-    touch has reached. Age is counted from the encoder's own onset, the first sample at which area is above 0. A sample
-    is a frame, or of events the state every `period_ms` from the first stamp.
+    With `graded` all trains are graded. Those of the levels, whose spikes have the value 1, are followed by one for
+    each moment in the order area, total, peak, x, y. During a touch it fires at every sample with the value
+    log(1 + moment), of a displacement log(1 + its size) with its sign; where the value is 0 there is no spike. With
+    `ages_ms` the last trains are one an age. During a touch, at every sample, one of them fires: that of the largest of
+    the ages that the touch has reached. Age is counted from the encoder's own onset, the first sample at which area is
+    above 0. A sample is a frame, or of events the state every `period_ms` from the first stamp.
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ class Moments(Tared):
 
     >>> encoder = Moments(levels=0, total=None, peak=None, displacement_mm=None, graded=True, ages_ms=[0.0, 0.2])
     >>> spikes = encoder.with_tare(Tare.take(rest)).encode(frames)
-    >>> [train.tolist() for train in spikes], spikes.values.round(2).tolist()
-    ([[0.2, 0.4], [0.2], [0.4]], [1.1, 1.39, 1.0, 1.0])
+    >>> [train.tolist() for train in spikes], spikes.values.round(2)
+    ([[0.2, 0.4], [0.2], [0.4]], array([1.1 , 1.39, 1.  , 1.  ], dtype=float32))
     """
 
     name = "moments"

@@ -105,7 +105,7 @@ class SpikeTrains(Columns):
         start : float, ms
         stop : float, ms, optional
             Default: the time of the last spike.
-        values : sequence of float sequences, a value a spike, optional
+        values : sequence of float sequences, a polarity or bits, or a factor of the weight, a spike, optional
         kind : "unsigned", "signed" or "graded", optional
             As in `SpikeTrains`.
 
@@ -423,7 +423,8 @@ class SpikeTrains(Columns):
         times = [np.asarray(t.rescale("ms").magnitude, np.float64) for t in trains]
         start = min(float(t.t_start.rescale("ms").magnitude) for t in trains)
         stop = max(float(t.t_stop.rescale("ms").magnitude) for t in trains)
-        values, kind = None, None
+        values = None
+        kind: Kind = "unsigned"
         if all("value" in t.array_annotations for t in trains):
             values = [np.asarray(t.array_annotations["value"], np.float32) for t in trains]
             kind = "graded" if all(t.annotations.get("value_kind") == "graded" for t in trains) else "signed"
@@ -504,8 +505,8 @@ class SpikeTrains(Columns):
             return cls.from_lists(times, first, last, values, kind=kind)
         except ProblemError as error:
             # With the caller's own window the window may be wrong, otherwise the file is.
-            kind = FormatError if start is None and stop is None else ProblemError
-            raise kind(f"{path}: {error}") from None
+            fault = FormatError if start is None and stop is None else ProblemError
+            raise fault(f"{path}: {error}") from None
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the trains to a .npz (``times offsets start stop``, ``values`` if any); return its path.
@@ -640,4 +641,4 @@ def _kind(kind: object, values: NDArray[np.float32] | None) -> Kind:
         return "unsigned" if values is None else "signed"
     if not isinstance(kind, str) or kind not in _KINDS:
         raise ProblemError(f"kind is {shown(kind)}: must be one of {', '.join(_KINDS)}")
-    return kind  # type: ignore[return-value]
+    return kind

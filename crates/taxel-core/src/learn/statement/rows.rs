@@ -297,6 +297,28 @@ impl Statement {
         }
     }
 
+    /// The sizes of the terms that rounding of a row's `coefficients` depends on: of a graded pattern, whose inputs of
+    /// one train may cancel, their coefficients with all values made positive.
+    pub(crate) fn sizes_into(&self, row: Row, coefficients: &[f64], sizes: &mut [f64]) -> Result<()> {
+        let (Row::Target { pattern, .. } | Row::Slope { pattern, .. } | Row::Silence { pattern, .. }) = row;
+        if self.example(pattern)?.inputs.iter().all(|input| input.value == 1.0) {
+            sizes.copy_from_slice(coefficients);
+            return Ok(());
+        }
+        let mut example = self.examples[pattern].clone();
+        for input in &mut example.inputs {
+            input.value = input.value.abs();
+        }
+        let row = match row {
+            Row::Target { target, .. } => Row::Target { pattern: 0, target },
+            Row::Slope { target, .. } => Row::Slope { pattern: 0, target },
+            Row::Silence { t, .. } => Row::Silence { pattern: 0, t },
+        };
+        let mut positive = Self::new(&self.neuron, self.margin, self.unit, self.trains);
+        positive.examples.push(example);
+        positive.state_into(row, sizes).map(drop)
+    }
+
     /// The row of B(w) (6.10): the coefficients `delta_t` ms after a target, and the threshold at the target, mV.
     ///
     /// Inputs after the target count: B evaluates the potential as if the neuron had not fired there.
