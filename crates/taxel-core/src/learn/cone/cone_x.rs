@@ -147,6 +147,11 @@ impl ConeX {
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
+        if let Some(rearm) = self.neuron.rearm {
+            return Err(problem!(
+                "rearm is {rearm}: CONE-X asks for silence at every point, whether the neuron is armed or not; must be None"
+            ));
+        }
         self.check_ranges()?;
         check_bounds(&self.lb, &self.ub)?;
         let Margin { height, slope } = self.margin();
