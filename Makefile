@@ -26,7 +26,8 @@ check:
 # What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
 # Of the studies, a distribution of their own in this repository, that is what they need beside taxel.
 wanted = $(BIN)/python -c 'import sys, tomllib; p, s = (tomllib.load(open(f, "rb"))["project"] for f in ("pyproject.toml", "studies/pyproject.toml")); extras = p["optional-dependencies"] | s["optional-dependencies"] | {"studies": s["dependencies"]}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), p["dependencies"]) if not x.startswith("taxel")))'
-install = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# Python compiles a module when it is first imported; compiling all of them at once takes ten seconds of the first minutes.
+install = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 $(VENV)/.installed: pyproject.toml studies/pyproject.toml | check
 	@echo "taxel: installing what it needs into $(VENV)"
@@ -46,12 +47,13 @@ $(VENV)/.for-%: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
 	@$(install) -r $(VENV)/wanted-$*.txt
 	@touch $@
 
-# Two builds of one extension, of which one is in place: incremental, so that a change in one file takes seconds, and as
-# released, which tests and benchmarks use. They share what the crates of others compiled to.
+# Two builds of one extension, of which one is in place: incremental, so that a change in one file takes seconds, without
+# line numbers, which take a fifth of the time to compile; and as released, which tests and benchmarks use. They share what
+# the crates of others compiled to.
 develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --features test-hooks
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building: minutes the first time"
-	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.package.taxel-core.codegen-units=256'
+	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.debug=false'
 	@$(install) --no-deps --editable studies
 	@rm -f $(VENV)/.released && touch $@
 

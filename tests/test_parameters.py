@@ -94,7 +94,7 @@ def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
     for value in wrong:
         given = int(value) if whole and math.isfinite(value) else value
         with pytest.raises(taxel.ProblemError) as error:
-            make(kind, **{name: [given] * len(default) if isinstance(default, list) else given})
+            make(kind, **{name: [given] * max(1, len(default)) if isinstance(default, list) else given})
         assert name in str(error.value)
         assert "\n" not in str(error.value)
         if math.isfinite(value) and not (whole and value < 0):

@@ -103,7 +103,8 @@ class Neuron(Value):
         ----------
         weights : float64, shape (trains,), mV
         trains : SpikeTrains
-            Unsigned, or signed ones split into ON and OFF (`SpikeTrains.split_by_sign`).
+            Unsigned; graded, whose values multiply the weights; or signed ones split into ON and OFF
+            (`SpikeTrains.split_by_sign`).
         threshold : float, above 0
             A factor on the threshold (a readout's `run_threshold`), and so on the potential that `rearm` stands for.
 

@@ -39,12 +39,14 @@ def statement(cone, patterns, targets, windows=None):
     def coefficients(pattern, t, earlier):
         row = np.zeros(len(pattern))
         for n, train in enumerate(pattern):
-            for s in train[train < t]:
+            for s, value in zip(train, stated.values_of(pattern, n), strict=True):
+                if s >= t:
+                    break
                 if cone.neuron_.after_spike == "reset" and len(earlier) and s <= earlier[-1] + cone.neuron_.refractory:
                     continue
                 if cone.neuron_.after_spike == "ignore" and any(e < s <= e + cone.neuron_.refractory for e in earlier):
                     continue
-                row[n] += kernel(cone.neuron_, t - s)
+                row[n] += value * kernel(cone.neuron_, t - s)
         return row
 
     delta = 0.1 * cone.neuron_.tau if cone.delta_t_ms is None else cone.delta_t_ms

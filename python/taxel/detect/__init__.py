@@ -1,13 +1,15 @@
 """Spikes to detections, live and from recordings, and their score."""
 
+from taxel.detect.alignment import Alignment
 from taxel.detect.examples import Example, Outcome
-from taxel.detect.folds import Fold, Judged, Part, Trained, choose, judge
+from taxel.detect.folds import Fold, Judged, Part, choose, judge
 from taxel.detect.readout import Learner, Readout, ReadoutStream, run
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron
-from taxel.detect.training import Recipe, train
+from taxel.detect.training import Recipe, Trained, train
 
 __all__ = [
+    "Alignment",
     "Example",
     "Fold",
     "Judged",

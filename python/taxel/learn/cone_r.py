@@ -171,7 +171,7 @@ class ConeR(SpikeLearner):
         Parameters
         ----------
         patterns : sequence of SpikeTrains
-            The same trains in each; signed ones split into ON and OFF.
+            The same trains in each, unsigned or graded; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
             Target spike times, one list a pattern; empty for a pattern without spikes.
         silence : sequence of float sequences of shape (windows, 2), ms, optional

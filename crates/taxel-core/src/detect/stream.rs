@@ -6,7 +6,7 @@ use crate::detect::{Detection, FrameClock, TrainedNeuron};
 use crate::encode::{Stream, Zeroing};
 use crate::neuron::{NeuronStream, OutputSpike};
 use crate::spikes::{ms, us};
-use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
+use crate::{Array, EventsView, FramesView, Result, Spike, SpikeKind, Stop, problem};
 
 mod named_neuron;
 mod repairs;
@@ -233,7 +233,7 @@ impl ReadoutStream {
         let mut crossings: Vec<(OutputSpike, usize, bool)> = Vec::new();
         for (k, one) in self.neurons.iter_mut().enumerate() {
             for (spike, repaired) in &self.waiting[..certain] {
-                one.push(spike.t, spike.train)?;
+                one.push(*spike)?;
                 if *repaired {
                     // Crossings up to here cannot rest on the repaired taxel.
                     one.drain_crossings(k, &mut crossings);
@@ -263,13 +263,15 @@ impl ReadoutStream {
     /// and all of these once for each delay.
     fn sort_to_inputs(&mut self) {
         let trains = u32::try_from(self.encoder.trains()).unwrap_or(u32::MAX);
-        let signed = self.encoder.signed();
-        let inputs = if signed { 2 * trains } else { trains };
+        let kind = self.encoder.kind();
+        let inputs = if kind == SpikeKind::Signed { 2 * trains } else { trains };
         for spike in std::mem::take(&mut self.emitted) {
             let repaired = self.repairs.may_give(spike.t);
-            let input = if signed && spike.value <= 0.0 { trains + spike.train } else { spike.train };
+            let off = kind == SpikeKind::Signed && spike.value <= 0.0;
+            let input = if off { trains + spike.train } else { spike.train };
+            let value = if kind == SpikeKind::Graded { spike.value } else { 1.0 };
             for (copy, delay) in (0_u32..).zip(&self.delays_ms) {
-                let delayed = Spike { t: spike.t + delay, train: copy * inputs + input, ..spike };
+                let delayed = Spike { t: spike.t + delay, train: copy * inputs + input, value };
                 self.waiting.push((delayed, repaired));
             }
         }

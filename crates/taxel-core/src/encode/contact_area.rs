@@ -14,7 +14,7 @@ use crate::allowed::{Range, ranges};
 use crate::held::Held;
 use crate::parameters::Described;
 use crate::spikes::ms;
-use crate::{Array, EventsView, Result, Spike, problem};
+use crate::{Array, EventsView, Result, Spike, SpikeKind, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.
 ///
@@ -80,8 +80,8 @@ impl Law for ContactArea {
         2 * self.levels.len()
     }
 
-    fn signed(&self) -> bool {
-        false
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Unsigned
     }
 
     fn set_tare(&mut self, tare: &Tare) {
@@ -135,8 +135,8 @@ impl Stream for Area {
         2 * self.levels.len()
     }
 
-    fn signed(&self) -> bool {
-        false
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Unsigned
     }
 
     fn latency_ms(&self) -> f64 {

@@ -23,18 +23,13 @@ wide! {
     }
 }
 
-/// The loaded places of an array.
-///
-/// A place is loaded while its value exceeds its rest by more than the noise floor and half a tick; it counts only if
-/// one of its 8 neighbours is loaded too, which rejects noise.
+/// The places of an array at or above a value of their own, and how many of them have such a neighbour.
 #[derive(Clone)]
-pub(super) struct Loaded {
+pub(super) struct Paired {
     rows: usize,
     columns: usize,
-    /// Smallest value at which each place is loaded; infinite if its rest is not known.
+    /// Smallest value at which each place is loaded; infinite if there is none.
     from: Vec<Block>,
-    noise_floor: f64,
-    rest: Rest<f64>,
     /// 1 for each loaded place, otherwise 0.
     loaded: Vec<[u32; BLOCK]>,
     /// Number of loaded neighbours of each place.
@@ -43,49 +38,31 @@ pub(super) struct Loaded {
     area: u32,
 }
 
-impl Loaded {
-    /// Starts with no taxel loaded; `what` names the encoder in an error.
-    pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
-        let Some(tare) = tare else {
-            return Err(problem!("{what} without a tare: take one at rest and give it to the encoder"));
-        };
-        let (rest, n) = (tare.rest_of(array)?, blocks(array.len()));
-        let mut fresh = Self {
-            rows: usize::from(array.rows),
-            columns: usize::from(array.columns),
-            loaded: vec![[0; BLOCK]; n],
+impl Paired {
+    /// Starts with no place loaded, and no value at which one is.
+    pub(super) fn new(rows: usize, columns: usize) -> Self {
+        let n = blocks(rows * columns);
+        Self {
+            rows,
+            columns,
             from: vec![[f32::INFINITY; BLOCK]; n],
-            noise_floor,
-            rest,
-            neighbours: vec![0; array.len()],
+            loaded: vec![[0; BLOCK]; n],
+            neighbours: vec![0; rows * columns],
             area: 0,
-        };
-        (0..array.len()).for_each(|place| fresh.rest_changed(place));
-        Ok(fresh)
+        }
     }
 
-    /// Changes the rest of a place; the caller must pass its value again.
-    pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
-        self.rest.set(place, rest);
-        self.rest_changed(place);
-    }
-
-    fn rest_changed(&mut self, place: usize) {
-        let from = touched_from(self.rest.values()[place], self.noise_floor);
+    /// Sets the smallest value at which a place is loaded; the caller must pass its value again.
+    pub(super) fn set_from(&mut self, place: usize, from: f64) {
         self.from[place / BLOCK][place % BLOCK] = round_up(from);
     }
 
-    /// The rest of a place; `None` if it is not known.
-    pub(super) fn rest(&self, place: usize) -> Option<f64> {
-        Some(self.rest.values()[place]).filter(|rest| rest.is_finite())
+    /// Number of blocks of places.
+    pub(super) fn blocks(&self) -> usize {
+        self.loaded.len()
     }
 
-    /// Difference between a value and a place's rest.
-    pub(super) fn above(&self, place: usize, value: f32) -> f64 {
-        self.rest.above(place, f64::from(value))
-    }
-
-    /// Number of taxels that count.
+    /// Number of loaded places with a loaded neighbour.
     pub(super) fn area(&self) -> u32 {
         self.area
     }
@@ -147,4 +124,69 @@ impl Loaded {
             self.area = if loaded { self.area + 1 } else { self.area - 1 };
         }
     }
+}
+
+/// The loaded places of an array.
+///
+/// A place is loaded while its value exceeds its rest by more than the noise floor and half a tick; it counts only if
+/// one of its 8 neighbours is loaded too, which rejects noise.
+#[derive(Clone)]
+pub(super) struct Loaded {
+    places: Paired,
+    noise_floor: f64,
+    rest: Rest<f64>,
+}
+
+impl Loaded {
+    /// Starts with no taxel loaded; `what` names the encoder in an error.
+    pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
+        let rest = given(what, tare)?.rest_of(array)?;
+        let places = Paired::new(usize::from(array.rows), usize::from(array.columns));
+        let mut fresh = Self { places, noise_floor, rest };
+        (0..array.len()).for_each(|place| fresh.rest_changed(place));
+        Ok(fresh)
+    }
+
+    /// Changes the rest of a place; the caller must pass its value again.
+    pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
+        self.rest.set(place, rest);
+        self.rest_changed(place);
+    }
+
+    fn rest_changed(&mut self, place: usize) {
+        self.places.set_from(place, touched_from(self.rest.values()[place], self.noise_floor));
+    }
+
+    /// The rest of a place; `None` if it is not known.
+    pub(super) fn rest(&self, place: usize) -> Option<f64> {
+        Some(self.rest.values()[place]).filter(|rest| rest.is_finite())
+    }
+
+    /// Difference between a value and a place's rest.
+    pub(super) fn above(&self, place: usize, value: f32) -> f64 {
+        self.rest.above(place, f64::from(value))
+    }
+
+    /// Updates the value of a place.
+    pub(super) fn take(&mut self, place: usize, value: f32) {
+        self.places.take(place, value);
+    }
+
+    /// Updates the values of a block of places.
+    pub(super) fn take_block(&mut self, block: usize, values: &Block) {
+        self.places.take_block(block, values);
+    }
+}
+
+impl std::ops::Deref for Loaded {
+    type Target = Paired;
+
+    fn deref(&self) -> &Paired {
+        &self.places
+    }
+}
+
+/// The tare of an encoder that needs one; `what` names the encoder in an error.
+pub(super) fn given<'a>(what: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
+    tare.ok_or_else(|| problem!("{what} without a tare: take one at rest and give it to the encoder"))
 }

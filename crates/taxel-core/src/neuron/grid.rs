@@ -14,7 +14,7 @@ pub(super) struct GridStream {
     grid: Grid,
     /// The state at grid point `point`, including the inputs of the interval before it.
     state: KernelSum,
-    /// The sum of the weights of inputs exactly at `point`: they change potential and slope only after it.
+    /// The sum of the weights times values of inputs exactly at `point`: they change potential and slope only after it.
     arriving: f64,
     point: f64,
     /// Whether `point` has been compared with the threshold.
@@ -41,7 +41,7 @@ impl GridStream {
 
     /// Adds an input to the state at the first grid point at or after it, at the cost of one exponential and without a
     /// queue.
-    pub(super) fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
+    pub(super) fn push(&mut self, t: f64, weight: f64, value: f64, out: &mut Vec<OutputSpike>) {
         let place = self.grid.place(t);
         let point = place.from();
         if point > self.point {
@@ -52,9 +52,9 @@ impl GridStream {
         if !self.neuron.loses(t, self.threshold.fired) {
             let age = self.grid.between(place, Place::at(self.point));
             if age > 0.0 {
-                self.shape.add(&mut self.state, weight, age);
+                self.shape.add(&mut self.state, weight, value, age);
             } else {
-                self.arriving += weight;
+                self.arriving += weight * value;
             }
         }
     }
@@ -94,7 +94,7 @@ impl GridStream {
 
     fn leaving(&self) -> KernelSum {
         let mut state = self.state;
-        self.shape.add(&mut state, self.arriving, 0.0);
+        self.shape.add(&mut state, self.arriving, 1.0, 0.0);
         state
     }
 

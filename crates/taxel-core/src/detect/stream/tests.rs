@@ -24,8 +24,8 @@ impl Stream for Plain {
     fn trains(&self) -> usize {
         4
     }
-    fn signed(&self) -> bool {
-        true
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Signed
     }
     fn latency_ms(&self) -> f64 {
         self.latency_ms

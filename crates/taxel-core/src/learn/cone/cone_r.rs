@@ -11,7 +11,6 @@ use crate::learn::statement::{
 };
 use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
-use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// Parameters of CONE-R; defaults from Tables 6.1 and 6.2.
@@ -300,7 +299,7 @@ impl ConeRProblem {
             divisors: (parameters.divide_b_by, parameters.divide_c_by, parameters.divide_d_by),
             sides: (parameters.sides_b, parameters.sides_c),
         };
-        let d_max = |most: &[f64]| self.rows.broken_silence(most);
+        let d_max = |most: &[f64]| self.rows.most_broken_silence(most);
         let unit = self.statement.unit;
         let silent: Vec<f64> = silent.iter().map(|most| most / unit).collect();
         Ok(Objective::new(choice, bounds, &silent, &self.rows.targets, unit, d_max))
@@ -410,7 +409,7 @@ impl ConeRProblem {
     fn unreachable(&self, objective: &Objective) -> Vec<(usize, usize)> {
         let targets = &self.rows.targets;
         let names = targets.names.iter().zip(targets.iter());
-        names.filter(|(_, row)| dot(row.at, &objective.bounds.upper) < row.threshold).map(|(name, _)| *name).collect()
+        names.filter(|(_, row)| objective.bounds.range(row.at).1 < row.threshold).map(|(name, _)| *name).collect()
     }
 
     fn refires(&self, weights: &[f64], only: Option<usize>) -> Result<usize> {

@@ -1,7 +1,7 @@
 //! Checks of the arguments of learners.
 
 use crate::neuron::Neuron;
-use crate::{Result, SpikeTrains, problem};
+use crate::{Result, SpikeKind, SpikeTrains, problem};
 
 /// Checks the arguments of every learner: one list of targets (ms, ascending) per pattern, and the same trains in each
 /// pattern.
@@ -99,7 +99,7 @@ pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
     if pattern.is_empty() {
         return Err(problem!("pattern {p}: has no train"));
     }
-    if pattern.values.is_some() {
+    if pattern.kind == SpikeKind::Signed {
         return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
     }
     Ok(())
@@ -108,7 +108,7 @@ pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
 /// Checks a pattern without targets.
 pub(crate) fn check_untargeted(pattern: &SpikeTrains) -> Result<()> {
     pattern.check()?;
-    if pattern.values.is_some() {
+    if pattern.kind == SpikeKind::Signed {
         return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
     }
     if pattern.is_empty() {

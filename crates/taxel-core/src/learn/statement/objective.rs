@@ -120,7 +120,8 @@ impl Objective {
     /// weights are 0, but the normalisers of l1 and l2 include them like every train.
     ///
     /// Reading: 6.3.2 takes each term's largest value over bounds at -ub and ub; for other bounds, the largest value is
-    /// taken over -max(|lb|, |ub|) to max(|lb|, |ub|), synapse by synapse.
+    /// taken over -max(|lb|, |ub|) to max(|lb|, |ub|), synapse by synapse. Graded inputs can make a coefficient negative:
+    /// B and C are then the sums of each row's own largest value, and D is taken with all values made positive.
     pub(crate) fn new(
         choice: Choice,
         bounds: Bounds,
@@ -134,8 +135,9 @@ impl Objective {
         let [l1, l2, b, c, d] = lambdas.map(|l| if sum > 0.0 { l / sum } else { 0.0 });
         let most: Vec<f64> = bounds.lower.iter().zip(&bounds.upper).map(|(l, u)| l.abs().max(u.abs())).collect();
         let over = |share: f64, most: f64| if most > 0.0 { share / most } else { 0.0 };
-        let lifted = |row: TargetRow<'_>| (dot(row.behind, &most) + kappa * row.threshold).powi(2);
-        let missed = |row: TargetRow<'_>| dot(row.at, &most) + row.threshold;
+        let reach = |row: &[f64]| dot(&row.iter().map(|a| a.abs()).collect::<Vec<f64>>(), &most);
+        let lifted = |row: TargetRow<'_>| (reach(row.behind) + kappa * row.threshold).powi(2);
+        let missed = |row: TargetRow<'_>| reach(row.at) + row.threshold;
         let square = dot(&most, &most) + dot(silent, silent);
         // The number of targets has no unit, so these terms scale with the unit of potentials; B is a sum of squares.
         let count = targets.len() as f64;

@@ -93,10 +93,11 @@ impl Relaxed {
         if lengths > 0.0 { thresholds / lengths } else { f64::INFINITY }
     }
 
-    /// D at these weights, without its factor.
-    pub(crate) fn broken_silence(&self, weights: &[f64]) -> f64 {
+    /// D at these weights, without its factor, if the values of all inputs were positive: its largest value, unless
+    /// inputs of both signs are present; then D cannot exceed it.
+    pub(crate) fn most_broken_silence(&self, weights: &[f64]) -> f64 {
         let mut potential = Vec::new();
-        self.silent.potential(weights, &mut potential);
+        self.silent.without_signs().potential(weights, &mut potential);
         potential.iter().zip(&self.silent.limit).map(|(u, limit)| (u - limit).max(0.0)).sum()
     }
 }

@@ -13,7 +13,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Grid, KernelSum, Neuron, Shape, Time, rounding_ms};
-use crate::{Result, SpikeTrains, Stop, problem};
+use crate::{Result, Spike, SpikeTrains, Stop, problem};
 
 /// This close before a target, ms, the target's row and its slope row replace rows of silence, which would be parallel
 /// to the target's row to within rounding. A neuron that crosses its threshold there fires at the target.
@@ -124,8 +124,10 @@ pub(crate) struct Example {
     pub(crate) targets: Vec<f64>,
     /// The windows in which silence is required, ms, ascending, ends included; `None`: everywhere.
     pub(crate) silence: Option<Vec<[f64; 2]>>,
-    /// The inputs as time (ms) and train, in order of time.
-    pub(crate) inputs: Vec<(f64, u32)>,
+    /// The inputs, in order of time.
+    pub(crate) inputs: Vec<Spike>,
+    /// The age of an input, ms, from which on it is smaller than the rounding of the others.
+    pub(crate) forgotten: f64,
 }
 
 /// The end of silence in pattern `p`, ms: the horizon, or the later of the pattern's stop and its last target + `tau`.
@@ -153,8 +155,8 @@ pub(crate) fn end_of(
 
 impl Example {
     /// The inputs before `t`, in order of time.
-    fn before(&self, t: f64) -> &[(f64, u32)] {
-        &self.inputs[..self.inputs.partition_point(|i| i.0 < t)]
+    fn before(&self, t: f64) -> &[Spike] {
+        &self.inputs[..self.inputs.partition_point(|i| i.t < t)]
     }
 
     /// Whether `t` is in a window of silence.
@@ -220,13 +222,14 @@ impl Statement {
         end: f64,
         stop: Stop<'_>,
     ) -> Result<()> {
-        let spikes = pattern.by_time(stop)?;
+        let inputs = pattern.by_time(stop)?;
         self.examples.push(Example {
             start: pattern.start,
             end,
             targets: targets.to_vec(),
             silence: silence.map(<[_]>::to_vec),
-            inputs: spikes.iter().map(|s| (s.t, s.train)).collect(),
+            forgotten: self.shape.forgotten() + self.shape.tau * spread(&inputs).ln(),
+            inputs,
         });
         Ok(())
     }
@@ -433,9 +436,9 @@ impl Statement {
         out.fill(0.0);
         let inputs = example.before(t);
         let age = self.neuron.ages(example.start, t);
-        let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
+        let from = inputs.partition_point(|i| i.t < t - example.forgotten);
         let (mut at, mut one) = (f64::NAN, 0.0);
-        for &(s, train) in &inputs[from..] {
+        for &Spike { t: s, train, value } in &inputs[from..] {
             // With times in whole ms, many inputs share a time: the exponential is computed once per time.
             if s != at {
                 at = s;
@@ -445,7 +448,16 @@ impl Statement {
                     part(self.shape.after(self.shape.input(), age(s)))
                 };
             }
-            out[train as usize] += one;
+            out[train as usize] += f64::from(value) * one;
         }
     }
+}
+
+/// How many times the largest value of the inputs is the smallest, both without sign; 1 of unsigned inputs.
+fn spread(inputs: &[Spike]) -> f64 {
+    let ends = inputs.iter().fold((f64::INFINITY, 0.0_f64), |(least, most), input| {
+        let size = f64::from(input.value).abs();
+        (least.min(size), most.max(size))
+    });
+    if ends.1 > 0.0 { ends.1 / ends.0 } else { 1.0 }
 }

@@ -1,6 +1,6 @@
 //! A block of neurons on a grid: advances from point to point.
 
-use super::lanes::{FADED, LANES, LOOK, Lanes, SLACK, Weight};
+use super::lanes::{FADED, LANES, LOOK, Lanes, Weight, slack};
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AfterSpike, Neuron};
 use crate::neuron::points::{Grid, Place};
@@ -34,7 +34,7 @@ struct Point {
 struct Input {
     train: u32,
     t: f64,
-    /// The state that an input of weight 1 has reached at the point.
+    /// The state that the input, with a weight of 1, has reached at the point.
     one: KernelSum,
 }
 
@@ -104,12 +104,10 @@ impl Script {
             let mut arriving = vec![];
             while let Some(spike) = rest.next_if(|s| grid.place(s.t).from() <= point) {
                 let age = grid.between(grid.place(spike.t), Place::at(point));
-                if age > 0.0 {
-                    let one = shape.after(shape.input(), age);
-                    inputs.push(Input { train: spike.train, t: spike.t, one });
-                } else {
-                    arriving.push(Input { train: spike.train, t: spike.t, one: shape.input() });
-                }
+                let mut one = KernelSum::default();
+                shape.add(&mut one, 1.0, f64::from(spike.value), age.max(0.0));
+                let to = if age > 0.0 { &mut inputs } else { &mut arriving };
+                to.push(Input { train: spike.train, t: spike.t, one });
             }
             let aged_end = inputs.len();
             inputs.append(&mut arriving);
@@ -119,7 +117,7 @@ impl Script {
         let far = grid.rounding_ms(trains.stop);
         let threshold = Threshold::new(neuron, threshold, start);
         Ok(Self {
-            floor: threshold.base - threshold.slack(far) - SLACK * neuron.unit(),
+            floor: threshold.base - threshold.slack(far) - slack(neuron, &spikes),
             threshold,
             grid,
             step: shape.step(step_ms),
