@@ -20,14 +20,22 @@ fn random_trains(random: &mut StdRng, trains: usize, whole_ms: bool) -> SpikeTra
 fn neurons() -> impl Iterator<Item = Neuron> {
     let after = [AfterSpike::Keep, AfterSpike::Ignore, AfterSpike::Reset];
     let first = [FirstThreshold::Base, FirstThreshold::Printed];
-    let clocks = [(Time::Continuous, 1.0), (Time::Grid, 1.0), (Time::Grid, 0.192)];
+    let grid = |step_ms, rearm| (Time::Grid, step_ms, rearm);
+    let clocks = [
+        (Time::Continuous, 1.0, None),
+        grid(1.0, None),
+        grid(0.192, None),
+        grid(1.0, Some(1.0)),
+        grid(0.192, Some(0.4)),
+    ];
     after.into_iter().flat_map(move |after_spike| {
         first.into_iter().flat_map(move |first_threshold| {
-            clocks.into_iter().map(move |(time, step_ms)| Neuron {
+            clocks.into_iter().map(move |(time, step_ms, rearm)| Neuron {
                 after_spike,
                 first_threshold,
                 time,
                 step_ms,
+                rearm,
                 tau: 8.0,
                 ..Neuron::default()
             })

@@ -198,6 +198,9 @@ def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
     _check_ungraded(readout.encoder)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
     neurons = list(readout.neurons.values())
+    for label, one in readout.neurons.items():
+        if one.neuron.rearm is not None:
+            raise ProblemError(f"NIR: rearm of {label!r} is {one.neuron.rearm}: no NIR neuron has that, must be None")
     nodes = [_gains(one.neuron, spike_s) for one in neurons]
     kinds = sorted({kind for kind, _, _ in nodes})
     if len(kinds) > 1:

@@ -73,12 +73,15 @@ impl GridStream {
         if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
     }
 
-    /// Steps point by point while the potential could still reach the threshold without a further input.
+    /// Steps point by point while the potential could still reach the threshold without a further input, or has yet to
+    /// fall below `rearm`.
     ///
     /// Once it cannot, the state stays where it is and the next input advances it in one jump. The number of steps
     /// depends only on the state, so a stream that is cut elsewhere gives the same bits.
     fn step_through(&mut self, last: f64, out: &mut Vec<OutputSpike>) {
-        while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - self.slack() {
+        while self.point < last
+            && (self.threshold.is_unarmed() || self.shape.bound(self.leaving()) >= self.threshold.base - self.slack())
+        {
             self.jump(self.point + 1.0);
             self.compare(out);
         }
@@ -112,7 +115,7 @@ impl GridStream {
             return;
         }
         let (t, slope) = (self.grid.time(self.point), self.shape.slope(self.state));
-        if !self.threshold.reached(t, self.state.b, slope, self.grid.rounding_ms(t)) {
+        if !self.threshold.compare(t, self.state.b, slope, self.grid.rounding_ms(t)) {
             return;
         }
         out.push(OutputSpike { t, slope });

@@ -73,6 +73,26 @@ pub(crate) fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, ta
     Ok(())
 }
 
+/// Checks the windows of silence of pattern number `p`.
+pub(crate) fn check_silence(p: usize, windows: Option<&[[f64; 2]]>) -> Result<()> {
+    let mut before = f64::NEG_INFINITY;
+    for (k, &[start, stop]) in windows.unwrap_or_default().iter().enumerate() {
+        if !(start.is_finite() && stop.is_finite() && start <= stop) {
+            return Err(problem!(
+                "pattern {p}, window {k} of silence: {start} to {stop} ms, start must not lie behind stop, both finite"
+            ));
+        }
+        if start < before {
+            return Err(problem!(
+                "pattern {p}, window {k} of silence: begins at {start} ms, before the end of the window before, {before} \
+                 ms; windows must ascend"
+            ));
+        }
+        before = stop;
+    }
+    Ok(())
+}
+
 /// Checks pattern number `p`.
 pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
     pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;

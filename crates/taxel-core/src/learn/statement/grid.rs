@@ -120,7 +120,7 @@ impl SilentRows {
                 next += 1;
             }
             let fired = next.checked_sub(1).map(|k| targets[k]);
-            limit.push(if statement.is_silent_between(fired, t, targets.get(next).copied()) {
+            limit.push(if example.in_window(t) && statement.is_silent_between(fired, t, targets.get(next).copied()) {
                 neuron.theta_0 + statement.rise(example, fired, t) - statement.margin.height
             } else {
                 f64::INFINITY

@@ -122,6 +122,8 @@ pub(crate) struct Example {
     /// The end of the time in which silence is required, ms.
     pub(crate) end: f64,
     pub(crate) targets: Vec<f64>,
+    /// The windows in which silence is required, ms, ascending, ends included; `None`: everywhere.
+    pub(crate) silence: Option<Vec<[f64; 2]>>,
     /// The inputs, in order of time.
     pub(crate) inputs: Vec<Spike>,
     /// The age of an input, ms, from which on it is smaller than the rounding of the others.
@@ -155,6 +157,13 @@ impl Example {
     /// The inputs before `t`, in order of time.
     fn before(&self, t: f64) -> &[Spike] {
         &self.inputs[..self.inputs.partition_point(|i| i.t < t)]
+    }
+
+    /// Whether `t` is in a window of silence.
+    pub(crate) fn in_window(&self, t: f64) -> bool {
+        let Some(windows) = &self.silence else { return true };
+        let k = windows.partition_point(|window| window[1] + rounding_ms(t) < t);
+        windows.get(k).is_some_and(|window| window[0] - rounding_ms(t) <= t)
     }
 
     /// The last target before `t`.
@@ -203,14 +212,22 @@ impl Statement {
         Self { neuron, shape, margin, unit, taper, trains, examples: vec![] }
     }
 
-    /// Adds a pattern, which the caller has checked, and the end of its silence, ms; if the caller stops it, nothing
-    /// changes.
-    pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64, stop: Stop<'_>) -> Result<()> {
+    /// Adds a pattern, which the caller has checked, the windows of its silence, if any, and its end, ms; if the caller
+    /// stops it, nothing changes.
+    pub(crate) fn push(
+        &mut self,
+        pattern: &SpikeTrains,
+        targets: &[f64],
+        silence: Option<&[[f64; 2]]>,
+        end: f64,
+        stop: Stop<'_>,
+    ) -> Result<()> {
         let inputs = pattern.by_time(stop)?;
         self.examples.push(Example {
             start: pattern.start,
             end,
             targets: targets.to_vec(),
+            silence: silence.map(<[_]>::to_vec),
             forgotten: self.shape.forgotten() + self.shape.tau * spread(&inputs).ln(),
             inputs,
         });
@@ -377,7 +394,8 @@ impl Statement {
         }
         if !self.is_silent(example, t) {
             return Err(problem!(
-                "pattern {pattern}: {t} ms lies at a target or in its refractory time, nothing is asked there"
+                "pattern {pattern}: {t} ms lies at a target, in its refractory time or in no window of silence, nothing is \
+                 asked there"
             ));
         }
         Ok(())
@@ -401,12 +419,12 @@ impl Statement {
         Grid::new(example.start, self.neuron.step_ms).place(t).is_point()
     }
 
-    /// Whether `t` is neither a target nor in the refractory time after one.
+    /// Whether `t` is in a window of silence, and neither a target nor in the refractory time after one.
     pub(crate) fn is_silent(&self, example: &Example, t: f64) -> bool {
-        self.is_silent_between(example.fired(t), t, example.next(t))
+        example.in_window(t) && self.is_silent_between(example.fired(t), t, example.next(t))
     }
 
-    /// Like `is_silent`, given the last target before `t` and the first one at or after `t`.
+    /// Like `is_silent` whatever the windows, given the last target before `t` and the first one at or after `t`.
     pub(crate) fn is_silent_between(&self, fired: Option<f64>, t: f64, next: Option<f64>) -> bool {
         let free = fired.is_some_and(|target| match self.neuron.time {
             Time::Grid => t <= target + self.neuron.refractory + rounding_ms(t),

@@ -151,7 +151,7 @@ pub(super) fn run<W: Weight>(
             let threshold = &mut thresholds[lane];
             lanes.recover(lane, threshold, t);
             let slope = shape.slope(KernelSum { a: lanes.a[lane], b: lanes.b[lane] });
-            if threshold.reached(t, lanes.b[lane], slope, script.grid.rounding_ms(t)) {
+            if threshold.compare(t, lanes.b[lane], slope, script.grid.rounding_ms(t)) {
                 fired[lane].push(t);
                 threshold.fire(t);
                 lanes.fire(lane, t, t + neuron.refractory, neuron.after_spike);
@@ -159,6 +159,14 @@ pub(super) fn run<W: Weight>(
                     (lanes.a[lane], lanes.b[lane]) = (0.0, 0.0);
                 }
                 lanes.recover(lane, threshold, t);
+            }
+            if neuron.rearm.is_some() {
+                // No rise can exclude a neuron that is unarmed: each point may arm it.
+                lanes.rise[lane] = match (threshold.is_unarmed(), lanes.edge[lane].is_finite()) {
+                    (true, _) => f64::NEG_INFINITY,
+                    (false, true) => f64::INFINITY,
+                    (false, false) => threshold.rise(t),
+                };
             }
         }
         from = Some(at);
