@@ -242,4 +242,5 @@ def readout_responses(
 def _listed(reader: object, patterns: object) -> list[SpikeTrains]:
     """Return the patterns; refuse graded ones on behalf of `reader`."""
     name = type(reader).__name__
-    return [instance(f"pattern {k}", one, SpikeTrains)._ungraded(name) for k, one in enumerate(several("patterns", patterns))]
+    trains = enumerate(several("patterns", patterns))
+    return [instance(f"pattern {k}", one, SpikeTrains)._ungraded(name) for k, one in trains]
