@@ -37,6 +37,8 @@ OPTIONS = [
     {"kernel": "double_exponential", "lb": -1.0, "ub": 0.2},
     {"kernel": "exponential", "lambdas": (0, 0, 1, 1, 1), "margin": 0.05},
     {"engine": "cone solver"},
+    {"sides_b": "below", "sides_c": "below", "divide_d_by": "targets", "lambdas": (2, 1, 300, 10, 1)},
+    {"sides_b": "below", "sides_c": "below", "divide_c_by": "targets", "engine": "cone solver"},
 ]
 
 

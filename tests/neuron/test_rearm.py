@@ -22,8 +22,9 @@ AT = 1e-11
 
 def simulated(neuron: Neuron, weights: np.ndarray, trains: SpikeTrains, threshold: float) -> list[float]:
     """Each grid point in turn: the potential as a sum over all inputs, whether it arms the neuron, whether it fires."""
-    pairs = sorted((s, n) for n, train in enumerate(trains) for s in train)
-    at, size = np.array([s for s, _ in pairs]), np.array([weights[n] for _, n in pairs])
+    at, size = trains.times, np.repeat(weights, trains.counts)
+    if trains.kind == "graded":
+        size = size * trains.values
     start, armed, fired = trains.start, True, []
     tau_rec = 2 * neuron.tau if neuron.tau_rec is None else neuron.tau_rec
     for k in range(int((trains.stop - start) / neuron.step_ms + 1e-9) + 1):
@@ -80,7 +81,12 @@ def problems(draw: st.DrawFn) -> tuple[Neuron, np.ndarray, SpikeTrains, float]:
     lists = [np.sort(rng.uniform(-5.0, length, rng.poisson(length / (4 if exact else 12)))) for _ in range(inputs)]
     if exact or draw(st.booleans()):
         lists = [np.floor(times) for times in lists]
-    return neuron, weights, SpikeTrains.from_lists(lists, -5.0, length), draw(st.sampled_from([1.0, 0.5]))
+    graded = {}
+    if not exact and draw(st.booleans()):
+        values = [rng.choice([-1, 1, 1], len(times)) * 10 ** rng.uniform(-1, 1, len(times)) for times in lists]
+        graded = {"values": values, "kind": "graded"}
+    trains = SpikeTrains.from_lists(lists, -5.0, length, **graded)
+    return neuron, weights, trains, draw(st.sampled_from([1.0, 0.5]))
 
 
 @settings(max_examples=200, deadline=None)

@@ -39,7 +39,8 @@ class ConeR(SpikeLearner):
     ----------
     neuron : Neuron, optional
         The neuron to be trained; default: ``Neuron()``. Whatever its `time`, it is trained on the grid of its
-        `step_ms`, which is also the step of the silent rows.
+        `step_ms`, which is also the step of the silent rows. With `rearm` it is trained as without, since no row can
+        tell when it is armed again; `refires_`, `predict` and `neuron_` run with it.
     kappa : float, above 0
         The potential after a target that the term B requires, in thresholds.
     delta_t_ms : float, ms, 0 or more, optional
