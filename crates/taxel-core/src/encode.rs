@@ -2,6 +2,7 @@
 
 mod blocks;
 mod bracket;
+mod by_stamp;
 mod channels;
 mod fields;
 mod law;
@@ -9,6 +10,7 @@ mod loaded;
 mod periods;
 mod pieces;
 mod power;
+mod quantity;
 mod receptor;
 mod running_range;
 mod sampled;
@@ -20,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 pub use pieces::Pieces;
+pub use quantity::Quantity;
 pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
 pub use tare::{Tare, TareBuilder, Zeroing};

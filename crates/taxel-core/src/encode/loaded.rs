@@ -43,11 +43,24 @@ pub(super) struct Loaded {
     area: u32,
 }
 
+/// Sums over the taxels that count.
+#[derive(Default)]
+pub(super) struct Sums {
+    /// Sum of the values above rest.
+    pub(super) total: f64,
+    /// Largest value above rest.
+    pub(super) peak: f64,
+    /// Sum of the columns, weighted by the values above rest.
+    pub(super) x: f64,
+    /// Sum of the rows, likewise.
+    pub(super) y: f64,
+}
+
 impl Loaded {
     /// Starts with no taxel loaded; `what` names the encoder in an error.
     pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
         let Some(tare) = tare else {
-            return Err(problem!("{what} without a tare: take one at rest and give it to the encoder"));
+            return Err(problem!("{what} without a tare: take one at rest and give it as tare"));
         };
         let (rest, n) = (tare.rest_of(array)?, blocks(array.len()));
         let mut fresh = Self {
@@ -81,7 +94,7 @@ impl Loaded {
     }
 
     /// Difference between a value and a place's rest.
-    pub(super) fn above(&self, place: usize, value: f32) -> f64 {
+    fn above(&self, place: usize, value: f32) -> f64 {
         self.rest.above(place, f64::from(value))
     }
 
@@ -91,13 +104,34 @@ impl Loaded {
     }
 
     /// Whether any place of a block is loaded.
-    pub(super) fn any(&self, block: usize) -> bool {
+    fn any(&self, block: usize) -> bool {
         self.loaded[block].iter().any(|&l| l != 0)
     }
 
     /// Whether a place counts: it and one of its neighbours are loaded.
-    pub(super) fn counts(&self, place: usize) -> bool {
+    fn counts(&self, place: usize) -> bool {
         self.is_loaded(place) && self.neighbours[place] > 0
+    }
+
+    /// Sums over the taxels that count, from the values of all places; they are added in the order of places.
+    pub(super) fn sums(&self, held: &[Block]) -> Sums {
+        let mut sums = Sums::default();
+        if self.area == 0 {
+            return sums;
+        }
+        let places = self.neighbours.len();
+        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.any(block)) {
+            for (place, &value) in (block * BLOCK..places).zip(values) {
+                if self.counts(place) {
+                    let above = self.above(place, value);
+                    sums.total += above;
+                    sums.peak = sums.peak.max(above);
+                    sums.x += above * (place % self.columns) as f64;
+                    sums.y += above * (place / self.columns) as f64;
+                }
+            }
+        }
+        sums
     }
 
     /// Updates the value of a place.

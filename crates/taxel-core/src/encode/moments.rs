@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next};
+use super::blocks::{Block, Next};
 use super::law::Law;
-use super::loaded::Loaded;
+use super::loaded::{Loaded, Sums};
 use super::periods::micros;
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
@@ -128,8 +128,6 @@ impl Law for Moments {
         let levels = self.all_levels();
         let passing = Passing {
             loaded,
-            places: array.len(),
-            columns: usize::from(array.columns),
             pitch_mm: array.pitch_mm,
             origin: None,
             since: vec![None; levels.len()],
@@ -182,9 +180,6 @@ impl Level {
 #[derive(Clone)]
 struct Passing {
     loaded: Loaded,
-    /// Number of places of the array.
-    places: usize,
-    columns: usize,
     pitch_mm: f64,
     /// The centre when the current touch began, in taxels.
     origin: Option<[f64; 2]>,
@@ -205,18 +200,7 @@ impl Passing {
             self.origin = None;
             return [0.0; 5];
         }
-        let (mut total, mut peak, mut x, mut y) = (0.0, 0.0_f64, 0.0, 0.0);
-        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.loaded.any(block)) {
-            for (place, &value) in (block * BLOCK..self.places).zip(values) {
-                if self.loaded.counts(place) {
-                    let above = self.loaded.above(place, value);
-                    total += above;
-                    peak = peak.max(above);
-                    x += above * (place % self.columns) as f64;
-                    y += above * (place / self.columns) as f64;
-                }
-            }
-        }
+        let Sums { total, peak, x, y } = self.loaded.sums(held);
         let centre = [x / total, y / total];
         let origin = *self.origin.get_or_insert(centre);
         let way = |axis: usize| (centre[axis] - origin[axis]) * self.pitch_mm;

@@ -4,6 +4,7 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 
 use super::*;
+use crate::detect::Detector;
 use crate::encode::ContactArea;
 use crate::neuron::Neuron;
 use crate::{Events, Intensities};
@@ -168,7 +169,9 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
             }
         }
         let run = |events: &Events, zeroings: &[Zeroing]| {
-            readout.run_events(events.view(), 192.0, Some(&tare), zeroings, Stop::never()).unwrap()
+            Detector::from(readout.clone())
+                .run_events(events.view(), 192.0, Some(&tare), zeroings, Stop::never())
+                .unwrap()
         };
         let said = run(&events, &zeroings);
         assert_eq!(said, run(&low, &[]), "seed {seed}, {name}");
