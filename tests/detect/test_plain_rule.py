@@ -214,6 +214,15 @@ def test_one_frame_of_two_taxels():
     assert list(found.known) == [53 * 192, 105 * 192]
 
 
+def test_a_board_s_stamps_are_known_at_the_end_of_their_frames():
+    """With version 1 a stamp is floor(1.92 k) units of 100 us, and its frame k ends at 192 (k + 1) us."""
+    for k in (3, 260, 1_000, 5_207):
+        stamps = [math.floor(1.92 * n) * 100 for n in (k, k + 50)]
+        found = run(PlainRule("area", 2, noise_floor=FLOOR), press(start=stamps[0], stop=stamps[1]), tare=tare())
+        assert found.t.tolist() == stamps
+        assert found.known.tolist() == [192 * (k + 1), 192 * (k + 51)]
+
+
 @pytest.mark.parametrize(("threshold", "found"), [(2.0, 2), (math.nextafter(2.0, 3.0), 0)])
 def test_a_value_at_the_threshold_counts(threshold, found):
     assert len(run(PlainRule("area", threshold, noise_floor=FLOOR), press(), tare=tare())) == found
@@ -312,7 +321,7 @@ def test_what_a_rule_cannot_read_is_refused():
     rule = PlainRule("area", 2)
     with pytest.raises(ProblemError, match="plain rule without a tare"):
         run(rule, press())
-    with pytest.raises(ProblemError, match="must be a taxel.Recording, taxel.Events or taxel.Frames"):
+    with pytest.raises(ProblemError, match="a plain rule reads a recording"):
         run(rule, taxel.SpikeTrains.from_lists([[1.0]]))
     with pytest.raises(ProblemError, match="tare of 3 x 4"):
         run(rule, press(array=Array(4, 4)), tare=tare())
@@ -353,9 +362,8 @@ def test_tuning_finds_a_planted_rule():
     assert rules["gone"].labels == ("gone",)
     for example_ in [played(17), *examples]:
         for name, rule in rules.items():
-            score = taxel.detect.score(
-                run(rule, example_.source, tare=example_.tare), {name: example_.labels[name]}, 50
-            )
+            found = run(rule, example_.source, tare=example_.tare)
+            score = taxel.detect.score(found, {name: example_.labels[name]}, 50)
             assert (score.missed, score.false) == (0, 0)
 
 
@@ -394,11 +402,17 @@ def test_tuning_tells_two_kinds_by_area_at_an_age():
     assert found["off"].labels == ("off",)
 
 
-def test_tuning_pictures_and_recordings(tmp_path: Path):
-    source = played(4)
-    pictures = source.source.frames(rate_hz=10_000)
-    rules = tune([Example(pictures, source.labels, source.tare)])
-    assert rules["hit"].threshold == 16.0
+def test_tuning_pictures():
+    source, held, pictures = played(4), np.zeros((12, 12)), []
+    stamps = np.unique(source.source.t)
+    for t in stamps:
+        now = source.source[source.source.t == t]
+        held[now.y, now.x] = now.intensity
+        pictures.append(held.copy())
+    frames = Frames(pictures, stamps, array=source.source.array)
+    rules = tune([Example(frames, source.labels, source.tare)])
+    assert rules["hit"] is not None
+    assert rules["hit"].labels == ("hit",)
     for wrong in ({"window_ms": -1.0}, {"noise_floor": -1.0}, {"labels": [3]}):
         with pytest.raises(ProblemError):
             tune([source], **wrong)

@@ -29,11 +29,13 @@ class Detector:
 
     #: What it is, in errors.
     _WHAT: ClassVar[str]
-    #: Checks the text of its file, and returns it with every default filled in.
-    _check: ClassVar[Callable[[str], str]]
-
     _text: str
     _parts: dict[str, Any]
+
+    @staticmethod
+    def _check(text: str) -> str:
+        """Check the text of its file, and return it with every default filled in."""
+        raise NotImplementedError
 
     @property
     def array(self) -> Array | None:

@@ -74,7 +74,6 @@ class PlainRule(Detector):
     """
 
     _WHAT = "plain rule"
-    _check = staticmethod(_core.check_plain_rule)
 
     def __init__(
         self,
@@ -105,6 +104,10 @@ class PlainRule(Detector):
                 )
             )
         )
+
+    @staticmethod
+    def _check(text: str) -> str:
+        return _core.check_plain_rule(text)
 
     @property
     def quantity(self) -> str:

@@ -86,7 +86,6 @@ class Readout(Detector):
     """
 
     _WHAT = "readout"
-    _check = staticmethod(_core.check_readout)
 
     def __init__(
         self,
@@ -124,6 +123,10 @@ class Readout(Detector):
             )
         )
         self._hold(made)
+
+    @staticmethod
+    def _check(text: str) -> str:
+        return _core.check_readout(text)
 
     @property
     def encoder(self) -> Encoder:
@@ -325,9 +328,7 @@ def run(
         source = recorded(source)
     if isinstance(source, SpikeTrains):
         if not isinstance(readout, Readout):
-            raise ProblemError(
-                f"source is {shown(source)}: a plain rule reads a recording, taxel.Events or taxel.Frames"
-            )
+            raise ProblemError(f"source is {shown(source)}: a plain rule reads a recording, events or frames")
         return _run_spikes(readout, source)
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1

@@ -5,9 +5,9 @@ use rand::{Rng, SeedableRng};
 
 use super::*;
 use crate::detect::Detector;
-use crate::encode::ContactArea;
+use crate::encode::{ContactArea, Zeroing};
 use crate::neuron::Neuron;
-use crate::{Events, Intensities};
+use crate::{Events, Intensities, Stop};
 
 fn readout() -> Readout {
     let neuron = Neuron { tau: 0.5, time: Time::Grid, step_ms: 0.192, ..Neuron::default() };
