@@ -51,7 +51,8 @@ def test_a_rule_detects_live_what_it_detects_in_the_recording(rule: PlainRule, t
     live.stop()
     recorded = taxel.open(tmp_path / "rule.mcap")
     again = run(rule, recorded, tare=TARE)
-    assert again == run(rule, events, tare=TARE)
+    assert recorded.registers is not None
+    assert again == run(rule, events, frame_us=recorded.registers.frame_us, tare=TARE)
     assert len(again) == 6 * (2 if rule.age_ms is None else 1)
     for found in (heard(called), recorded.detections):
         # Nothing moved the time on after the last event.
@@ -64,7 +65,7 @@ def test_a_rule_detects_live_what_it_detects_in_the_recording(rule: PlainRule, t
 
 def test_in_silence_the_end_is_detected() -> None:
     events = touches(1)
-    with Live(0, host=LOOPBACK, array=SMALL, readout=PlainRule("area", 2, frames=20), tare=TARE) as live:
+    with Live(0, host=LOOPBACK, array=SMALL, readout=PlainRule("area", 2, frames=200), tare=TARE) as live:
         play(events, live.address[1])
         found = [live.next(30), live.next(30)]
     assert [one and one.label for one in found] == ["contact", "lift"]
@@ -84,8 +85,8 @@ def test_commands_take_a_rule_where_they_take_a_readout(tmp_path: Path, capsys: 
     truth.write_text("label,t_us\n" + "".join(f"contact,{t}\n" for t in found["contact"].t))
     report = tmp_path / "report"
     code, out, _ = call(
-        capsys, "detect", recording, "--readout", path, "--tare", tmp_path / "tare.json", "--truth", truth, "--report", report,
-        "--json",
+        capsys, "detect", recording, "--readout", path, "--tare", tmp_path / "tare.json", "--truth", truth,
+        "--report", report, "--json",
     )  # fmt: skip
     assert code == 0
     result = json.loads(out)

@@ -122,7 +122,7 @@ def _of_neuron(
 ) -> dict[str, Markup | None]:
     """Return the drawings of a label's neuron; a plain rule has none."""
     if isinstance(readout, PlainRule):
-        return {}
+        return {"potential": None, "weights": None}
     return {
         "potential": _drawn(_potential(readout, listened, label, moments)),
         "weights": _drawn(_weights(readout, listened[0], label)),
