@@ -21,10 +21,10 @@ from taxel.frames import Frames
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
-__all__ = ["Detector", "ReadoutStream", "detector", "read", "tare_text"]
+__all__ = ["ReadoutStream", "detector", "read", "tare_text"]
 
 
-class Detector:
+class _Detector:
     """What a readout and a plain rule have in common: a file, and a stream."""
 
     #: What it is, in errors.
@@ -147,7 +147,7 @@ class Detector:
     __hash__ = None  # type: ignore[assignment]
 
 
-_D = TypeVar("_D", bound=Detector)
+_D = TypeVar("_D", bound=_Detector)
 
 
 class ReadoutStream:
@@ -185,7 +185,7 @@ class ReadoutStream:
 
     def __init__(
         self,
-        readout: Detector,
+        readout: _Detector,
         array: Array | None = None,
         *,
         frame_us: float = FRAME_US,
@@ -268,9 +268,9 @@ class ReadoutStream:
         return {} if self._core is None else dict(self._core.potentials)
 
 
-def detector(name: str, value: object) -> Detector:
+def detector(name: str, value: object) -> _Detector:
     """Return a readout or a plain rule; refuse any other value."""
-    if not isinstance(value, Detector):
+    if not isinstance(value, _Detector):
         raise ProblemError(f"{name} is {shown(value)}: must be a taxel.Readout or taxel.detect.PlainRule")
     return value
 

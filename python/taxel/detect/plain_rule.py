@@ -9,7 +9,7 @@ from taxel import _core
 from taxel._base.arguments import instance, number, parameters, several, shown, text, whole
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect.detector import Detector
+from taxel.detect.detector import _Detector
 from taxel.tare import Tare
 
 __all__ = ["PlainRule"]
@@ -18,7 +18,7 @@ __all__ = ["PlainRule"]
 _USUAL = ("contact", "lift")
 
 
-class PlainRule(Detector):
+class PlainRule(_Detector):
     """Detect when the load on a sensor rises to a threshold, and when it is gone: what any training is held against.
 
     The sensor is loaded from the first of `frames` frames in a row in which the quantity is `threshold` or more, until

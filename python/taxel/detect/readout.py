@@ -14,7 +14,7 @@ from taxel import _core
 from taxel._base.arguments import floats, instance, number, parameters, shown, text, whole
 from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
-from taxel.detect.detector import Detector, detector, tare_text
+from taxel.detect.detector import _Detector, detector, tare_text
 from taxel.detect.exchange import Parts, read_nir, write_nir
 from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
@@ -41,7 +41,7 @@ class Learner(Protocol):
     weights_: NDArray[np.float64]
 
 
-class Readout(Detector):
+class Readout(_Detector):
     """Hold trained neurons with names, and the encoder that they were trained behind.
 
     Parameters
@@ -270,7 +270,7 @@ class Readout(Detector):
 
 
 def run(
-    readout: Detector,
+    readout: _Detector,
     source: Recording | Events | Frames | SpikeTrains,
     *,
     frame_us: float | None = None,

@@ -112,9 +112,10 @@ def tune(
     report = (lambda _: None) if progress is None else callback("progress", progress)
     names = sorted({name for one in sound for name in one.labels}) if labels is None else several("labels", labels)
     names = [text("labels", name) for name in names]
-    width_us = round(float(to_us(number("window_ms", window_ms, "ms"))))
-    if not 0 <= width_us <= 3_600_000_000:
-        raise ProblemError(f"window_ms is {window_ms}: must lie between 0 and 3600000")
+    width_ms = number("window_ms", window_ms, "ms")
+    if not 0.0 <= width_ms <= 3_600_000.0:
+        raise ProblemError(f"window_ms is {width_ms:g}: must lie between 0 and 3600000")
+    width_us = round(float(to_us(width_ms)))
     floor = number("noise_floor", noise_floor)
     if any(isinstance(one.source, SpikeTrains) for one in sound):
         return dict.fromkeys(names)

@@ -5,6 +5,7 @@ use rand::{Rng, SeedableRng};
 
 use super::*;
 use crate::detect::Detector;
+use crate::detect::detector::SILENCE_US;
 use crate::encode::{ContactArea, Zeroing};
 use crate::neuron::Neuron;
 use crate::{Events, Intensities, Stop};
