@@ -68,6 +68,7 @@ THOUSANDS = {
     "taxel.spikes.exchange": "NWB counts in seconds",
     "taxel.recording": "ns of the host's clock",
     "taxel.cli.emulate": "seconds; ns of the host's clock",
+    "taxel.cli.information": "seconds",
     "taxel.clock": "ns of the host, us of the board",
     "taxel.detect.exchange": "NIR counts in seconds and volts",
     "taxel.demo": "seconds, kbit/s, seeds",

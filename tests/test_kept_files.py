@@ -28,8 +28,10 @@ def test_a_recording_has_the_same_contents(ending, events):
 
 
 def test_a_tare_is_that_of_the_recording(events):
-    tare = taxel.Tare.load(KEPT / "tare.json")
-    assert tare == taxel.Tare.take(events, stop_us=1_500_000)
+    tare, again = taxel.Tare.load(KEPT / "tare.json"), taxel.Tare.take(events, stop_us=1_500_000)
+    assert np.array_equal(tare.rest, again.rest)
+    assert (tare.array, tare.start_us, tare.stop_us) == (again.array, again.start_us, again.stop_us)
+    assert np.isnan(tare.noise).all()  # it was saved before the noise was measured
 
 
 def test_a_readout_gives_the_same_detections(events):

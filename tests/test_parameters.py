@@ -7,7 +7,7 @@ import json
 import math
 import pickle
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -90,11 +90,13 @@ def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
     if "most" in rules:
         wrong.append(rules["most"] * 2 + 1 if rules["most_in"] else rules["most"])
     default = described(kind._kind)["defaults"].get(name)
-    whole = get_type_hints(kind)[name] in (int, int | None)
+    hint = get_type_hints(kind)[name]
+    whole = hint in (int, int | None)
+    entries = max(1, len(default)) if isinstance(default, list) else int(hint == Sequence[float] | None)
     for value in wrong:
         given = int(value) if whole and math.isfinite(value) else value
         with pytest.raises(taxel.ProblemError) as error:
-            make(kind, **{name: [given] * len(default) if isinstance(default, list) else given})
+            make(kind, **{name: [given] * entries if entries else given})
         assert name in str(error.value)
         assert "\n" not in str(error.value)
         if math.isfinite(value) and not (whole and value < 0):

@@ -64,7 +64,8 @@ def check(command: TyperGroup | TyperCommand, arguments: list[str], *, in_full: 
     if in_full:
         command.make_context("taxel", list(arguments))
     else:
-        options = {option for parameter in command.params for option in parameter.opts} | {"--help", "-h"}
+        every = {option for one in command.params for option in (*one.opts, *one.secondary_opts)}
+        options = every | {"--help", "-h"}
         assert {argument for argument in arguments if argument.startswith("-")} <= options, arguments
 
 

@@ -38,7 +38,8 @@ class Detection(NamedTuple):
     ----------
     label : str
     t : int, us
-        Time of the event by the board's clock: the crossing less the encoder's latency and the trained delay.
+        Time of the event by the board's clock: the crossing less the encoder's latency and the trained delay. Where the
+        recipe aligned its labels (`taxel.detect.Recipe`), the event is what the sensor felt of it.
     known : int, us
         Earliest time of detection: the end of the board's frame in which the potential crosses the threshold.
     slope : float, mV/ms
@@ -79,7 +80,7 @@ class Detections(Columns):
     ----------
     label : str, shape (n,), text
     t : int64, shape (n,), us
-        Time of the event: the crossing less the encoder's latency and the trained delay.
+        Time of the event: the crossing less the encoder's latency and the trained delay, as in `Detection`.
     known : int64, shape (n,), us
         Earliest time of detection: the end of the frame in which the potential crosses the threshold.
     slope : float, shape (n,), mV/ms, optional

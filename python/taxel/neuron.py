@@ -52,6 +52,11 @@ class Neuron(Value):
         with a maximum of 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential rises in jumps.
     tau_s : float, ms, above 0 and below `tau`, optional
         Synaptic time constant of the double exponential; default: ``tau / 4``.
+    rearm : float, above 0 and at most 1, optional
+        After a spike no further one until the potential was below `rearm` times the threshold at some grid point, the
+        threshold being the one in force there; default: no such condition. Only with `time` "grid". In the refractory
+        time the sum of the inputs is compared, as far as `after_spike` leaves any, with `rearm` times `theta_0`; with
+        "reset" nothing is left, so that the next point already fulfils the condition.
 
     Raises
     ------
@@ -87,6 +92,7 @@ class Neuron(Value):
     step_ms: float = _DEFAULT.step_ms
     kernel: Literal["alpha", "double_exponential", "exponential"] = _DEFAULT.kernel
     tau_s: float | None = _DEFAULT.tau_s
+    rearm: float | None = _DEFAULT.rearm
 
     _kind = "neuron"
 
@@ -97,9 +103,10 @@ class Neuron(Value):
         ----------
         weights : float64, shape (trains,), mV
         trains : SpikeTrains
-            Unsigned, or signed ones split into ON and OFF (`SpikeTrains.split_by_sign`).
+            Unsigned; graded, whose values multiply the weights; or signed ones split into ON and OFF
+            (`SpikeTrains.split_by_sign`).
         threshold : float, above 0
-            A factor on the threshold (a readout's `run_threshold`).
+            A factor on the threshold (a readout's `run_threshold`), and so on the potential that `rearm` stands for.
 
         Returns
         -------

@@ -25,7 +25,7 @@ __all__ = ["Tare"]
 
 
 class Tare:
-    """Hold the rest of each taxel: the time-weighted mean of its held values over an unloaded interval.
+    """Hold the rest of each taxel: the time-weighted mean of its held values over an unloaded interval, and its noise.
 
     Made by `Tare.take`, `Tare.load` or `Tare.from_json`. Measure it with the board's noise floor at 0; otherwise a rest
     is no more precise than the noise floor.
@@ -35,6 +35,9 @@ class Tare:
     array : Array
     rest : float64, shape (rows, columns), in the sensor's unit
         NaN for a taxel without any event.
+    noise : float64, shape (rows, columns), in the sensor's unit
+        The time-weighted standard deviation of each taxel's held values over the interval; NaN for a taxel without any
+        event, and for all in a tare that an older taxel saved.
     start_us, stop_us : int, us
         The interval.
     note : str
@@ -48,10 +51,13 @@ class Tare:
     Tare(1 of 1 taxels, 0 to 3000 us)
     >>> tare.rest
     array([[52.]])
+    >>> tare.noise.round(3)
+    array([[1.414]])
     """
 
     array: Array
     rest: NDArray[np.float64]
+    noise: NDArray[np.float64]
     start_us: int
     stop_us: int
     note: str
@@ -128,8 +134,8 @@ class Tare:
         tare._text = _core.check_tare(checked_text("tare", text))
         values: dict[str, Any] = json.loads(tare._text)
         tare.array = Array._from_geometry(values["array"])
-        tare.rest = np.array([np.nan if r is None else r for r in values["rest"]]).reshape(tare.array.shape)
-        tare.rest.setflags(write=False)
+        tare.rest = _of_taxels(values["rest"], tare.array)
+        tare.noise = _of_taxels(values.get("noise", [None] * len(values["rest"])), tare.array)
         tare.start_us, tare.stop_us, tare.note = values["start_us"], values["stop_us"], values["note"]
         return tare
 
@@ -193,3 +199,10 @@ class Tare:
         known = int(np.count_nonzero(~np.isnan(self.rest)))
         note = f", {self.note}" if self.note else ""
         return f"Tare({known} of {self.array.taxels} taxels, {self.start_us} to {self.stop_us} us{note})"
+
+
+def _of_taxels(values: list[float | None], array: Array) -> NDArray[np.float64]:
+    """Return values by taxel, NaN where there is none, which cannot be changed."""
+    held = np.array([np.nan if value is None else value for value in values], dtype=float).reshape(array.shape)
+    held.setflags(write=False)
+    return held

@@ -1,6 +1,6 @@
 """Touch learnt from labels alone: contact and lift, and which of two spheres fell (after thesis 5.6.2).
 
-No rule is written by hand: the recipe `touch` and the training of `taxel train` learn both questions from labelled
+No rule is written by hand: the recipe `touch_kind` and the training of `taxel train` learn both questions from labelled
 recordings of the emulated board. For comparison the best plain rule that we could think of and an LDA on frames around
 the touch run on the same scenes; for the spheres also an LDA on three numbers.
 """
@@ -39,7 +39,7 @@ WHERE = "after 5.6.2"
 PROTOCOL = (
     "Balls of 36 g, 50 and 70 mm across, fall on foam over the emulated board; heights (100 to 200 mm), places and "
     "foams are drawn by seed. The recordings and a table of labels are written to files, and read and learnt from "
-    "as `taxel train --recipe touch` does; the recipe was chosen on other seeds. Judged on other seeds, so other "
+    "as `taxel train --recipe touch_kind` does; the recipe was chosen on other seeds. Judged on other seeds, so other "
     "places. Two questions: contact and lift of every fall and bounce; which sphere, at its first contact. Beside "
     "the neuron: the best of some plain rules, chosen on the training scenes (loaded taxels for contact and lift; "
     "a threshold on area, total, peak or a ratio of them for the sphere), and a linear discriminant on the 16 x 16 "
@@ -170,7 +170,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         names = KINDS if params["question"] == "kind" else EVENTS
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # targets out of reach are counted below as missed
-            readout = train_readout([drop.example for drop in sets["train"]], Recipe.load("touch", labels=names))
+            readout = train_readout([drop.example for drop in sets["train"]], Recipe.load("touch_kind", labels=names))
         judge = _kinds if params["question"] == "kind" else _contacts
         return judge(params, readout, sets["train"], sets["test"])
 
@@ -433,7 +433,7 @@ def statements(p: Parameters, summary: Summary) -> list[Statement]:
 def tables(p: Parameters, summary: Summary) -> list[Table]:
     """List both questions by method."""
     del p
-    recipe = Recipe.load("touch", labels=EVENTS)
+    recipe = Recipe.load("touch_kind", labels=EVENTS)
     trained = " and ".join(f"{label} {recipe.learner_of(label)[1]:g} ms" for label in EVENTS)
     kinds = [(WAYS[way], *(f"{100 * share:.0f}" for share in summary["kinds"][way])) for way in WAYS]
     contacts = []

@@ -89,8 +89,9 @@ def test_scenes_come_back_from_their_files_with_their_labels(tmp_path) -> None:
 
 def test_the_recipe_is_chosen_for_events_and_has_a_neuron_for_every_label() -> None:
     events = taxel.Events([0], [0], [0], [1], array=taxel.Array(2, 2), intensity=[5])
-    assert recipes.fitting(events) == "touch"
-    recipe = Recipe.load("touch", labels=["contact", "Lift", "ball"])
+    labels = ["contact", "Lift", "ball"]
+    assert recipes.fitting(events, labels) == "touch_kind"
+    recipe = Recipe.load("touch_kind", labels=labels)
     assert isinstance(recipe.encoder, taxel.encode.Moments)
     assert recipe.encoder.displacement_mm is None
     assert [recipe.learner_of(label)[1] for label in ("contact", "Lift", "ball")] == [2.0, 4.0, 6.0]

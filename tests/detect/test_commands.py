@@ -360,10 +360,8 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     page = (tmp_path / "r" / "report.html").read_text()
     held, own = page.index("On held-out data"), page.index("On its own training data")
     assert page.count("9.npz</td>", held, own) == page.count("9.npz</td>", own, page.index("The worst")) == 2
-    assert "on held-out data: whole recordings, 3 folds" in out
+    assert out.startswith("held out: whole recordings, 3 folds (window 50 ms)\n")
     assert "contact, chosen: tau 1.5" in out
-    code, out, _ = call(capsys, *arguments, "-o", tmp_path / "d.json")
-    assert "on its own training data" in out
 
 
 def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:
@@ -423,7 +421,8 @@ def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_pa
     assert code == 0
     files = [trials / f"t{k}.npz" for k in range(4)]
     listed = tmp_path / "b.json"
-    code, said, _ = call(capsys, "train", *files, "--labels", trials / "labels.csv", "-o", listed, "--json", *plain)
+    table = ("--labels", trials / "labels.csv", "--folds", 0)
+    code, said, _ = call(capsys, "train", *files, *table, "-o", listed, "--json", *plain)
     assert code == 0
     assert json.loads(said)["judged_on"] == "its own training data"
     assert json.loads(said)["score"]["found"] == 4

@@ -208,6 +208,17 @@ def test_a_graph_without_an_encoder_asks_for_one(tmp_path: Path) -> None:
     assert taxel.Readout.from_nir(tmp_path / "a.nir", encoder=ENCODER).neurons["output 0"].neuron.tau == 10.0
 
 
+def test_graded_spikes_are_refused(tmp_path: Path) -> None:
+    encoder = taxel.encode.Moments(levels=1, graded=True)
+    graded = taxel.Readout(encoder, {"a": (taxel.Neuron(), np.zeros(encoder.trains(taxel.Array(2, 2))))})
+    with refused("NIR takes no graded trains: .* those of moments have"):
+        graded.to_nir(tmp_path / "a.nir")
+    assert not (tmp_path / "a.nir").exists()
+    nir.write(tmp_path / "a.nir", graph_of())
+    with refused("NIR takes no graded trains"):
+        taxel.Readout.from_nir(tmp_path / "a.nir", encoder=encoder)
+
+
 def test_another_file_is_one_error(tmp_path: Path) -> None:
     (tmp_path / "a.nir").write_text("nothing of the kind")
     with pytest.raises(taxel.FormatError, match=r"a\.nir: no NIR graph"):

@@ -10,6 +10,7 @@ from test_readout import recipe, tare, touches
 import taxel
 from taxel.detect import Example, Fold, Part, Score, choose, judge, run, score, train
 from taxel.detect.folds import _folds as folds
+from taxel.detect.folds import count_of_folds
 
 
 def examples(*seeds: int) -> list[Example]:
@@ -48,6 +49,43 @@ def test_of_one_recording_each_event_is_judged_once_by_what_never_heard_it(k: in
     assert judged.together.missed == 0
 
 
+def labelled(*counts: dict[str, int], gap_us: int = 200_000) -> list[Example]:
+    """Give examples with so many labels each, one label name after the other in turn."""
+    made = []
+    for names in counts:
+        times: dict[str, list[int]] = {name: [] for name in names}
+        for k in range(max(names.values(), default=0)):
+            for n, name in enumerate(names):
+                if k < names[name]:
+                    times[name].append(k * gap_us + n * 20_000)
+        spikes = taxel.SpikeTrains.from_lists([[]], stop=1e9)
+        made.append(Example(spikes, {name: np.array(t, np.int64) for name, t in times.items()}))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("examples", "count", "why"),
+    [
+        (labelled({"contact": 25, "lift": 25}), 5, ""),
+        (labelled({"contact": 25, "lift": 25}, gap_us=3_600_000_000), 5, ""),
+        (labelled({"contact": 25, "lift": 7}), 3, ""),
+        (labelled({"contact": 60, "lift": 7}), 0, "every lift is in one stretch of the recording"),
+        (labelled({"contact": 4}), 2, ""),
+        (labelled({"contact": 3}), 0, "of contact there are 3, and two folds need 4"),
+        (labelled({"contact": 20, "ball": 1}), 0, "of ball there is 1, and two folds need 4"),
+        (labelled(*[{"contact": 3, "lift": 3}] * 9), 5, ""),
+        (labelled(*[{"contact": 9}] * 3), 3, ""),
+        (labelled({"contact": 2}, {"contact": 2}, {}), 2, ""),
+        (labelled({"contact": 9, "lift": 9}, {"contact": 9}), 0, "every lift is in one recording"),
+        (labelled({"contact": 1}, {"contact": 2}), 0, "of contact there are 3, and two folds need 4"),
+    ],
+)
+def test_folds_are_as_many_as_recordings_and_the_rarest_label_allow(
+    examples: list[Example], count: int, why: str
+) -> None:
+    assert count_of_folds(examples) == (count, why)
+
+
 def test_a_point_that_finds_nothing_is_not_chosen() -> None:
     plan = recipe()
     neurons = {
@@ -74,6 +112,17 @@ def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
         assert said.startswith(f"{label}: {count} of {count} events are out of reach")
         assert f"({first:.10g} ms of example 0, " in said
         assert "pattern" not in said
+
+
+def test_a_point_that_the_labels_do_not_allow_is_not_chosen() -> None:
+    """Two labels lie within its refractory time."""
+    plan = recipe()
+    neurons = {label: {**own, "search": [{"refractory": 9000.0}]} for label, own in plan.neurons.items()}
+    best = choose(examples(1, 2), dataclasses.replace(plan, neurons=neurons), window_ms=10.0)
+    assert best.neurons == {label: dict(own) for label, own in plan.neurons.items()}
+    first = {label: {**own, "refractory": 9000.0, "search": [dict(own)]} for label, own in plan.neurons.items()}
+    with pytest.raises(taxel.ProblemError, match=r"contact: pattern 0, target 1 .* inside the refractory"):
+        choose(examples(1, 2), dataclasses.replace(plan, neurons=first))
 
 
 def test_the_first_of_equal_points_is_kept() -> None:

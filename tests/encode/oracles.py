@@ -180,8 +180,8 @@ def moment_levels(levels, **ranges):
     return every
 
 
-def moments(t, pictures, rest, end, floor, pitch, every, tonic=None):
-    """Crossings of the levels in `every`, and tonic spikes (us) up to `end`."""
+def moment_values(pictures, rest, floor, pitch):
+    """Area, total, peak, and the displacement of the centre in x and in y, of each picture."""
     values, origin = [], None
     for picture in pictures.astype(np.float64):
         there = counted(picture, rest, floor)
@@ -193,7 +193,28 @@ def moments(t, pictures, rest, end, floor, pitch, every, tonic=None):
         y, x = ndimage.center_of_mass(above)
         origin = (x, y) if origin is None else origin
         values.append([there.sum(), above.sum(), above.max(), (x - origin[0]) * pitch, (y - origin[1]) * pitch])
-    spikes, values = [], np.array(values)
+    return np.array(values)
+
+
+def sampled_moments(t, values, shown, ages, first):
+    """A spike of each of the moments `shown` at each sample, and one of the largest age (us) that a touch has reached.
+
+    Trains are numbered from `first`; values are rounded to float32.
+    """
+    spikes, onset = [], None
+    for time, sample in zip(t, values, strict=True):
+        onset = None if sample[0] == 0 else time if onset is None else onset
+        for n, moment in enumerate(shown):
+            value = np.float32(np.sign(sample[moment]) * np.log1p(abs(sample[moment])))
+            spikes += [(time, first + n, value)] if value else []
+        reached = [] if onset is None else [k for k, age in enumerate(ages) if age <= time - onset]
+        spikes += [(time, first + len(shown) + reached[-1], np.float32(1))] if reached else []
+    return spikes
+
+
+def moments(t, pictures, rest, end, floor, pitch, every, tonic=None):
+    """Crossings of the levels in `every`, and tonic spikes (us) up to `end`."""
+    spikes, values = [], moment_values(pictures, rest, floor, pitch)
     for n, (moment, at) in enumerate(every):
         reached = values[:, moment] >= at if at > 0 else values[:, moment] <= at
         begin = None

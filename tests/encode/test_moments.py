@@ -33,6 +33,15 @@ EXAMPLES = {
         period_ms=0.3,
         tare=rest(scenes.ARRAY),
     ),
+    "moments, graded": Moments(
+        levels=2,
+        **RANGES | {"displacement_mm": None},
+        tonic_ms=0.7,
+        graded=True,
+        ages_ms=[0.0, 0.4, 2.0],
+        period_ms=0.3,
+        tare=rest(scenes.ARRAY),
+    ),
 }
 
 
@@ -40,8 +49,11 @@ def turned(encoder):
     """The trains as they stand on an array that is turned by half a turn: right is left and down is up."""
     ways = sum(getattr(encoder, name) is not None for name in ("area", "total", "peak"))
     order = [*range(ways), ways + 1, ways, ways + 3, ways + 2]
-    parts = np.arange(encoder.trains(scenes.ARRAY)).reshape(-1, len(order), encoder.levels)
-    return parts[:, order].ravel()
+    order = order if encoder.displacement_mm else order[:ways]
+    trains, levels = np.arange(encoder.trains(scenes.ARRAY)), len(order) * encoder.levels
+    parts = trains[: levels * (3 if encoder.tonic_ms else 2)].reshape(-1, len(order), encoder.levels)
+    # The sampled moments and ages of the examples do not depend on directions.
+    return np.concatenate([parts[:, order].ravel(), trains[parts.size :]])
 
 
 def some_rest(rng, array, unknown=0.1):
@@ -79,6 +91,90 @@ def test_moments_are_those_of_numpy_and_scipy(seed, levels, left_out, floor, ton
     wanted = oracles.moments(t.tolist(), pictures, tare.rest, int(t[-1]), floor, 2.67, every, tonic)
     assert spikes_of(spikes) == wanted
     assert wanted
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    levels=st.sampled_from([0, 1, 3]),
+    left_out=st.sets(st.sampled_from(sorted(RANGES)), max_size=3),
+    tonic=st.sampled_from([None, 300, 7000]),
+    graded=st.booleans(),
+    ages=st.lists(st.integers(0, 30_000), max_size=6, unique=True).map(sorted),
+)
+def test_sampled_moments_and_ages_are_those_of_numpy(seed, levels, left_out, tonic, graded, ages):
+    if not (graded or ages):
+        ages = [0]
+    rng = np.random.default_rng(seed)
+    array = Array(5, 7, 2.67)
+    tare = some_rest(rng, array)
+    t = 77 + np.cumsum(rng.choice([192, 100, 3333], 150))
+    pictures = wander(rng, 150, 35).reshape(150, 5, 7).astype(np.float32)
+    pictures[rng.random(150) < 0.1] = 40  # touches end and new ones begin
+    ranges = {name: None if name in left_out else of for name, of in RANGES.items()}
+    options = {"levels": levels, "tonic_ms": None if tonic is None else tonic / 1000, "tare": tare, **ranges}
+    encoder = Moments(graded=graded, ages_ms=[age / 1000 for age in ages] or None, **options)
+    spikes = encoder.encode(Frames(pictures, t, unit="ticks", array=array))
+    assert spikes.kind == encoder.kind == ("graded" if graded else "unsigned")
+    every = oracles.moment_levels(levels, **ranges)
+    first = len(every) * (2 if tonic is None else 3)
+    shown = [n for n, name in enumerate(["area", "total", "peak", *["displacement_mm"] * 2]) if ranges[name] and graded]
+    assert len(spikes) == encoder.trains(array) == first + len(shown) + len(ages)
+    values = oracles.moment_values(pictures, tare.rest, 3.0, 2.67)
+    wanted = oracles.sampled_moments(t.tolist(), values, shown, ages, first)
+    assert [spike for spike in spikes_of(spikes) if spike[1] < first] == oracles.moments(
+        t.tolist(), pictures, tare.rest, int(t[-1]), 3.0, 2.67, every, tonic
+    )
+    found = sorted(spike for spike in spikes_of(spikes) if spike[1] >= first)
+    assert [spike[:2] for spike in found] == [spike[:2] for spike in sorted(wanted)]
+    assert np.allclose([s[2] for s in found], [s[2] for s in sorted(wanted)], rtol=1e-6, atol=0)
+    assert wanted
+
+
+def test_moments_of_events_are_sampled_every_period_from_the_first_stamp_on():
+    tare = rest(Array(1, 3), 50)
+    events = taxel.Events(
+        [1000, 1000, 1000, 1750, 1750, 4100, 4100],
+        [0, 1, 2, 0, 1, 0, 1],
+        [0] * 7,
+        [True] * 5 + [False] * 2,
+        intensity=[50, 50, 50, 60, 57, 50, 50],
+        array=Array(1, 3),
+    )
+    options = {"levels": 0, "area": None, "peak": None, "displacement_mm": None, "period_ms": 0.5}
+    spikes = Moments(**options, graded=True, ages_ms=[0.5, 1.2], tare=tare).encode(events)
+    assert [train.tolist() for train in spikes] == [[2.0, 2.5, 3.0, 3.5, 4.0], [2.5, 3.0], [3.5, 4.0]]
+    assert spikes.values.tolist() == pytest.approx([np.log1p(17)] * 5 + [1.0] * 4)
+    unsigned = Moments(**options, ages_ms=[0.5, 1.2], tare=tare).encode(events)
+    assert (unsigned.kind, list(map(len, unsigned))) == ("unsigned", [2, 2])
+
+
+def test_the_options_are_off_by_default_and_leave_json_as_it_was():
+    plain = Moments(tare=rest(ARRAY))
+    assert not {"graded", "ages_ms"} & json.loads(plain.to_json()).keys()
+    assert taxel.encode.Encoder.from_json(plain.to_json()) == plain
+    both = Moments(graded=True, ages_ms=[1.0, 2.0], tare=rest(ARRAY))
+    assert taxel.encode.Encoder.from_json(both.to_json()) == both
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"ages_ms": []}, "ages_ms is empty"),
+        ({"ages_ms": [-1.0]}, r"ages_ms\[0\] is -1"),
+        ({"ages_ms": [1.0, float("nan")]}, r"ages_ms\[1\]"),
+        ({"ages_ms": [2.0, 1.0]}, r"ages_ms\[1\]: must be a us or more above the one before"),
+        ({"ages_ms": [1.0, 1.0001]}, r"ages_ms\[1\]: must be a us or more"),
+        ({"ages_ms": 3.0}, "ages_ms"),
+        ({"graded": 2}, "graded"),
+        ({"levels": 0}, "levels is 0, and neither graded nor ages_ms is given"),
+        ({"graded": True} | dict.fromkeys(RANGES), "all left out"),
+        ({"graded": True, "ages_ms": [1.0]} | dict.fromkeys(RANGES), "all left out"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(options, text):
+    with refused(text):
+        Moments(**options).to_json()
 
 
 def bump(x, y, height=60.0, shape=(16, 24)):
@@ -158,7 +254,7 @@ def test_it_begins_settled():
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"levels": 0}, "levels is 0: must be from 1 to 1000"),
+        ({"levels": 1001}, "levels is 1001: must be from 0 to 1000"),
         ({"levels": 2.5}, "levels is 2.5: must be a whole number"),
         ({"area": (0, 5)}, r"area\[0\] is 0: must be above 0"),
         ({"total": (5, 5)}, "total is 5 to 5"),

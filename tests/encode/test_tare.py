@@ -17,7 +17,7 @@ from .scenes import spikes_of, touch
 
 @settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), start=st.sampled_from([None, 0, 1_234_567, 1_240_000]))
-def test_a_rest_is_the_mean_by_time_of_the_held_value(seed, start):
+def test_rest_and_noise_are_mean_and_deviation_by_time_of_the_held_value(seed, start):
     rng = np.random.default_rng(seed)
     array = Array(3, 4)
     events = touch(rng, array, 100)
@@ -31,8 +31,12 @@ def test_a_rest_is_the_mean_by_time_of_the_held_value(seed, start):
             time = np.diff(edges)
             if time.sum() == 0:
                 assert np.isnan(tare.rest[y, x])
+                assert np.isnan(tare.noise[y, x])
             else:
-                assert tare.rest[y, x] == pytest.approx((events.intensity[at] * time).sum() / time.sum())
+                rest = np.average(events.intensity[at], weights=time)
+                assert tare.rest[y, x] == pytest.approx(rest)
+                noise = np.sqrt(np.average((events.intensity[at] - rest) ** 2, weights=time))
+                assert tare.noise[y, x] == pytest.approx(noise, abs=1e-9)
 
 
 def test_frames_and_events_of_the_same_values_have_the_same_rest():
@@ -59,6 +63,11 @@ def test_a_saved_tare_comes_back(tmp_path):
     with pytest.raises(FileExistsError):
         tare.save(place)
     tare.save(place, overwrite=True)
+
+
+def test_noise_is_exact_far_from_0():
+    pictures = 3e7 + np.array([0, 2] * 5)[:, None, None] * np.ones((1, 2))
+    assert Tare.take(Frames(pictures, 100 * np.arange(10))).noise == pytest.approx(np.full((1, 2), 1.0), rel=0.01)
 
 
 def test_a_taxel_that_does_not_exist_has_no_rest():
@@ -90,6 +99,14 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
         (
             lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace("[5.0]", "[5.0, 6.0]")),
             "2 rests for 1 x 1 taxels",
+        ),
+        (
+            lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace('"noise":[0.0]', '"noise":[0.0, 6.0]')),
+            "noise of 2 taxels for 1 x 1",
+        ),
+        (
+            lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace('"noise":[0.0]', '"noise":[-1.0]')),
+            "noise of taxel 0 must be 0 or more",
         ),
     ],
 )

@@ -126,7 +126,10 @@ def test_inner_products_by_bins_are_those_of_whole_rasters(tau):
     windows = [4_000.0, 20_000.0, 50_000.0, 200_000.0]
     for window, gram in zip(windows, event_grams(spikes, windows, tau), strict=True):
         assert np.allclose(gram, grams_by_hand(spikes, window, tau), atol=1e-4)
-    assert features(spikes, 200_000.0) <= taxels * 20
+    for window, size in zip(windows, features(spikes, windows), strict=True):
+        bins = spikes.bins_to(window)
+        rows = zip(spikes.trial, spikes.taxel, spikes.bin, strict=True)
+        assert size == max(1, len({(x, b) for k, x, b in rows if b < bins[k]}))
 
 
 def test_pictures_are_taken_at_the_times_of_the_events():
@@ -212,6 +215,31 @@ def test_order_is_known_at_a_fast_period_and_lost_at_a_slow_one(answered):
     assert answered.cheapest.kbps < answered.full.kbps
     assert answered.zero.level < 0.15
     assert answered.classifiers["neighbours"].bits > 0.9
+
+
+def test_progress_is_in_proportion_to_the_expected_time_and_settings_are_told_as_they_are_done():
+    steps, told = [], []
+    found = answer(
+        trials_of(60),
+        encoder=ENCODER,
+        window_ms=60,
+        windows_ms=[10],
+        periods_ms=[1, 10],
+        taxels=[1],
+        pools=[2],
+        draws=3,
+        shuffles=4,
+        classifiers=["neighbours", "tempotron"],
+        progress=lambda what, done, of: steps.append((what, done, of)),
+        watch=lambda *point: told.append(point),
+    )
+    assert steps[0][1] == 0
+    assert len({of for _, _, of in steps}) == 1
+    done = [one for _, one, _ in steps]
+    assert done == sorted(done)
+    assert 0.8 * steps[0][2] < done[-1] <= steps[0][2]  # what is counted beforehand is what is done, but for the last
+    assert [point[:2] for point in told] == [(1, 10), (1, 60), (10, 10), (10, 60)] * 3
+    assert {point[:2]: point[2] for point in told} == {(p.period_ms, p.window_ms): p.found.bits for p in found.points}
 
 
 def test_pictures_and_controls_stand_beside_it(answered):

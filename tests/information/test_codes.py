@@ -141,3 +141,24 @@ def test_what_makes_no_sense_is_said(call, said):
     with refused(said) as error:
         call()
     assert isinstance(error.value, taxel.Error)
+
+
+@pytest.mark.parametrize("code", [RateCode, FirstSpikeLatency, RelativeLatency, RankOrder])
+def test_graded_trains_are_refused_by_name(code):
+    graded = SpikeTrains.from_lists([[1.0]], stop=10.0, values=[[2.0]], kind="graded")
+    with refused(f"^{code.__name__} takes no graded trains"):
+        code(window_ms=10.0).decode(graded)
+    with refused(f"^{code.__name__} takes no graded trains"):
+        compare_codes([graded] * 8, ["soft", "hard"] * 4, {"one": code(window_ms=10.0)})
+
+
+@pytest.mark.parametrize("readout", [taxel.information.ConeRReadout, taxel.information.TempotronReadout])
+def test_readouts_of_classes_refuse_graded_trains_by_name(readout):
+    graded, plain = (
+        [SpikeTrains.from_lists([[1.0 + k], [2.0]], stop=10.0, values=values, kind=kind) for k in range(4)]
+        for values, kind in (([[2.0], [1.0]], "graded"), (None, None))
+    )
+    one = readout().fit(plain, [0, 0, 1, 1])
+    for call in (lambda: readout().fit(graded, [0, 0, 1, 1]), lambda: one.predict(graded)):
+        with refused(f"^{readout.__name__} takes no graded trains"):
+            call()

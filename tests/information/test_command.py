@@ -1,6 +1,7 @@
 """`taxel information`, as a lab would use it."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from typer.testing import CliRunner
 
 import taxel
 from taxel import ProblemError
-from taxel.cli import app
+from taxel.cli import app, main
+from taxel.cli._bar import bar, duration
 from taxel.information import read_trials
 from taxel.labels import beside, write_labels
 
@@ -52,6 +54,33 @@ def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
     again = run(recording, "--labels", labels, *QUICK, "--report", page)
     assert isinstance(again.exception, FileExistsError)
     assert page.read_text() == text
+
+
+def test_the_expected_time_stands_first_and_a_bar_shows_what_is_left(tmp_path, monkeypatch, capsys):
+    recording, labels = folder(tmp_path, 60)
+    asked = ["information", *map(str, (recording, "--labels", labels, *QUICK, "--overwrite"))]
+    report = ["--report", str(tmp_path / "page.html")]
+    with pytest.raises(SystemExit):
+        main([*asked, *report])
+    told = capsys.readouterr().err
+    assert re.fullmatch(r"60 trials: about \d+ s on an idle processor; Ctrl-C prints what is known by then\n", told)
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")  # as a terminal
+    with pytest.raises(SystemExit):
+        main([*asked, *report])
+    assert "drawing" in capsys.readouterr().err
+    with bar(quiet=False) as update:
+        update("reading", 0, 0)
+        update("1 ms", 0, 40)
+        update("2 ms", 10, 40)
+    assert re.search(r"2 ms .*\d s left", capsys.readouterr().err)
+    with pytest.raises(SystemExit):
+        main([*asked, *report, "--json"])
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.2, "1 s"), (99, "99 s"), (150, "2 min"), (9000, "2.5 h")])
+def test_a_time_is_told_in_words(seconds, text):
+    assert duration(seconds) == text
 
 
 def test_json_holds_all_figures(tmp_path):

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import taxel
 from taxel.information import Estimate, estimate, folds, keeps, zero_test
@@ -67,8 +69,44 @@ def test_several_draws_are_averaged():
     labels = np.repeat([0, 1], 30)
     one, other = np.where(np.arange(60) % 5 == 0, 1 - labels, labels), labels
     both = estimate(labels, [one, other])
-    assert both.bits == pytest.approx((estimate(labels, one).bits + estimate(labels, other).bits) / 2)
+    assert both.bits == both.corrected  # 0.64, of 0.27 and, before it is held, 1.01
+    assert both.corrected == pytest.approx((estimate(labels, one).corrected + estimate(labels, other).corrected) / 2)
     assert both.counts.shape == (2, 2, 2)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(2, 5), st.integers(2, 30), st.integers(1, 4), st.floats(0, 1), st.booleans(), st.integers(0, 999))
+def test_bits_lie_within_zero_and_the_labels_entropy_and_in_their_interval(
+    classes, trials, draws, right, grouped, seed
+):
+    random = np.random.default_rng(seed)
+    labels = np.concatenate([[0, 1], random.integers(0, classes, trials)])
+    said = np.where(
+        random.random((draws, len(labels))) < right, labels, random.integers(0, classes, (draws, len(labels)))
+    )
+    groups = random.integers(0, 4, len(labels)) if grouped else None
+    found = estimate(labels, said, groups=groups, redraws=20, seed=seed)
+    assert 0 <= found.bits <= found.most
+    assert found.bits == np.clip(found.corrected, 0, found.most)
+    assert 0 <= found.interval[0] <= found.bits <= found.interval[1] <= found.most
+    listed = found.to_dict()
+    assert listed["interval"][0] <= listed["bits"] <= listed["interval"][1] <= listed["most"]
+    assert listed["corrected"] == round(found.corrected, 4)
+
+
+def test_draws_are_averaged_before_they_are_held():
+    """Each draw held by itself would read too high near 0."""
+    random = np.random.default_rng(1)
+    labels = np.repeat([0, 1], 30)
+    nothing = [estimate(labels, said, redraws=2) for said in random.integers(0, 2, (40, 60))]
+    unheld = [one.corrected for one in nothing]
+    assert min(unheld) < 0 < max(unheld)
+    together = estimate(labels, [random.permutation(labels) for _ in range(40)], redraws=2)
+    assert together.bits == pytest.approx(0, abs=0.005)
+    assert np.mean([estimate(labels, random.permutation(labels), redraws=2).bits for _ in range(40)]) > 0.005
+    one = estimate(labels, labels, redraws=2)
+    assert one.corrected == pytest.approx(1 + 1 / (2 * 60 * np.log(2)))  # one response a label, two in all
+    assert one.bits == one.most == 1.0
 
 
 def test_shuffling_tells_something_from_nothing():

@@ -2,11 +2,19 @@
 
 import importlib
 import os
+import re
 import subprocess
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
+
+import taxel
+from taxel.cli import main
+
+from .touches import folder
 
 estimating = importlib.import_module("taxel.information.estimate")
 
@@ -60,3 +68,70 @@ def test_units_that_are_redrawn_in_pieces_are_those_of_one_call(monkeypatch: pyt
         monkeypatch.setattr(estimating, "_DRAWN", piece)
         found = estimating._redrawn(np.random.default_rng(units), units, 4)
         assert (found == np.random.default_rng(units).multinomial(units, np.full(units, 1 / units), size=4)).all()
+
+
+STOPPED = """
+import os, signal, sys, time
+import taxel.information
+from taxel.cli import main
+
+asked, done, stopped = taxel.information.answer, [], []
+
+def counted(*trials, watch, **ask):
+    def stop(*point):
+        watch(*point)
+        done.append(point)
+        if len(done) == int(sys.argv[1]):
+            stopped.append(time.process_time())
+            os.kill(os.getpid(), signal.SIGINT)
+    return asked(*trials, watch=stop, **ask)
+
+taxel.information.answer = counted
+try:
+    main(sys.argv[2:])
+finally:
+    print(time.process_time() - stopped[0])
+"""
+
+
+def stopped(place: Path, *, after: int, more: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
+    """Run the command on made touches, and send it SIGINT when so many settings are done."""
+    recording, labels = folder(place, 60)
+    asked = ["--window-ms", "60", "--windows", "10", "--periods", "1,10", "--draws", "3", "--taxels", "1"]
+    command = ["information", str(recording), "--labels", str(labels), *asked, *more]
+    script = [sys.executable, "-c", STOPPED, str(after), *command, "--report", str(place / "page.html")]
+    return subprocess.run(script, capture_output=True, text=True, check=False, timeout=300)
+
+
+def test_ctrl_c_ends_the_command_soon_with_the_bits_so_far(tmp_path: Path) -> None:
+    ended = stopped(tmp_path, after=5)  # the first draw has two periods to two windows
+    assert ended.returncode == 130, ended.stderr
+    assert float(ended.stdout) < SOON_S
+    line = ended.stderr.splitlines()[-1]
+    assert line.startswith(
+        "stopped; bits of 1 to 2 of 3 draws, without intervals: 1 ms: 1.00 to 10 ms, 1.00 to 60 ms; "
+    )
+    assert re.fullmatch(r".*; 10 ms: 0\.\d\d to 10 ms, 0\.\d\d to 60 ms", line)
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_ctrl_c_says_the_same_beside_json(tmp_path: Path) -> None:
+    ended = stopped(tmp_path, after=1, more=["--json"])
+    assert ended.returncode == 130
+    expected = "stopped; bits of 1 of 3 draws, without intervals: 1 ms: 1.00 to 10 ms"
+    assert ended.stderr.splitlines() == [expected]
+
+
+def test_ctrl_c_before_any_setting_is_done_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, labels = folder(tmp_path, 20)
+
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(taxel.information, "answer", stop)
+    with pytest.raises(SystemExit) as ended:
+        main(["information", str(recording), "--labels", str(labels), "--window-ms", "60"])
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "stopped; no setting is done yet\n"

@@ -32,7 +32,8 @@ class Simulated:
 
     def __init__(self, neuron, weights, pattern):
         self.neuron, self.pattern = neuron, pattern
-        pairs = [(float(t), float(w)) for train, w in zip(pattern, weights, strict=True) for t in train]
+        values = np.ones(len(pattern.times)) if pattern.values is None else pattern.values.astype(float)
+        pairs = list(zip(pattern.times, values * np.repeat(weights, pattern.counts), strict=True))
         self.times = np.array([t for t, _ in sorted(pairs)])
         self.weights = np.array([w for _, w in sorted(pairs)])
         self.fired = []

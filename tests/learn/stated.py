@@ -21,9 +21,17 @@ def row(cone, pattern, t, fired):
     """The coefficients of the potential at t."""
     out = np.zeros(len(pattern))
     for n, train in enumerate(pattern):
-        heard = [s for s in train[train < t] if counts(cone, s, fired)]
-        out[n] = kernel(cone.neuron_, t - np.array(heard)).sum()
+        values = values_of(pattern, n)
+        heard = [(s, v) for s, v in zip(train, values, strict=True) if s < t and counts(cone, s, fired)]
+        times, values = np.array(heard).reshape(-1, 2).T
+        out[n] = values @ kernel(cone.neuron_, t - times)
     return out
+
+
+def values_of(pattern, n):
+    """The values of a train's spikes, 1 of unsigned ones."""
+    own = slice(pattern.offsets[n], pattern.offsets[n + 1])
+    return np.ones(len(pattern[n])) if pattern.values is None else pattern.values[own].astype(float)
 
 
 def threshold(cone, t, fired, start):
@@ -75,6 +83,14 @@ def shares(cone, rows):
     if cone.divide_b_by == "targets":
         largest[2] = len(rows[0])
     return np.array(cone.lambdas) / max(np.sum(cone.lambdas), 1e-300) / largest
+
+
+def graded(patterns, seed, values=lambda random, n: random.choice([-1, 1], n) * 10 ** random.uniform(-1, 1, n)):
+    """The same patterns with a value a spike."""
+    random = np.random.default_rng(seed)
+    return [
+        SpikeTrains(p.times, p.offsets, p.start, p.stop, values(random, len(p.times)), kind="graded") for p in patterns
+    ]
 
 
 def examples(seed, trains=20, patterns=2, targets=2, duration=120.0, whole_ms=False, apart=8.0, spikes=4, first=25.0):

@@ -27,8 +27,8 @@ def examples(seed, trains=14, *shape, **options):
     return stated.examples(seed, trains, *shape, first=20.0, **options)
 
 
-def statement(cone, patterns, targets):
-    """Every coefficient of 6.12 to 6.14, one sum of kernels at a time."""
+def statement(cone, patterns, targets, windows=None):
+    """Every coefficient of 6.12 to 6.14, one sum of kernels at a time; silence is asked for in the windows alone."""
 
     def threshold(t, earlier, start):
         spike = earlier[-1] if len(earlier) else (start if cone.neuron_.first_threshold == "printed" else None)
@@ -39,17 +39,19 @@ def statement(cone, patterns, targets):
     def coefficients(pattern, t, earlier):
         row = np.zeros(len(pattern))
         for n, train in enumerate(pattern):
-            for s in train[train < t]:
+            for s, value in zip(train, stated.values_of(pattern, n), strict=True):
+                if s >= t:
+                    break
                 if cone.neuron_.after_spike == "reset" and len(earlier) and s <= earlier[-1] + cone.neuron_.refractory:
                     continue
                 if cone.neuron_.after_spike == "ignore" and any(e < s <= e + cone.neuron_.refractory for e in earlier):
                     continue
-                row[n] += kernel(cone.neuron_, t - s)
+                row[n] += value * kernel(cone.neuron_, t - s)
         return row
 
     delta = 0.1 * cone.neuron_.tau if cone.delta_t_ms is None else cone.delta_t_ms
     at, behind, theta, silent, limit = [], [], [], [], []
-    for pattern, wanted in zip(patterns, targets, strict=True):
+    for p, (pattern, wanted) in enumerate(zip(patterns, targets, strict=True)):
         for k, t in enumerate(wanted):
             at.append(coefficients(pattern, t, wanted[:k]))
             behind.append(coefficients(pattern, t + delta, wanted[:k]))
@@ -59,10 +61,20 @@ def statement(cone, patterns, targets):
             t = pattern.start + k * cone.neuron_.step_ms
             if any(e - 1e-9 <= t <= e + cone.neuron_.refractory + 1e-9 for e in wanted):
                 continue
+            asked = None if windows is None else windows[p]
+            if asked is not None and not any(a - 1e-9 <= t <= b + 1e-9 for a, b in asked):
+                continue
             earlier = [e for e in wanted if e < t]
             silent.append(coefficients(pattern, t, earlier))
             limit.append(threshold(t, earlier, pattern.start) - cone.margin)
-    return (np.array(v) for v in (at, behind, theta, silent, limit))
+    n = len(patterns[0])
+    at, behind, silent = (np.reshape(v, (len(v), n)) for v in (at, behind, silent))
+    return at, behind, np.array(theta), silent, np.array(limit)
+
+
+def short(sides, distances):
+    """The distances that count."""
+    return distances if sides == "both" else np.minimum(distances, 0.0)
 
 
 def terms(cone, rows, w):
@@ -71,8 +83,8 @@ def terms(cone, rows, w):
         [
             np.abs(w).sum(),
             np.linalg.norm(w) ** (2 if cone.norm == "square" else 1),
-            ((behind @ w - cone.kappa * theta) ** 2).sum(),
-            np.abs(at @ w - theta).sum(),
+            (short(cone.sides_b, behind @ w - cone.kappa * theta) ** 2).sum(),
+            np.abs(short(cone.sides_c, at @ w - theta)).sum(),
             np.maximum(silent @ w - limit, 0).sum(),
         ]
     )
@@ -83,8 +95,10 @@ def shares(cone, rows):
     most = np.maximum(np.abs(cone.lb), np.abs(cone.ub)) * np.ones(rows[0].shape[1])
     low, high = terms(cone, rows, -most), terms(cone, rows, most)
     largest = np.array([high[0], high[1], low[2], low[3], high[4]])
-    if cone.divide_b_by == "targets":
-        largest[2] = len(rows[0])
+    for k, by in enumerate((cone.divide_b_by, cone.divide_c_by, cone.divide_d_by)):
+        if by == "targets":
+            largest[2 + k] = len(rows[0]) if k < 2 else max(len(rows[0]), 1)
+    largest[largest == 0.0] = np.inf
     return np.array(cone.lambdas) / np.sum(cone.lambdas) / largest
 
 
@@ -93,9 +107,13 @@ def least(cone, rows):
     at, behind, theta, silent, limit = rows
     (k, n), m = at.shape, len(silent)
     c = shares(cone, rows)
-    scale = 1 / (c @ terms(cone, rows, np.zeros(n)))
+    costs = [c @ terms(cone, rows, np.clip(w, cone.lb, cone.ub) * np.ones(n)) for w in (0.0, np.inf)]
+    scale = 1 / (costs[0] or costs[1] or 1.0)
     c = c * scale
-    # variables: w, a >= |w|, t >= |w|_2, y = behind w - kappa theta, e >= |at w - theta|, h >= max(silent w - limit, 0)
+    # variables: w, a >= |w|, t >= |w|_2, y = behind w - kappa theta, e >= |at w - theta|,
+    # h >= max(silent w - limit, 0); where only potentials below count, y >= kappa theta - behind w, e >= theta - at w
+    # and 0.
+    one_b, one_c = cone.sides_b == "below", cone.sides_c == "below"
     sizes = np.cumsum([0, n, n, 1, k, k, m])
     q = np.zeros(sizes[-1])
     q[sizes[1] : sizes[2]], q[sizes[4] : sizes[5]], q[sizes[5] :] = c[0], c[3], c[4]
@@ -114,12 +132,12 @@ def least(cone, rows):
 
     eye = np.eye
     parts = [
-        (block(k, w=behind, y=-eye(k)), cone.kappa * theta),
+        (block(k, w=(-1) ** one_b * behind, y=-eye(k)), (-1) ** one_b * cone.kappa * theta),
         (block(n, w=eye(n), a=-eye(n)), np.zeros(n)),
         (block(n, w=-eye(n), a=-eye(n)), np.zeros(n)),
         (block(n, w=eye(n)), cone.ub * np.ones(n)),
         (block(n, w=-eye(n)), np.multiply(cone.lb, -np.ones(n))),
-        (block(k, w=at, e=-eye(k)), theta),
+        (block(k, w=(1 - one_c) * at, e=-eye(k)), (1 - one_c) * theta),
         (block(k, w=-at, e=-eye(k)), -theta),
         (block(m, w=silent, h=-eye(m)), limit),
         (block(m, h=-eye(m)), np.zeros(m)),
@@ -128,7 +146,7 @@ def least(cone, rows):
     ]
     a, b = sparse.vstack([v[0] for v in parts]).tocsc(), np.concatenate([v[1] for v in parts])
     cones = [
-        clarabel.ZeroConeT(k),
+        *([clarabel.NonnegativeConeT(k) if one_b else clarabel.ZeroConeT(k)] if k else []),
         clarabel.NonnegativeConeT(4 * n + 2 * k + 2 * m),
         clarabel.SecondOrderConeT(n + 1),
     ]
@@ -157,6 +175,13 @@ OPTIONS = [
     {"kernel": "double_exponential", "tau_s": 3.0, "after_spike": "reset"},
     {"kernel": "double_exponential", "step_ms": 0.4, "norm": "square"},
     {"kernel": "exponential", "after_spike": "ignore", "lambdas": (2, 2, 10, 100, 800)},
+    {"divide_c_by": "targets", "divide_d_by": "targets", "lambdas": (0, 1, 1, 10, 1)},
+    {"divide_d_by": "targets", "sides_c": "below", "after_spike": "reset", "norm": "square"},
+    {"sides_b": "below", "kappa": 1.1, "divide_b_by": "targets"},
+    {"sides_b": "below", "sides_c": "below", "lambdas": (0, 2, 200, 10, 100), "norm": "square", "after_spike": "reset"},
+    {"sides_b": "below", "sides_c": "below", "lambdas": (4, 0, 50, 100, 800), "lb": -1.0, "ub": 1.0},
+    {"sides_b": "below", "sides_c": "below", "engine": "cone solver", "divide_c_by": "targets", "lb": 0.01, "ub": 0.5},
+    {"sides_b": "below", "engine": "cone solver", "lambdas": (1, 1, 300, 1, 300), "lb": -1.0, "ub": 1.0},
     {"engine": "cone solver"},
     {"engine": "cone solver", "lb": [-0.1] * 7 + [-0.6] * 7, "ub": 0.2, "norm": "square"},
 ]
@@ -167,8 +192,9 @@ OPTIONS = [
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_the_objective_is_that_of_every_row_handed_whole_to_a_solver(options, seed):
     patterns, targets = examples(seed, whole_ms=seed == 2)
-    cone = made(ConeR, tau=12.0, **options).fit(patterns, targets)
-    rows = tuple(statement(cone, patterns, targets))
+    silence = [None, [(15.0, 40.0), (40.0, 60.5)]] if seed == 3 else None
+    cone = made(ConeR, tau=12.0, **options).fit(patterns, targets, silence=silence)
+    rows = statement(cone, patterns, targets, silence)
     value = shares(cone, rows) * terms(cone, rows, cone.weights_)
     assert cone.silent_rows_ == len(rows[3])
     assert list(cone.parts_.values()) == pytest.approx(list(value), rel=1e-9, abs=1e-12)

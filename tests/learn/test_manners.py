@@ -99,6 +99,45 @@ def test_scores_lie_between_0_and_1_and_predictions_are_spikes(name):
     assert one.score(patterns, [[1.0], [1.0]], window_ms=0.0) == 0.0
 
 
+#: The learners that read the values of graded trains; all others refuse them.
+READ_VALUES = {"ConeR", "ConeX", "OnlineConeR"}
+
+
+@each_learner
+def test_values_are_read_or_graded_trains_are_refused_by_name(name):
+    patterns, targets = examples()
+    graded = [
+        SpikeTrains(p.times, p.offsets, p.start, p.stop, np.full(len(p.times), 0.5), kind="graded") for p in patterns
+    ]
+    targets = [True, False] if name == "Tempotron" else targets
+    one, plain = fitted(name)
+    # Some learners have more methods that read patterns.
+    calls = {
+        "fit": lambda: make(name).fit(graded, targets),
+        "fit one": lambda: make(name).fit([patterns[0], graded[1]], targets),
+        "predict": lambda: one.predict(graded),
+        "score": lambda: one.score(graded, targets),
+    }
+    if hasattr(one, "change"):
+        calls["change"] = lambda: one.change(one.weights_, graded[0], targets[0])
+        calls["change in silence"] = lambda: one.change(one.weights_, graded[0], False if name == "Tempotron" else [])
+    if name == "Tempotron":
+        calls["peak"] = lambda: one.peak(one.weights_, graded[0])
+    for method in ("rows", "output", "partial_fit"):
+        if hasattr(one, method) and name not in READ_VALUES:
+            calls[method] = lambda method=method: getattr(one, method)(graded[0])
+    if name in READ_VALUES:
+        assert not all(np.array_equal(a, b) for a, b in zip(one.predict(graded), one.predict(plain), strict=True))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            assert not np.array_equal(make(name).fit(graded, targets).weights_, one.weights_, equal_nan=True)
+        return
+    for call, run in calls.items():
+        with pytest.raises(taxel.ProblemError, match=f"(?i)^{name} takes no graded trains") as caught:
+            run()
+        assert "\n" not in str(caught.value), call
+
+
 @each_learner
 @pytest.mark.parametrize("shift", [1000.0, 1e9])
 def test_moved_in_time_it_learns_the_same(name, shift):

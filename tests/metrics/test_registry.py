@@ -91,3 +91,18 @@ def test_a_wrong_or_unknown_parameter_is_refused_in_the_table_s_words(name):
         metrics.pairwise(name, [a, b], **given(name), nonsense=1)
     with pytest.raises(taxel.ProblemError, match="must be one of"):
         metrics.pairwise("nonsense", [a, b])
+
+
+@each_metric
+def test_graded_trains_are_refused_by_name(name):
+    plain = patterns(1)
+    graded = [SpikeTrains(p.times, p.offsets, p.start, p.stop, np.ones(len(p.times)), kind="graded") for p in plain]
+    for call in (
+        lambda: getattr(metrics, name)(graded[0], plain[0], **given(name)),
+        lambda: getattr(metrics, name)(plain[0], graded[0], **given(name)),
+        lambda: metrics.pairwise(name, graded, **given(name)),
+        lambda: metrics.pairwise(name, plain, graded, **given(name)),
+        lambda: metrics.pairwise(name, graded[0], **given(name)),
+    ):
+        with pytest.raises(ProblemError, match=f"^{name} takes no graded trains"):
+            call()

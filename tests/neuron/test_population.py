@@ -29,6 +29,7 @@ def problems(draw: st.DrawFn) -> tuple[Neuron, np.ndarray, SpikeTrains, float]:
         theta_plus=draw(st.sampled_from([0.0, 0.2])),
         refractory=draw(st.sampled_from([3.0, 0.7, 0.0] if after_spike == "reset" else [3.0, 0.7])),
         step_ms=draw(st.sampled_from([1.0, 0.3])),
+        rearm=draw(st.sampled_from([None, 1.0, 0.3])) if time == "grid" else None,
     )
     lists = [np.sort(rng.uniform(-5.0, length, rng.poisson(length / 50))) for _ in range(inputs)]
     if draw(st.booleans()):  # on grid points, many at a time

@@ -24,8 +24,11 @@ mpl.use("Agg")
 def some(draw: st.DrawFn) -> SpikeTrains:
     rng = np.random.default_rng(draw(st.integers(0, 10**6)))
     lists = [np.sort(rng.uniform(0, 100, n)).round(3) for n in draw(st.lists(st.integers(0, 8), max_size=5))]
-    values = [rng.choice([-2.0, -1.0, 1.0, 3.0], len(t)) for t in lists] if draw(st.booleans()) else None
-    return SpikeTrains.from_lists(lists, -1.0, 101.0, values)
+    kind = draw(st.sampled_from(["unsigned", "signed", "graded"]))
+    values = None if kind == "unsigned" else [rng.choice([-2.0, -1.0, 1.0, 3.0], len(t)) for t in lists]
+    if kind == "graded":
+        values = [v * 10.0 ** rng.uniform(-6, 6, len(v)) for v in values]
+    return SpikeTrains.from_lists(lists, -1.0, 101.0, values, kind=kind)
 
 
 @given(some())
@@ -33,7 +36,7 @@ def test_lists_give_the_same_trains_back(trains: SpikeTrains) -> None:
     values = None
     if trains.values is not None:
         values = np.split(trains.values, trains.offsets[1:-1]) if len(trains) else []
-    assert SpikeTrains.from_lists(list(trains), trains.start, trains.stop, values) == trains
+    assert SpikeTrains.from_lists(list(trains), trains.start, trains.stop, values, kind=trains.kind) == trains
     assert sum(trains.counts) == len(trains.times)
 
 
@@ -54,6 +57,7 @@ def test_neo_takes_our_trains_and_gives_them_back(trains: SpikeTrains) -> None:
     assert np.array_equal(back.offsets, trains.offsets)
     if len(trains):
         assert (back.start, back.stop) == (trains.start, trains.stop)
+        assert back.kind == trains.kind
     if trains.values is not None and len(trains):
         assert np.array_equal(back.values, trains.values)
 
@@ -134,7 +138,7 @@ def test_delayed_trains_are_the_trains_later_delay_after_delay(trains: SpikeTrai
     later = trains.delayed(delays)
     assert len(later) == len(delays) * len(trains)
     assert (later.start, later.stop) == (trains.start, trains.stop + delays[-1])
-    assert later.signed == trains.signed
+    assert later.kind == trains.kind
     for d, delay in enumerate(delays):
         for n in range(len(trains)):
             k = d * len(trains) + n
@@ -174,6 +178,10 @@ def test_selected_trains_come_in_the_order_given(trains: SpikeTrains) -> None:
 
 @given(some())
 def test_splitting_by_sign_keeps_every_spike_once(trains: SpikeTrains) -> None:
+    if trains.kind == "graded":
+        with pytest.raises(ProblemError, match="never split by sign"):
+            trains.split_by_sign()
+        return
     split = trains.split_by_sign()
     if trains.values is None:
         assert split == trains

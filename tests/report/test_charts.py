@@ -165,7 +165,7 @@ def page(*figures):
     class Row:
         score = None
 
-    charts = {"contact": {"potential": chart(list(figures)), "weights": "", "errors": None}}
+    charts = {"contact": {"potential": chart(list(figures)), "weights": "", "errors": None, "moved": None}}
     return render(
         "report/listening.html.j2",
         title="a page",

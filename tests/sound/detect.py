@@ -14,6 +14,9 @@ RECIPE = taxel.detect.Recipe(LEVELS, {"tau": 5.0}, {"a": {"ub": 1.0}})
 EXAMPLE = taxel.detect.Example(taxel.Frames(np.eye(4)[:, :, None] * np.ones(4), [0, 9000, 18000, 27000]), {"a": [9000]})
 
 
+ALIGNMENT = taxel.detect.Alignment("a", 0, np.zeros(2, np.int64), np.array([0, 9000]), np.array([1.5, np.nan]))
+
+
 def read_out() -> taxel.detect.ReadoutStream:
     return READOUT.stream()
 
@@ -84,6 +87,7 @@ SOUND: dict[str, Sound] = {
         run_threshold=1.0,
         about="a touch",
         source="made here",
+        align=True,
     ),
     "taxel.detect.Recipe.learner_of": method(RECIPE, "learner_of", label="a"),
     "taxel.detect.Recipe.from_dict": plain(taxel.detect.Recipe.from_dict, values={"encoder": {"name": "fa1"}}),
@@ -129,6 +133,7 @@ SOUND: dict[str, Sound] = {
         labels={"a": [9000]},
         tare=None,
     ),
+    "taxel.detect.Alignment.felt": method(ALIGNMENT, "felt", example=0),
     "taxel.detect.TrainedNeuron": plain(
         lambda **given: taxel.Readout(LEVELS, {"a": taxel.detect.TrainedNeuron(**given)}, array=ARRAY),
         neuron=taxel.Neuron(tau=2.0),
@@ -139,6 +144,7 @@ SOUND: dict[str, Sound] = {
 
 #: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
+    "taxel.detect.Alignment": lambda: ALIGNMENT,
     "taxel.detect.Judged": lambda: judged(2),
     "taxel.detect.Trained": lambda: judged(2).trained[0],
     "taxel.detect.Score": lambda: taxel.detect.score(FOUND, {"a": [10], "b": [25]}),

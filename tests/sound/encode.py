@@ -17,6 +17,7 @@ SOUND: dict[str, Sound] = {
     "taxel.encode.Encoder.trains": method(LEVELS, "trains", array=ARRAY),
     "taxel.encode.Encoder.with_tare": method(LEVELS, "with_tare", tare=TARE),
     "taxel.encode.Skin.afferents": method(taxel.encode.Skin(), "afferents", array=ARRAY),
+    "taxel.encode.LocalLoad.values": method(taxel.encode.LocalLoad(tare=TARE), "values", x=FRAMES),
     "taxel.encode.Afferents.trains": method(taxel.encode.Skin().afferents(ARRAY), "trains", kind="SA-1"),
     "taxel.encode.EncoderStream": plain(taxel.encode.EncoderStream, encoder=LEVELS, array=ARRAY),
     "taxel.encode.EncoderStream.push": fresh(lambda: LEVELS.stream(ARRAY), "push", x=FRAMES),

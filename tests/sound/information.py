@@ -198,6 +198,7 @@ SOUND: dict[str, Sound] = {
         classifiers=["neighbours"],
         seed=1,
         progress=lambda *_: None,
+        watch=lambda *_: None,
     ),
 }
 

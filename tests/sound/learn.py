@@ -13,6 +13,10 @@ CONE_OPTIONS: dict[str, Any] = {
     "lb": -1.0,
     "ub": 1.0,
     "divide_b_by": "targets",
+    "divide_c_by": "targets",
+    "divide_d_by": "targets",
+    "sides_b": "below",
+    "sides_c": "below",
     "norm": "square",
     "margin": 0.01,
     "horizon": 30.0,
@@ -95,21 +99,30 @@ SOUND: dict[str, Sound] = {
     "taxel.learn.OnlineConeR": plain(taxel.learn.OnlineConeR, window=3, neuron=taxel.Neuron(tau=5.0), **CONE_OPTIONS),
     "taxel.learn.OnlineConeR.partial_fit": lambda: (
         taxel.learn.OnlineConeR(neuron=taxel.Neuron(tau=5.0), window=3, ub=1.0).partial_fit,
-        {"pattern": PLAIN, "targets": [5.0]},
+        {"pattern": PLAIN, "targets": [5.0], "silence": [[0.0, 20.0]]},
     ),
     "taxel.learn.OnlineConeR.fit": method(
         taxel.learn.OnlineConeR(neuron=taxel.Neuron(tau=5.0), window=3, ub=1.0),
         "fit",
         patterns=[PLAIN],
         targets=[[5.0]],
+        silence=[[[0.0, 20.0]]],
         start=None,
         progress=None,
     ),
     "taxel.learn.ConeR.fit": method(
-        CONE, "fit", patterns=[PLAIN], targets=[[5.0]], start=[0.1] * 4, progress=lambda *_: None
+        CONE,
+        "fit",
+        patterns=[PLAIN],
+        targets=[[5.0]],
+        silence=[[[0.0, 20.0]]],
+        start=[0.1] * 4,
+        progress=lambda *_: None,
     ),
-    "taxel.learn.ConeR.prepare": method(CONE, "prepare", patterns=[PLAIN], targets=[[5.0]]),
-    "taxel.learn.ConeRProblem": plain(taxel.learn.ConeRProblem, cone=CONE, patterns=[PLAIN], targets=[[5.0]]),
+    "taxel.learn.ConeR.prepare": method(CONE, "prepare", patterns=[PLAIN], targets=[[5.0]], silence=[[[0.0, 20.0]]]),
+    "taxel.learn.ConeRProblem": plain(
+        taxel.learn.ConeRProblem, cone=CONE, patterns=[PLAIN], targets=[[5.0]], silence=[[[0.0, 20.0]]]
+    ),
     "taxel.learn.ConeRProblem.fit": method(
         CONE.prepare([PLAIN], [[5.0]]), "fit", cone=CONE, start=[0.1] * 4, progress=lambda *_: None
     ),

@@ -13,6 +13,7 @@ SOUND: dict[str, Sound] = {
         kernel="double_exponential",
         tau=10.0,
         tau_s=2.0,
+        rearm=0.5,
         theta_0=0.3,
         theta_plus=0.2,
         tau_rec=20.0,

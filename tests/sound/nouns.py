@@ -42,11 +42,19 @@ SOUND: dict[str, Sound] = {
     "taxel.Frames.between": method(FRAMES, "between", start=0, stop=200),
     "taxel.Frames.region": method(FRAMES, "region", x=slice(0, 2), y=slice(0, 2)),
     "taxel.SpikeTrains": plain(
-        taxel.SpikeTrains, times=[1.0, 2.0], offsets=[0, 1, 2], start=0.0, stop=5.0, values=[1.0, -1.0]
+        taxel.SpikeTrains,
+        times=[1.0, 2.0],
+        offsets=[0, 1, 2],
+        start=0.0,
+        stop=5.0,
+        values=[1.0, -1.0],
+        kind="graded",
     ),
     "taxel.SpikeTrains.from_lists": plain(
-        taxel.SpikeTrains.from_lists, times=[[1.0], []], start=0.0, stop=5.0, values=[[1.0], []]
+        taxel.SpikeTrains.from_lists, times=[[1.0], []], start=0.0, stop=5.0, values=[[1.0], []], kind="signed"
     ),
+    "taxel.SpikeTrains.side_by_side": plain(taxel.SpikeTrains.side_by_side, parts=[TRAINS, TRAINS]),
+    "taxel.SpikeTrains.lasting": method(TRAINS, "lasting", stop=99.0),
     "taxel.SpikeTrains.between": method(TRAINS, "between", start=0.0, stop=2.0),
     "taxel.SpikeTrains.select": method(TRAINS, "select", trains=[1]),
     "taxel.SpikeTrains.delayed": method(TRAINS, "delayed", delays_ms=[0.0, 2.0]),

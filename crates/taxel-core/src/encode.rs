@@ -7,10 +7,12 @@ mod channels;
 mod fields;
 mod law;
 mod loaded;
+mod local_sums;
 mod periods;
 mod pieces;
 mod power;
 mod quantity;
+mod recent;
 mod receptor;
 mod running_range;
 mod sampled;
@@ -21,6 +23,7 @@ mod tare;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+pub use local_load::LargestSum;
 pub use pieces::Pieces;
 pub use quantity::Quantity;
 pub use running_range::{FirstWindow, RunningRange};
@@ -32,7 +35,7 @@ use law::Law;
 use crate::parameters::Described;
 use crate::reading::{self, Unfit};
 use crate::spikes::ms;
-use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeTrains, Stop, problem};
+use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The registry: one line per encoder, `NAME: Kind`; the encoder's file is `encode/NAME.rs`, and its name in JSON is
 /// `NAME`.
@@ -100,6 +103,8 @@ encoders! {
     skin: Skin,
     /// The number of loaded taxels.
     contact_area: ContactArea,
+    /// Quantities of a touch in units of each taxel's own noise.
+    local_load: LocalLoad,
     /// The area and force of a touch, and the displacement of its centre.
     moments: Moments,
 }
@@ -164,10 +169,10 @@ impl Encoder {
         self.law().trains(array)
     }
 
-    /// Whether the spikes carry a signed value, so that a neuron receives each train as two, ON and OFF.
+    /// The meaning of the spikes' values; a neuron receives each signed train as two, ON and OFF.
     #[must_use]
-    pub fn signed(&self) -> bool {
-        self.law().signed()
+    pub fn kind(&self) -> SpikeKind {
+        self.law().kind()
     }
 
     /// The same encoder with this tare; an encoder that uses no tare is returned unchanged.
@@ -188,17 +193,9 @@ impl Encoder {
     /// As [`Encoder::stream`] and [`Stream::push_events`]; `Problem` also if an event is too far behind an earlier one
     /// ([`EventsView::check_order`]); `Interrupted` if asked to stop.
     pub fn encode_events(&self, events: EventsView<'_>, stop: Stop<'_>) -> Result<SpikeTrains> {
-        /// Events between two checks of `stop`.
-        const PIECE: usize = 65_536;
         let mut stream = self.stream(events.array)?;
-        events.check()?;
-        events.check_order()?;
-        let mut out = vec![];
-        for piece in events.pieces(PIECE) {
-            stop.check()?;
-            stream.push_events(piece, &mut out)?;
-        }
-        collect(stream, out, events.t.first().copied())
+        let (out, end) = spikes_of_events(&mut *stream, events, stop)?;
+        collect(&*stream, &out, events.t.first().copied(), end)
     }
 
     /// Encodes a whole recording of pictures.
@@ -208,20 +205,49 @@ impl Encoder {
     /// As [`Encoder::stream`], [`FramesView::check`] and [`Stream::push_frame`]; `Interrupted` if asked to stop.
     pub fn encode_frames(&self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<SpikeTrains> {
         let mut stream = self.stream(frames.array)?;
-        frames.check()?;
-        let mut out = vec![];
-        for (k, (t, picture)) in frames.iter().enumerate() {
-            if k % 64 == 0 {
-                stop.check()?;
-            }
-            stream.push_frame(t, picture, &mut out)?;
-        }
-        collect(stream, out, frames.t.first().copied())
+        let (out, end) = spikes_of_frames(&mut *stream, frames, stop)?;
+        collect(&*stream, &out, frames.t.first().copied(), end)
     }
 }
 
-fn collect(mut stream: Box<dyn Stream>, mut out: Vec<Spike>, first: Option<i64>) -> Result<SpikeTrains> {
+/// All spikes of a whole recording of events, and the end of their window, ms.
+fn spikes_of_events(
+    stream: &mut dyn Stream,
+    events: EventsView<'_>,
+    stop: Stop<'_>,
+) -> Result<(Vec<Spike>, Option<f64>)> {
+    /// Events between two checks of `stop`.
+    const PIECE: usize = 65_536;
+    events.check()?;
+    events.check_order()?;
+    let mut out = vec![];
+    for piece in events.pieces(PIECE) {
+        stop.check()?;
+        stream.push_events(piece, &mut out)?;
+    }
+    let end = stream.finish(&mut out);
+    Ok((out, end))
+}
+
+/// All spikes of a whole recording of pictures, and the end of their window, ms.
+fn spikes_of_frames(
+    stream: &mut dyn Stream,
+    frames: FramesView<'_>,
+    stop: Stop<'_>,
+) -> Result<(Vec<Spike>, Option<f64>)> {
+    frames.check()?;
+    let mut out = vec![];
+    for (k, (t, picture)) in frames.iter().enumerate() {
+        if k % 64 == 0 {
+            stop.check()?;
+        }
+        stream.push_frame(t, picture, &mut out)?;
+    }
+    let end = stream.finish(&mut out);
+    Ok((out, end))
+}
+
+fn collect(stream: &dyn Stream, out: &[Spike], first: Option<i64>, end: Option<f64>) -> Result<SpikeTrains> {
     let start = first.map_or(0.0, ms);
-    let end = stream.finish(&mut out).unwrap_or(start);
-    SpikeTrains::from_spikes(&out, stream.trains(), stream.signed(), start, end)
+    SpikeTrains::from_spikes(out, stream.trains(), stream.kind(), start, end.unwrap_or(start))
 }

@@ -16,5 +16,5 @@ pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, Hor
 pub use engines::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
 pub use fit::{Engine, Fit, Left, Round, Status};
 pub use online::OnlineConeR;
-pub use statement::{Bound, Bounds, Certificate, Divisor, Margin, Norm, Parts, Row, Stated};
+pub use statement::{Bound, Bounds, Certificate, Divisor, DivisorC, DivisorD, Margin, Norm, Parts, Row, Sides, Stated};
 pub use stdp::{Stdp, StdpNeuron};

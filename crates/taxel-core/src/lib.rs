@@ -19,6 +19,7 @@ pub mod reading;
 pub mod vectors;
 
 pub mod array;
+pub mod baseline;
 pub mod events;
 pub mod frames;
 pub mod held;
@@ -42,4 +43,4 @@ pub use array::Array;
 pub use error::{Error, Result, Stop};
 pub use events::{Events, EventsView, Intensities, IntensitiesView, Marker};
 pub use frames::FramesView;
-pub use spikes::{Spike, SpikeTrains};
+pub use spikes::{Spike, SpikeKind, SpikeTrains};

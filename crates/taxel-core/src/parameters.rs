@@ -34,8 +34,14 @@ impl Described {
 
     /// The same description with one more parameter, which is null by default.
     #[must_use]
-    pub fn or_nothing(mut self, name: &'static str) -> Self {
-        self.defaults.insert(name.to_owned(), Value::Null);
+    pub fn or_nothing(self, name: &'static str) -> Self {
+        self.or(name, Value::Null)
+    }
+
+    /// The same description with one more parameter, which has no range.
+    #[must_use]
+    pub fn or(mut self, name: &'static str, default: impl Into<Value>) -> Self {
+        self.defaults.insert(name.to_owned(), default.into());
         self
     }
 

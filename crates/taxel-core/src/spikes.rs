@@ -18,6 +18,52 @@ pub fn us(ms: f64) -> f64 {
     ms * 1000.0
 }
 
+/// The meaning of the spikes' values, one for all trains together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SpikeKind {
+    /// Spikes have no value; a neuron reads each as 1.
+    #[default]
+    Unsigned,
+    /// Polarity or bits. A neuron reads each train as two unsigned ones, ON and OFF.
+    Signed,
+    /// A factor of the weight, finite, above or below 0.
+    Graded,
+}
+
+impl SpikeKind {
+    /// All kinds.
+    pub const ALL: [Self; 3] = [Self::Unsigned, Self::Signed, Self::Graded];
+
+    /// The name in Python and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unsigned => "unsigned",
+            Self::Signed => "signed",
+            Self::Graded => "graded",
+        }
+    }
+
+    /// The kind of this name.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, with the names of all kinds.
+    pub fn named(name: &str) -> Result<Self> {
+        let names = Self::ALL.map(Self::name).join(", ");
+        Self::ALL
+            .into_iter()
+            .find(|kind| kind.name() == name)
+            .ok_or_else(|| problem!("kind is {name}: must be one of {names}"))
+    }
+
+    /// The number of inputs of a neuron for each train: two for signed trains.
+    #[must_use]
+    pub fn inputs_per_train(self) -> usize {
+        if self == Self::Signed { 2 } else { 1 }
+    }
+}
+
 /// One spike, as encoders emit it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spike {
@@ -25,7 +71,7 @@ pub struct Spike {
     pub t: f64,
     /// Index of its train.
     pub train: u32,
-    /// Signed value: polarity or bits; 1 if the encoder's spikes have none.
+    /// Polarity or bits of a signed spike, the factor of the weight of a graded one, 1 of an unsigned one.
     pub value: f32,
 }
 
@@ -36,7 +82,9 @@ pub struct SpikeTrains {
     pub times: Vec<f64>,
     /// Index of each train's first spike, and at the end the number of spikes: trains + 1 entries.
     pub offsets: Vec<usize>,
-    /// A signed value per spike, if the encoder's spikes have one.
+    /// What the values mean.
+    pub kind: SpikeKind,
+    /// A value per spike of signed and graded trains.
     pub values: Option<Vec<f32>>,
     /// Start of the observed window; ms.
     pub start: f64,
@@ -50,7 +98,8 @@ impl SpikeTrains {
     /// # Errors
     ///
     /// `Problem` if a spike's train does not exist, or if a spike is outside the window.
-    pub fn from_spikes(spikes: &[Spike], trains: usize, signed: bool, start: f64, stop: f64) -> Result<Self> {
+    pub fn from_spikes(spikes: &[Spike], trains: usize, kind: SpikeKind, start: f64, stop: f64) -> Result<Self> {
+        let valued = kind != SpikeKind::Unsigned;
         let mut offsets = vec![0_usize; trains + 1];
         for s in spikes {
             let n = s.train as usize;
@@ -67,11 +116,11 @@ impl SpikeTrains {
         }
         let mut next = offsets.clone();
         let mut times = vec![0.0; spikes.len()];
-        let mut values = vec![0.0; if signed { spikes.len() } else { 0 }];
+        let mut values = vec![0.0; if valued { spikes.len() } else { 0 }];
         for s in spikes {
             let place = &mut next[s.train as usize];
             times[*place] = s.t;
-            if signed {
+            if valued {
                 values[*place] = s.value;
             }
             *place += 1;
@@ -82,13 +131,13 @@ impl SpikeTrains {
                 order.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
                 let in_order: Vec<f64> = order.iter().map(|&k| times[k]).collect();
                 times[train.clone()].copy_from_slice(&in_order);
-                if signed {
+                if valued {
                     let in_order: Vec<f32> = order.iter().map(|&k| values[k]).collect();
                     values[train].copy_from_slice(&in_order);
                 }
             }
         }
-        Ok(Self { times, values: signed.then_some(values), offsets, start, stop })
+        Ok(Self { times, kind, values: valued.then_some(values), offsets, start, stop })
     }
 
     /// Copies the columns of spike trains with the window `(start, stop)`, ms, and checks them.
@@ -99,7 +148,7 @@ impl SpikeTrains {
     pub fn copy_of(
         times: &[f64],
         offsets: Vec<usize>,
-        values: Option<&[f32]>,
+        (kind, values): (SpikeKind, Option<&[f32]>),
         (start, stop): (f64, f64),
         interrupt: Stop<'_>,
     ) -> Result<Self> {
@@ -108,7 +157,7 @@ impl SpikeTrains {
             interrupt.check()?;
             copy.extend_from_slice(piece);
         }
-        let trains = Self { times: copy, offsets, values: values.map(<[f32]>::to_vec), start, stop };
+        let trains = Self { times: copy, offsets, kind, values: values.map(<[f32]>::to_vec), start, stop };
         trains.check()?;
         Ok(trains)
     }
@@ -169,10 +218,17 @@ impl SpikeTrains {
         Ok(all)
     }
 
-    /// Splits signed trains into twice as many unsigned ones: first all ON (value above 0), then all OFF.
-    #[must_use]
-    pub fn split_by_sign(&self) -> Self {
-        let Some(values) = &self.values else { return self.clone() };
+    /// Splits signed trains into twice as many unsigned ones: first all ON (value above 0), then all OFF. Unsigned
+    /// trains are returned unchanged.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for graded trains, whose values are factors of the weight.
+    pub fn split_by_sign(&self) -> Result<Self> {
+        if self.kind == SpikeKind::Graded {
+            return Err(problem!("trains are graded: their values multiply the weight and are never split by sign"));
+        }
+        let Some(values) = &self.values else { return Ok(self.clone()) };
         let (mut times, mut offsets) = (Vec::with_capacity(self.times.len()), vec![0]);
         for on in [true, false] {
             for n in 0..self.len() {
@@ -181,16 +237,28 @@ impl SpikeTrains {
                 offsets.push(times.len());
             }
         }
-        Self { times, offsets, values: None, start: self.start, stop: self.stop }
+        Ok(Self { times, offsets, kind: SpikeKind::Unsigned, values: None, start: self.start, stop: self.stop })
     }
 
-    /// Checks offsets, order, finiteness and window.
+    /// Returns an error for graded trains, on behalf of `reader`, which reads no values.
     ///
     /// # Errors
     ///
-    /// `Problem`, naming train and spike.
+    /// `Problem`, with the name of `reader`.
+    pub fn check_ungraded(&self, reader: &str) -> Result<()> {
+        if self.kind == SpikeKind::Graded {
+            return Err(problem!("{reader} takes no graded trains: their spikes have values, which it does not read"));
+        }
+        Ok(())
+    }
+
+    /// Checks offsets, order, finiteness, window, and that values are those of the kind.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming train and spike, or the number of the value.
     pub fn check(&self) -> Result<()> {
-        check(&self.times, &self.offsets, self.values.as_ref().map(Vec::len), self.start, self.stop)
+        check(&self.times, &self.offsets, (self.kind, self.values.as_deref()), self.start, self.stop)
     }
 }
 
@@ -225,21 +293,25 @@ impl PartialEq for Next {
 
 impl Eq for Next {}
 
-/// [`SpikeTrains::check`] for borrowed columns; of the values only their number is checked.
+/// [`SpikeTrains::check`] for borrowed columns.
 ///
 /// # Errors
 ///
-/// `Problem`, naming train and spike.
-pub fn check(times: &[f64], offsets: &[usize], values: Option<usize>, start: f64, stop: f64) -> Result<()> {
+/// `Problem`, naming train and spike, or the number of the value.
+pub fn check(
+    times: &[f64],
+    offsets: &[usize],
+    (kind, values): (SpikeKind, Option<&[f32]>),
+    start: f64,
+    stop: f64,
+) -> Result<()> {
+    check_values(kind, values, times.len())?;
     if !(start.is_finite() && stop.is_finite() && start <= stop) {
         return Err(problem!("window {} to {} ms: start must not lie after stop", start, stop));
     }
     let sound = offsets.first() == Some(&0) && offsets.last() == Some(&times.len()) && offsets.is_sorted();
     if !sound {
         return Err(problem!("offsets must ascend from 0 to the number of spikes, {}", times.len()));
-    }
-    if values.is_some_and(|len| len != times.len()) {
-        return Err(problem!("values: must be one a spike, {}", times.len()));
     }
     for (n, ends) in offsets.windows(2).enumerate() {
         let train = &times[ends[0]..ends[1]];
@@ -257,6 +329,31 @@ pub fn check(times: &[f64], offsets: &[usize], values: Option<usize>, start: f64
                 return Err(problem!("train {n}, spike {k}: {t} ms lies outside the window {} to {} ms", start, stop));
             }
         }
+    }
+    Ok(())
+}
+
+/// Checks that there are values where the kind has them, one per spike, all finite, and of graded spikes none 0.
+fn check_values(kind: SpikeKind, values: Option<&[f32]>, spikes: usize) -> Result<()> {
+    let Some(values) = values else {
+        return match kind {
+            SpikeKind::Unsigned => Ok(()),
+            SpikeKind::Signed | SpikeKind::Graded => Err(problem!("{} trains need values, one a spike", kind.name())),
+        };
+    };
+    if kind == SpikeKind::Unsigned {
+        return Err(problem!("unsigned trains have no values: choose kind signed or graded, or leave the values out"));
+    }
+    if values.len() != spikes {
+        return Err(problem!("values: must be one a spike, {spikes}"));
+    }
+    if let Some(k) = values.iter().position(|value| !value.is_finite()) {
+        return Err(problem!("values[{k}] is {}: must be finite", format!("{}", values[k]).to_lowercase()));
+    }
+    if kind == SpikeKind::Graded
+        && let Some(k) = values.iter().position(|&value| value == 0.0)
+    {
+        return Err(problem!("values[{k}] is 0: a graded value of 0 is no spike, leave it out"));
     }
     Ok(())
 }

@@ -4,7 +4,7 @@
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use taxel_core::neuron::{AfterSpike, FirstThreshold, Neuron, OutputSpike, Time};
-use taxel_core::{Spike, SpikeTrains, Stop};
+use taxel_core::{Spike, SpikeKind, SpikeTrains, Stop};
 
 fn random_trains(random: &mut StdRng, trains: usize, whole_ms: bool) -> SpikeTrains {
     let spikes: Vec<Spike> = (0..trains * 4)
@@ -14,20 +14,28 @@ fn random_trains(random: &mut StdRng, trains: usize, whole_ms: bool) -> SpikeTra
             Spike { t, train: random.random_range(0..trains as u32), value: 1.0 }
         })
         .collect();
-    SpikeTrains::from_spikes(&spikes, trains, false, 0.0, 220.0).unwrap()
+    SpikeTrains::from_spikes(&spikes, trains, SpikeKind::Unsigned, 0.0, 220.0).unwrap()
 }
 
 fn neurons() -> impl Iterator<Item = Neuron> {
     let after = [AfterSpike::Keep, AfterSpike::Ignore, AfterSpike::Reset];
     let first = [FirstThreshold::Base, FirstThreshold::Printed];
-    let clocks = [(Time::Continuous, 1.0), (Time::Grid, 1.0), (Time::Grid, 0.192)];
+    let grid = |step_ms, rearm| (Time::Grid, step_ms, rearm);
+    let clocks = [
+        (Time::Continuous, 1.0, None),
+        grid(1.0, None),
+        grid(0.192, None),
+        grid(1.0, Some(1.0)),
+        grid(0.192, Some(0.4)),
+    ];
     after.into_iter().flat_map(move |after_spike| {
         first.into_iter().flat_map(move |first_threshold| {
-            clocks.into_iter().map(move |(time, step_ms)| Neuron {
+            clocks.into_iter().map(move |(time, step_ms, rearm)| Neuron {
                 after_spike,
                 first_threshold,
                 time,
                 step_ms,
+                rearm,
                 tau: 8.0,
                 ..Neuron::default()
             })
@@ -43,7 +51,7 @@ fn in_pieces(neuron: &Neuron, weights: &[f64], trains: &SpikeTrains, cuts: &[f64
             stream.advance(cuts[cut], &mut out);
             cut += 1;
         }
-        stream.push(spike.t, spike.train, &mut out).unwrap();
+        stream.push(spike, &mut out).unwrap();
     }
     for &t in &cuts[cut..] {
         stream.advance(t, &mut out);
@@ -76,12 +84,12 @@ fn a_stream_cut_anywhere_fires_as_the_whole() {
 #[test]
 fn trains_pushed_in_another_order_at_equal_times_fire_at_the_same_times() {
     let neuron = Neuron::default();
-    let spikes = [(1.0, 0), (1.0, 1), (1.0, 2)];
+    let spikes = [0, 1, 2].map(|train| Spike { t: 1.0, train, value: 1.0 });
     let weights = [0.5, 0.4, 0.3];
     let fire = |order: [usize; 3]| {
         let (mut stream, mut out) = (neuron.stream(&weights, 1.0, 0.0).unwrap(), Vec::new());
         for k in order {
-            stream.push(spikes[k].0, spikes[k].1, &mut out).unwrap();
+            stream.push(spikes[k], &mut out).unwrap();
         }
         stream.advance(50.0, &mut out);
         out.iter().map(|s| s.t).collect::<Vec<_>>()
@@ -95,18 +103,20 @@ fn trains_pushed_in_another_order_at_equal_times_fire_at_the_same_times() {
 fn an_input_from_the_past_is_an_error_and_changes_nothing() {
     let neuron = Neuron::default();
     let (mut stream, mut out) = (neuron.stream(&[1.0], 1.0, 0.0).unwrap(), Vec::new());
-    stream.push(5.0, 0, &mut out).unwrap();
+    let at = |t, train| Spike { t, train, value: 1.0 };
+    stream.push(at(5.0, 0), &mut out).unwrap();
     let before = stream.potential();
-    assert!(stream.push(4.0, 0, &mut out).unwrap_err().to_string().contains("5 ms already"));
-    assert!(stream.push(f64::NAN, 0, &mut out).is_err());
-    assert!(stream.push(6.0, 1, &mut out).unwrap_err().to_string().contains("train 1 of 1"));
+    assert!(stream.push(at(4.0, 0), &mut out).unwrap_err().to_string().contains("5 ms already"));
+    assert!(stream.push(at(f64::NAN, 0), &mut out).is_err());
+    assert!(stream.push(at(6.0, 1), &mut out).unwrap_err().to_string().contains("train 1 of 1"));
     assert_eq!(stream.potential().to_bits(), before.to_bits());
 }
 
 #[test]
 fn a_factor_on_the_threshold_moves_the_crossing_to_where_the_potential_has_that_value() {
     let neuron = Neuron { tau: 10.0, ..Neuron::default() };
-    let trains = SpikeTrains::from_spikes(&[Spike { t: 0.0, train: 0, value: 1.0 }], 1, false, 0.0, 40.0).unwrap();
+    let trains =
+        SpikeTrains::from_spikes(&[Spike { t: 0.0, train: 0, value: 1.0 }], 1, SpikeKind::Unsigned, 0.0, 40.0).unwrap();
     for factor in [0.5, 0.9, 1.0] {
         let first = neuron.run(&[1.0], &trains, factor, Stop::never()).unwrap()[0];
         let reached = neuron.potential(&[1.0], &trains, &[first.t], &[], Stop::never()).unwrap()[0];

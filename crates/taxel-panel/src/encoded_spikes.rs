@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use serde_json::{Value, json};
 use taxel_core::encode::{Encoder, Stream};
-use taxel_core::{Array, Events, Intensities, Spike, problem};
+use taxel_core::{Array, Events, Intensities, Spike, SpikeKind, problem};
 
 use super::time_columns::{SPAN, column_of};
 use taxel_core::held::{UNKNOWN, as_events};
@@ -152,7 +152,7 @@ impl EncodedSpikes {
             return None;
         }
         let message = json!({
-            "type": "spikes", "encoder": self.name, "trains": self.stream.trains(), "signed": self.stream.signed(),
+            "type": "spikes", "encoder": self.name, "trains": self.stream.trains(), "signed": self.stream.kind() == SpikeKind::Signed,
             "latency_ms": self.stream.latency_ms(), "left_out": self.left_out,
             "t_ms": self.pending.iter().map(|s| s.t).collect::<Vec<_>>(),
             "train": self.pending.iter().map(|s| s.train).collect::<Vec<_>>(),

@@ -9,7 +9,7 @@ use numpy::{BorrowError, Element, IntoPyArray, PyArray1, PyArrayMethods, PyReado
 use pyo3::Borrowed;
 use pyo3::prelude::*;
 use taxel_core::wire::{Columns, Filled, Room};
-use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeTrains, Stop};
+use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeKind, SpikeTrains, Stop};
 
 use crate::enter::enter;
 use crate::errors::{ProblemError, core};
@@ -206,9 +206,9 @@ pub(crate) fn from_events(py: Python<'_>, events: Events) -> EventsOut<'_> {
     )
 }
 
-/// Spike trains as Python hands them over: times, offsets, values, start, stop; ms.
+/// Spike trains as Python passes them: times, offsets, values, kind, start, stop; ms.
 pub(crate) type SpikesIn<'py> =
-    (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<PyReadonlyArray1<'py, f32>>, f64, f64);
+    (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<PyReadonlyArray1<'py, f32>>, String, f64, f64);
 
 /// Where trains begin and end.
 pub(crate) fn to_offsets(offsets: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
@@ -216,11 +216,11 @@ pub(crate) fn to_offsets(offsets: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<us
     slice("offsets", offsets)?.iter().map(|&o| usize::try_from(o).map_err(|_| below(o))).collect()
 }
 
-pub(crate) fn to_spikes((times, offsets, values, start, stop): SpikesIn<'_>) -> PyResult<SpikeTrains> {
+pub(crate) fn to_spikes((times, offsets, values, kind, start, stop): SpikesIn<'_>) -> PyResult<SpikeTrains> {
     let py = times.py();
     let offsets = to_offsets(&offsets)?;
     let times = slice("times", &times)?;
-    let values = values.as_ref().map(|v| slice("values", v)).transpose()?;
+    let values = (SpikeKind::named(&kind).map_err(core)?, values.as_ref().map(|v| slice("values", v)).transpose()?);
     let copy = |interrupt: Stop<'_>| SpikeTrains::copy_of(times, offsets, values, (start, stop), interrupt);
     // Of few spikes a copy costs less than releasing the GIL.
     if times.len() < MANY_SPIKES { copy(Stop::never()).map_err(core) } else { enter(py, copy) }
@@ -231,9 +231,10 @@ const MANY_SPIKES: usize = 1 << 20;
 
 /// Spike trains as Python gets them: the same parts, as new arrays.
 pub(crate) type SpikesOut<'py> =
-    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>, Option<Bound<'py, PyArray1<f32>>>, f64, f64);
+    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>, Option<Bound<'py, PyArray1<f32>>>, &'static str, f64, f64);
 
 pub(crate) fn from_spikes(py: Python<'_>, trains: SpikeTrains) -> SpikesOut<'_> {
     let offsets = trains.offsets.iter().map(|&o| i64::try_from(o).unwrap_or(i64::MAX)).collect();
-    (array(py, trains.times), array(py, offsets), trains.values.map(|v| array(py, v)), trains.start, trains.stop)
+    let SpikeTrains { times, kind, values, start, stop, .. } = trains;
+    (array(py, times), array(py, offsets), values.map(|v| array(py, v)), kind.name(), start, stop)
 }

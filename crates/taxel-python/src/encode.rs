@@ -1,7 +1,8 @@
 //! Encoders and the tare for Python; parameters cross as JSON.
 
+use numpy::PyArray1;
 use pyo3::prelude::*;
-use taxel_core::encode::{Encoder, Pieces, Skin, Tare};
+use taxel_core::encode::{Encoder, LocalLoad, Pieces, Skin, Tare};
 
 use taxel_core::problem;
 
@@ -24,11 +25,11 @@ fn encoder_names() -> Vec<&'static str> {
     taxel_core::encode::NAMES.to_vec()
 }
 
-/// Trains for an array, whether they are signed, and the latency in ms.
+/// Trains for an array, their kind, and the latency in ms.
 #[pyfunction]
-fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, bool, f64)> {
+fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, &'static str, f64)> {
     let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
-    Ok((encoder.trains(&array), encoder.signed(), encoder.latency_ms()))
+    Ok((encoder.trains(&array), encoder.kind().name(), encoder.latency_ms()))
 }
 
 /// Type and place (x, y in mm) of each afferent of a skin on an array, a train each.
@@ -44,6 +45,44 @@ fn skin_afferents(py: Python<'_>, skin: &str, array: ArrayParts) -> PyResult<Ski
         placed.iter().map(|p| p.x_mm).collect(),
         placed.iter().map(|p| p.y_mm).collect(),
     ))
+}
+
+/// The parameters of a local load.
+fn local_load(encoder: &str) -> PyResult<LocalLoad> {
+    match Encoder::from_json(encoder).map_err(core)? {
+        Encoder::LocalLoad(load) => Ok(load),
+        _ => Err(core(problem!("local load: must be one"))),
+    }
+}
+
+/// The names of a local load's quantities.
+#[pyfunction]
+fn local_load_quantities(encoder: &str) -> PyResult<Vec<String>> {
+    Ok(local_load(encoder)?.quantities())
+}
+
+/// The quantities of a local load of a whole recording of events, sample by sample.
+#[pyfunction]
+fn local_load_of_events<'py>(
+    py: Python<'py>,
+    encoder: &str,
+    events: EventsIn<'py>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (load, events) = (local_load(encoder)?, to_events(events)?);
+    let events = events.view()?;
+    Ok(PyArray1::from_vec(py, enter(py, |stop| load.values_of_events(events, stop))?))
+}
+
+/// The quantities of a local load of a whole recording of pictures, picture by picture.
+#[pyfunction]
+fn local_load_of_frames<'py>(
+    py: Python<'py>,
+    encoder: &str,
+    frames: FramesIn<'py>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (load, frames) = (local_load(encoder)?, to_frames(frames)?);
+    let frames = frames.view()?;
+    Ok(PyArray1::from_vec(py, enter(py, |stop| load.values_of_frames(frames, stop))?))
 }
 
 /// Encodes a whole recording of events.
@@ -143,6 +182,9 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(encoder_names, module)?)?;
     module.add_function(wrap_pyfunction!(encoder_about, module)?)?;
     module.add_function(wrap_pyfunction!(skin_afferents, module)?)?;
+    module.add_function(wrap_pyfunction!(local_load_quantities, module)?)?;
+    module.add_function(wrap_pyfunction!(local_load_of_events, module)?)?;
+    module.add_function(wrap_pyfunction!(local_load_of_frames, module)?)?;
     module.add_function(wrap_pyfunction!(encode_events, module)?)?;
     module.add_function(wrap_pyfunction!(encode_frames, module)?)?;
     module.add_function(wrap_pyfunction!(tare_of_events, module)?)?;

@@ -54,11 +54,13 @@ impl ConeRProblem {
         parameters: &str,
         patterns: Vec<SpikesIn<'_>>,
         targets: Vec<PyReadonlyArray1<'_, f64>>,
+        silence: Vec<Option<PyReadonlyArray1<'_, f64>>>,
     ) -> PyResult<Self> {
         let parameters = to_cone_r(parameters)?;
         let patterns = patterns.into_iter().map(to_spikes).collect::<PyResult<Vec<_>>>()?;
         let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
-        enter(py, |stop| core_learn::ConeRProblem::new(&parameters, &patterns, &targets, stop)).map(Self)
+        let silence = silence.iter().map(to_windows).collect::<PyResult<Vec<_>>>()?;
+        enter(py, |stop| core_learn::ConeRProblem::new(&parameters, &patterns, &targets, &silence, stop)).map(Self)
     }
 
     /// How many rows demand silence.
@@ -124,9 +126,17 @@ impl OnlineConeR {
         self.window.with(py, |window| window.silent_rows())
     }
 
-    fn add(&self, py: Python<'_>, pattern: SpikesIn<'_>, targets: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+    #[pyo3(signature = (pattern, targets, silence = None))]
+    fn add(
+        &self,
+        py: Python<'_>,
+        pattern: SpikesIn<'_>,
+        targets: PyReadonlyArray1<'_, f64>,
+        silence: Option<PyReadonlyArray1<'_, f64>>,
+    ) -> PyResult<()> {
         let (pattern, targets) = (to_spikes(pattern)?, slice("targets", &targets)?);
-        self.window.enter(py, |window, stop| window.add(&pattern, targets, stop))
+        let silence = to_windows(&silence)?;
+        self.window.enter(py, |window, stop| window.add(&pattern, targets, silence.as_deref(), stop))
     }
 
     /// A fit, and the exception of a signal that ended it early.
@@ -166,6 +176,12 @@ impl Plastic {
         let piece = to_spikes(piece)?;
         Ok(array(py, self.0.enter(py, |neuron, stop| neuron.push(&piece, learn, stop))?))
     }
+}
+
+/// Windows of silence, given as start, stop, start, stop ...
+fn to_windows(silence: &Option<PyReadonlyArray1<'_, f64>>) -> PyResult<Option<Vec<[f64; 2]>>> {
+    let windows = silence.as_ref().map(|ends| slice("silence", ends)).transpose()?;
+    Ok(windows.map(|ends| ends.chunks_exact(2).map(|window| [window[0], window[1]]).collect()))
 }
 
 /// Weights of an earlier fit, and its multipliers where it was of the same rows.

@@ -2,7 +2,7 @@
 
 use pyo3::prelude::*;
 
-use taxel_core::spikes;
+use taxel_core::{SpikeKind, spikes};
 
 use crate::convert::{EventsIn, SpikesIn, SpikesOut, from_spikes, slice, to_events, to_offsets, to_spikes};
 use crate::enter::enter;
@@ -10,10 +10,10 @@ use crate::enter::enter;
 /// Checks spike trains; raises where train or spike make no sense.
 #[pyfunction]
 fn check_spikes(py: Python<'_>, trains: SpikesIn<'_>) -> PyResult<()> {
-    let (times, offsets, values, start, stop) = trains;
+    let (times, offsets, values, kind, start, stop) = trains;
     let (times, offsets) = (slice("times", &times)?, to_offsets(&offsets)?);
-    let values = values.as_ref().map(|v| slice("values", v).map(<[f32]>::len)).transpose()?;
-    enter(py, |_| spikes::check(times, &offsets, values, start, stop))
+    let values = values.as_ref().map(|v| slice("values", v)).transpose()?;
+    enter(py, |_| spikes::check(times, &offsets, (SpikeKind::named(&kind)?, values), start, stop))
 }
 
 /// Checks events; raises where a column is short or an event lies outside its array.
@@ -28,7 +28,7 @@ fn check_events(py: Python<'_>, events: EventsIn<'_>) -> PyResult<()> {
 #[pyfunction]
 fn split_by_sign<'py>(py: Python<'py>, trains: SpikesIn<'py>) -> PyResult<SpikesOut<'py>> {
     let trains = to_spikes(trains)?;
-    let split = enter(py, |_| Ok::<_, taxel_core::Error>(trains.split_by_sign()))?;
+    let split = enter(py, |_| trains.split_by_sign())?;
     Ok(from_spikes(py, split))
 }
 

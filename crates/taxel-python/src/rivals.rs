@@ -106,7 +106,7 @@ fn run_rival<'py>(
     let rival = to_rival(parameters)?;
     let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
-    let fired = enter(py, |stop| rival.neuron.run(weights, &pattern, stop))?;
+    let fired = enter(py, |stop| rival.run(weights, &pattern, stop))?;
     Ok(array(py, fired))
 }
 

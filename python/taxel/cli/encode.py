@@ -52,6 +52,7 @@ def encode(
         "encoder": {key: value for key, value in json.loads(chosen.to_json()).items() if key != "tare"},
         "latency_ms": chosen.latency_ms,
         "trains": len(trains),
+        "kind": trains.kind,
         "signed": trains.signed,
         "spikes": int(counts.sum()),
         "silent_trains": int(np.count_nonzero(counts == 0)),

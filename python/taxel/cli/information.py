@@ -13,6 +13,7 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption
+from taxel.cli._bar import bar, duration
 from taxel.cli._recordings import SET_HELP, open_all, progress
 
 if TYPE_CHECKING:
@@ -72,41 +73,83 @@ def information(
     if report.exists() and not overwrite:
         raise FileExistsError(17, "exists already; give --overwrite or another --report", str(report))
     chosen = _encoder(encoder, values or [])
-    with progress(as_json) as update:
-        opened = []
-        for path in recordings:
-            update(f"reading {path}")
-            opened += open_all([path], array)
-        trials = _trials(labels, opened, window_ms)
-        if labels is None and len({trial.label for trial in trials}) == 1:
-            raise ProblemError(
-                f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, here "
-                f"{trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings a folder"
+    known = _Known()
+    try:
+        # `progress` prints the warnings; the bar shows the steps.
+        with progress(quiet=True), bar(as_json) as update:
+            opened = []
+            for path in recordings:
+                update(f"reading {path}", 0, 0)
+                opened += open_all([path], array)
+            trials = _trials(labels, opened, window_ms)
+            if labels is None and len({trial.label for trial in trials}) == 1:
+                raise ProblemError(
+                    f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, "
+                    f"here {trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings "
+                    "a folder"
+                )
+            _check_folds(trials, str(recordings[0]) if labels in (None, "notes") else labels, count=folds, seed=seed)
+
+            def show(what: str, done: int, of: int) -> None:
+                if not done and not as_json:
+                    typer.echo(
+                        f"{counted(len(trials), 'trial')}: about {duration(of / 1000)} on an idle processor; Ctrl-C "
+                        "prints what is known by then",
+                        err=True,
+                    )
+                update(what, done, of)
+
+            result = answer(
+                trials,
+                encoder=chosen,
+                window_ms=window_ms,
+                windows_ms=_numbers("--windows", windows_ms),
+                periods_ms=_numbers("--periods", periods_ms),
+                taxels=_whole("--taxels", taxels),
+                pools=_whole("--pools", pools),
+                draws=draws,
+                folds=folds,
+                shuffles=shuffles,
+                classifiers=[name for name in classifiers.split(",") if name],
+                seed=seed,
+                progress=show,
+                watch=known.add,
             )
-        _check_folds(trials, str(recordings[0]) if labels in (None, "notes") else labels, count=folds, seed=seed)
-        result = answer(
-            trials,
-            encoder=chosen,
-            window_ms=window_ms,
-            windows_ms=_numbers("--windows", windows_ms),
-            periods_ms=_numbers("--periods", periods_ms),
-            taxels=_whole("--taxels", taxels),
-            pools=_whole("--pools", pools),
-            draws=draws,
-            folds=folds,
-            shuffles=shuffles,
-            classifiers=[name for name in classifiers.split(",") if name],
-            seed=seed,
-            progress=lambda what, done, of: update(f"{what} ({done} of {of})"),
-        )
-        update("drawing")
-        write_information(report, result, overwrite=overwrite)
+            update("drawing", 0, 0)
+            write_information(report, result, overwrite=overwrite)
+    except KeyboardInterrupt:
+        typer.echo(known.line(draws), err=True)
+        raise
     if as_json:
         typer.echo(json.dumps({**result.to_dict(), "report": str(report)}))
         return
     for line in lines(result):
         typer.echo(line)
     typer.echo(f"written to {report}")
+
+
+class _Known:
+    """The bits of the settings of all taxels that are done, for a run that is stopped."""
+
+    def __init__(self) -> None:
+        self._bits: dict[float, dict[float, tuple[float, int]]] = {}
+
+    def add(self, period_ms: float, window_ms: float, bits: float) -> None:
+        """Note the bits of a setting by its draws so far."""
+        by_window = self._bits.setdefault(period_ms, {})
+        by_window[window_ms] = bits, by_window.get(window_ms, (0.0, 0))[1] + 1
+
+    def line(self, draws: int) -> str:
+        """Return one line of all settings so far."""
+        if not self._bits:
+            return "stopped; no setting is done yet"
+        counts = sorted({count for by_window in self._bits.values() for _, count in by_window.values()})
+        done = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+        by_period = "; ".join(
+            f"{period:g} ms: " + ", ".join(f"{bits:.2f} to {window:g} ms" for window, (bits, _) in by_window.items())
+            for period, by_window in self._bits.items()
+        )
+        return f"stopped; bits of {done} of {counted(draws, 'draw')}, without intervals: {by_period}"
 
 
 def _trials(labels: str | None, opened: list[Recording], window_ms: float | None) -> list[LabelledTrial]:

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from taxel.cli._recordings import (
 )
 
 if TYPE_CHECKING:
+    from taxel.cli._trained import Result
     from taxel.detect import Example, Judged, Outcome, Readout, Recipe
     from taxel.events import Events
     from taxel.frames import Frames
@@ -45,9 +47,10 @@ def train(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="The recipe to start from: touch (events of a board), gait_plate (counts), gait_insole (N), "
-            "gait_channel (others); or a TOML or JSON file (a path with a dot or a slash): [encoder], [learner], "
-            "[neurons.LABEL], run_threshold. Default, without --encoder: the recipe that fits the recording."
+            help="The recipe to start from: touch (contact and lift, events of a board), touch_kind (other labels), "
+            "gait_plate (counts), gait_insole (N), gait_channel (others); or a TOML or JSON file (a path with a dot or "
+            "a slash): [encoder], [learner], [neurons.LABEL], run_threshold, align. Default, without --encoder: "
+            "that which fits the recording and its labels."
         ),
     ] = None,
     encoder: Annotated[
@@ -63,9 +66,14 @@ def train(
     folds: Annotated[
         int | None,
         typer.Option(
-            min=2,
-            help="Cross-validate in this many folds: of recordings, or of blocks of time of a single recording.",
+            min=0,
+            help="Score on held-out data, in so many folds: of recordings, or of blocks of time of a single one; 0: on "
+            "the training data. Default: at most 5, as many as the recordings and the rarest label allow.",
         ),
+    ] = None,
+    align: Annotated[
+        bool | None,
+        typer.Option(help="Move labels to what the sensor felt before they are learnt. Default: as the recipe says."),
     ] = None,
     search: Annotated[
         bool,
@@ -80,9 +88,9 @@ def train(
 ) -> None:
     """Train neurons to detect labelled events, and save them as a readout.
 
-    Training starts from the recipe that fits the recordings; --recipe, --encoder and --set change that. With --folds
-    the score is cross-validated: each fold is scored by neurons that were trained without it. Without --folds the score
-    is that of the training data.
+    Training starts from the recipe that fits the recordings and labels; --recipe, --encoder and --set change that. The
+    score is cross-validated: each fold is scored by neurons that were trained without it. The first line says so, or
+    why the score is that of the training data.
 
     Example: taxel train trials/ -o gait.json
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json
@@ -90,58 +98,55 @@ def train(
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
     from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import Recipe, choose, judge, recipes  # noqa: PLC0415
-    from taxel.detect import train as train_readout  # noqa: PLC0415
-    from taxel.detect.training import changed  # noqa: PLC0415
 
     try_whole(out, overwrite=overwrite)
     if report is not None:
         try_whole(new_report(report))
+    if folds == 1:
+        raise ProblemError("--folds 1: must be 2 or more, or 0 for none")
     changes = assignments(values or [])
-    if encoder is not None:
-        changes["encoder.name"] = encoder
-    if recipe is not None:
-        Recipe.load(recipe, changes)  # reports errors of the recipe before the recordings are read
-    elif "encoder.name" in changes:
-        plan = Recipe.from_dict(changed({}, changes))
+    changes |= {key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None}
+    _planned(recipe, changes)  # reports errors of the recipe before the recordings are read
     opened = open_all(recordings)
     with progress(as_json) as update:
         update("reading")
         labelled = references(labels, "--labels", opened)
         if not any(labelled):
             raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
-        if recipe is None and "encoder.name" not in changes:
-            recipe = recipes.fitting(_source(opened[0]))
+        names = sorted({label for events in labelled for label in events})
+        recipe, plan = _planned(recipe, changes, _source(opened[0]), names)
+        assert plan is not None
         if recipe is not None:
-            plan = Recipe.load(recipe, changes, sorted({label for events in labelled for label in events}))
             update(f"starting from the recipe {recipe}")
-        examples = _examples(opened, labelled, tare, plan)
         if search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
             raise ProblemError("--search: the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
-        judged = None
-        if folds is not None:
-            registers = opened[0].registers
-            frame_us = None if registers is None else registers.frame_us
-            judged = judge(
-                examples, plan, folds, search=search, window_ms=window_ms, frame_us=frame_us, progress=update
-            )
-        if search:
-            plan = choose(examples, plan, window_ms=window_ms, progress=update)
-        readout = train_readout(examples, plan, progress=update)
-        outcomes = []
-        if judged is None or report is not None:
-            outcomes = _on_itself(readout, opened, examples, window_ms, update)
-    readout.save(out, overwrite=overwrite)
-    trained = _Trained(
-        out, readout, recipe, plan, opened, judged or _own(outcomes, window_ms), judged, window_ms, search, report
-    )
+        training = _Training(opened, _examples(opened, labelled, tare, plan), search, window_ms, update)
+        result, outcomes = training.result(plan, folds)
+    result.made.readout.save(out, overwrite=overwrite)
     if report is not None:
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
-        held_out = () if judged is None else judged.scores
-        title = f"Training of {out}"
-        write_listening(report, readout, outcomes, title=title, judged=trained.how, held_out=held_out)
-    typer.echo(json.dumps(trained.to_dict()) if as_json else trained.page())
+        title, held_out = f"Training of {out}", () if result.why else result.scored.scores
+        more: dict[str, Any] = {"held_out": held_out, "alignments": result.made.alignments}
+        write_listening(report, result.made.readout, outcomes, title=title, judged=result.how, **more)
+    typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else result.page(out, recipe, report))
+
+
+def _planned(
+    recipe: str | None,
+    changes: Mapping[str, Any],
+    source: Events | Frames | None = None,
+    labels: Sequence[str] | None = None,
+) -> tuple[str | None, Recipe | None]:
+    """Return the name of the recipe, if it has one, and the recipe: that which fits the source if none is named."""
+    from taxel.detect import Recipe, recipes  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect.training import changed  # noqa: PLC0415
+
+    if recipe is None and "encoder.name" in changes:
+        return None, Recipe.from_dict(changed({}, changes))
+    if recipe is None and source is not None:
+        recipe = recipes.fitting(source, labels or ())
+    return recipe, None if recipe is None else Recipe.load(recipe, changes, labels)
 
 
 def _source(recording: Recording) -> Events | Frames:
@@ -163,24 +168,60 @@ def _examples(
     ]
 
 
-def _on_itself(
-    readout: Readout,
-    opened: Sequence[Recording],
-    examples: Sequence[Example],
-    window_ms: float,
-    update: Callable[[str], None],
-) -> list[Outcome]:
-    """Return the outcomes of the readout on the recordings that it was trained on."""
-    from taxel.detect import Example, Outcome, run, score  # noqa: PLC0415
+@dataclass(frozen=True)
+class _Training:
+    """Hold the labelled recordings of a training, and how it is scored."""
 
-    outcomes = []
-    for one, example in zip(opened, examples, strict=True):
-        update(f"scoring on {one.path}")
-        truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
-        detections = run(readout, one, tare=example.tare)
-        own = score(detections, truth, window_ms)
-        outcomes.append(Outcome(str(one.path), Example(one, truth, example.tare), detections, own))
-    return outcomes
+    opened: Sequence[Recording]
+    examples: Sequence[Example]
+    search: bool
+    window_ms: float
+    update: Callable[[str], None]
+
+    def result(self, plan: Recipe, folds: int | None) -> tuple[Result, list[Outcome]]:
+        """Return the readout with its scores, held out where that can be, and its outcomes on the training data."""
+        from taxel.cli._trained import Result  # noqa: PLC0415  the command line starts quickly
+        from taxel.detect import choose, judge  # noqa: PLC0415
+        from taxel.detect.advice import advised  # noqa: PLC0415
+        from taxel.detect.folds import INNER, count_of_folds  # noqa: PLC0415
+        from taxel.detect.training import trained  # noqa: PLC0415
+
+        count, why = count_of_folds(self.examples) if folds is None else (folds, "" if folds else "--folds 0")
+        scored = None
+        if count:
+            registers = self.opened[0].registers
+            frame_us = None if registers is None else registers.frame_us
+            how: dict[str, Any] = {"search": self.search, "window_ms": self.window_ms, "frame_us": frame_us}
+            try:
+                scored = judge(self.examples, plan, count, **how, progress=self.update)
+            except ProblemError as error:
+                # Nobody asked for these folds, and all of the data may still be learnt from.
+                if folds is not None:
+                    raise
+                count, why = 0, f"a part of the training data cannot be learnt from: {error}"
+        if self.search:
+            plan = choose(self.examples, plan, window_ms=self.window_ms, progress=self.update)
+        begun = perf_counter()
+        made = trained(self.examples, plan, self.update)
+        outcomes = self._outcomes(made.readout)
+        a_point_s = None if self.search else (perf_counter() - begun) * INNER * (count + 1)
+        own = _own(outcomes, self.window_ms)
+        scored = own if scored is None else scored
+        advice = advised(made, self.examples, scored.together, own.together, a_point_s)
+        return Result(self.opened, made, scored, why, advice, self.window_ms, self.search), outcomes
+
+    def _outcomes(self, readout: Readout) -> list[Outcome]:
+        """Return the outcomes of the readout on the recordings that it was trained on."""
+        from taxel.detect import Example, Outcome, run, score  # noqa: PLC0415  the command line starts quickly
+
+        outcomes = []
+        for one, example in zip(self.opened, self.examples, strict=True):
+            self.update(f"scoring on {one.path}")
+            truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
+            detections = run(readout, one, tare=example.tare)
+            own = score(detections, truth, self.window_ms)
+            outcomes.append(Outcome(str(one.path), Example(one, truth, example.tare), detections, own))
+        return outcomes
 
 
 def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
@@ -191,67 +232,3 @@ def _own(outcomes: Sequence[Outcome], window_ms: float) -> Judged:
     truths = [one.example.labels for one in outcomes]
     together = score_together([one.found for one in outcomes], truths, window_ms)
     return Judged(tuple(one.score for one in outcomes if one.score is not None), together, "its own training data")
-
-
-@dataclass(frozen=True)
-class _Trained:
-    """The result of a training: the readout, and its scores."""
-
-    out: Path
-    readout: Readout
-    recipe: str | None
-    plan: Recipe
-    opened: Sequence[Recording]
-    scored: Judged
-    judged: Judged | None
-    window_ms: float
-    searched: bool
-    report: Path | None
-
-    @property
-    def how(self) -> str:
-        """Return on which data the readout was scored."""
-        if self.judged is None:
-            return "on its own training data"
-        one = self.judged.together
-        counts = f"{one.found} of {one.events} found, {one.missed} missed, {one.false} false"
-        return f"on its own training data; held out ({self.judged.how}): {counts}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the result as plain values for JSON."""
-        result: dict[str, Any] = {
-            "readout": str(self.out),
-            "labels": list(self.readout.labels),
-            "recipe": self.recipe,
-            "judged_on": self.scored.how,
-            "window_ms": self.window_ms,
-            "recordings": [
-                {"recording": str(one.path), "score": each.to_dict()}
-                for one, each in zip(self.opened, self.scored.scores, strict=True)
-            ],
-        }
-        result["score"] = self.scored.together.to_dict()
-        if self.report is not None:
-            result["report"] = str(self.report / "report.html")
-        if self.searched:
-            result["neurons"] = {label: dict(self.plan.neurons[label]) for label in self.readout.labels}
-        return result
-
-    def page(self) -> str:
-        """Return the result as lines for people."""
-        lines = []
-        if self.recipe is not None:
-            lines.append(f"recipe {self.recipe}" + (f": {self.plan.about}" if self.plan.about else ""))
-        lines.append(repr(self.readout))
-        for label in self.readout.labels if self.searched else ():
-            chosen = ", ".join(f"{key} {value}" for key, value in self.plan.neurons[label].items() if key != "search")
-            lines.append(f"{label}, chosen: {chosen}")
-        how = "on its own training data" if self.judged is None else f"on held-out data: {self.judged.how}"
-        lines.append(f"\n{how} (window {self.window_ms:g} ms)")
-        lines += [f"\n{one.path}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
-        if len(self.scored.scores) > 1:
-            lines.append(f"\nall recordings:\n{self.scored.together!r}")
-        lines.append(f"\nwritten to {self.out}")
-        if self.report is not None:
-            lines.append(f"report: {self.report / 'report.html'}")
-        return "\n".join(lines)

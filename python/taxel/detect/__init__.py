@@ -1,17 +1,19 @@
 """Spikes to detections, live and from recordings, and their score."""
 
+from taxel.detect.alignment import Alignment
 from taxel.detect.detector import ReadoutStream
 from taxel.detect.examples import Example, Outcome
-from taxel.detect.folds import Fold, Judged, Part, Trained, choose, judge
+from taxel.detect.folds import Fold, Judged, Part, choose, judge
 from taxel.detect.loading import load
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.readout import Learner, Readout, run
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron
-from taxel.detect.training import Recipe, train
+from taxel.detect.training import Recipe, Trained, train
 from taxel.detect.tuning import tune
 
 __all__ = [
+    "Alignment",
     "Example",
     "Fold",
     "Judged",

@@ -79,6 +79,14 @@ def write_nir(readout: Parts, path: str | os.PathLike[str], *, spike_ms: float |
     return lost(readout)
 
 
+def _check_ungraded(encoder: Encoder) -> None:
+    """Refuse an encoder of graded spikes: the input spikes of a NIR graph have no values."""
+    if encoder.kind == "graded":
+        raise ProblemError(
+            f"NIR takes no graded trains: the input spikes of its graphs have no values, those of {encoder.name} have"
+        )
+
+
 def lost(readout: Parts) -> list[str]:
     """Return what NIR's nodes cannot hold of a readout, one line each."""
     neurons = [one.neuron for one in readout.neurons.values()]
@@ -187,8 +195,12 @@ def _peak_one(tau: float, tau_s: float) -> float:
 def _graph(readout: Parts, spike_ms: float | None) -> NIRGraph:
     import nir  # noqa: PLC0415  an extra
 
+    _check_ungraded(readout.encoder)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
     neurons = list(readout.neurons.values())
+    for label, one in readout.neurons.items():
+        if one.neuron.rearm is not None:
+            raise ProblemError(f"NIR: rearm of {label!r} is {one.neuron.rearm}: no NIR neuron has that, must be None")
     nodes = [_gains(one.neuron, spike_s) for one in neurons]
     kinds = sorted({kind for kind, _, _ in nodes})
     if len(kinds) > 1:
@@ -246,6 +258,7 @@ def _parts(
     encoder = encoder or (own.encoder if own is not None else None)
     if encoder is None:
         raise ProblemError("NIR holds no encoder: say which with encoder=")
+    _check_ungraded(encoder)
     weights, delays_ms, cells = _layers(graph)
     spike_s = None if spike_ms is None else spike_ms / 1000.0
     templates: list[TrainedNeuron | None] = [None] * len(weights)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
@@ -18,15 +19,16 @@ from taxel._core import ProblemError
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import Readout, run
 from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import Fitting, Recipe, encoded, fit, readout_of
+from taxel.detect.training import Fitting, Recipe, Trained, encoded, learn, readout_of
 from taxel.detections import Detections
-from taxel.learn import ConeR
 from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["Fold", "Judged", "Part", "Trained", "choose", "judge"]
+__all__ = ["Fold", "Judged", "Part", "choose", "judge"]
 
 #: Into how many folds the training data of a fold are split for a search, where nothing else is stated.
-_INNER = 3
+INNER = 3
+#: Into how many folds examples are split at most, where nobody states it.
+_MOST = 5
 
 
 class Part(NamedTuple):
@@ -76,23 +78,6 @@ class Fold(NamedTuple):
     train: Sequence[Part]
     test: Sequence[Part]
     inner: Sequence[Fold] = ()
-
-
-class Trained(NamedTuple):
-    """What one fold trained.
-
-    Attributes
-    ----------
-    recipe : Recipe
-        With the points that a search chose.
-    learners : mapping of str to ConeR
-        The fitted learners, by label.
-    readout : Readout
-    """
-
-    recipe: Recipe
-    learners: Mapping[str, ConeR]
-    readout: Readout
 
 
 @dataclass(frozen=True)
@@ -176,11 +161,10 @@ def judge(
         report(f"fold {n + 1} of {len(ways)}")
         plan = recipe
         if search:
-            inner = fold.inner or _split(examples, fold.train, _INNER)
+            inner = fold.inner or _split(examples, fold.train, INNER)
             plan = _chosen(examples, patterns, recipe, inner, window, frame_us, report)
         with _quiet():
-            learners = fit([_of(part, patterns) for part in fold.train], plan, report)
-        trained.append(Trained(plan, learners, readout_of(learners, plan, array)))
+            trained.append(learn([_of(part, patterns) for part in fold.train], plan, array, report))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, frame_us))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
@@ -193,7 +177,7 @@ def choose(
     examples: Sequence[Example],
     recipe: Recipe,
     *,
-    k: int | Sequence[Fold] = _INNER,
+    k: int | Sequence[Fold] = INNER,
     window_ms: float = 50.0,
     frame_us: float | None = None,
     progress: Callable[[str], object] | None = None,
@@ -277,22 +261,39 @@ def _marks(
     frame_us: float | None,
     report: Callable[[str], object],
 ) -> list[tuple[int, float]]:
-    """Return the `Score.rank` over all folds of each of several recipes for one label."""
+    """Return the `Score.rank` over all folds of each of several recipes for one label.
+
+    One that cannot be learnt from a fold's training data, but for the first, ranks behind all others.
+    """
     array = array_of(examples)
     detections: list[dict[int, list[Detections]]] = [{} for _ in plans]
+    refused: set[int] = set()
     for n, fold in enumerate(folds):
         training = [_of(part, patterns) for part in fold.train]
         rows: Fitting | None = None
         for m, plan in enumerate(plans):
             report(f"trying point {m + 1} of {len(plans)} for {label}, fold {n + 1} of {len(folds)}")
+            if m in refused:
+                continue
             if rows is None or not rows.fits(plan):
-                rows = Fitting(training, plan, label, lambda _: None)
+                try:
+                    rows = Fitting(training, plan, label, lambda _: None)
+                except ProblemError:  # as where two labels lie within a longer refractory time
+                    if m == 0:
+                        raise
+                    refused.add(m)
+                    continue
             with _quiet():
                 readout = readout_of({label: rows.fit(plan)}, plan, array)
             for part in fold.test:
                 detections[m].setdefault(part.example, []).append(_detected(readout, examples, part, frame_us))
     truths = _truths(examples, folds, (label,))
-    return [score_together([reduce(add, of[place]) for place in sorted(of)], truths, window).rank for of in detections]
+    return [
+        (sys.maxsize, np.inf)
+        if m in refused
+        else score_together([reduce(add, of[place]) for place in sorted(of)], truths, window).rank
+        for m, of in enumerate(detections)
+    ]
 
 
 def _quiet() -> Any:
@@ -342,6 +343,37 @@ def _truths(
 
 def _only(examples: Sequence[Example], label: str) -> list[Example]:
     return [one._replace(labels={name: t for name, t in one.labels.items() if name == label}) for one in examples]
+
+
+def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
+    """Return into how many folds (checked) examples are split where nobody states it; 0 where they cannot be, and why.
+
+    At most five, not more than half the events of the rarest label, of several examples not more than these. Each
+    label must be in the training data of every fold.
+    """
+    counts = {label: 0 for example in examples for label in example.labels}
+    for example in examples:
+        for label, times in example.labels.items():
+            counts[label] += len(times)
+    rarest = min(counts, key=lambda label: counts[label])
+    most = min(_MOST, counts[rarest] // 2, *([len(examples)] if len(examples) > 1 else []))
+    if most < 2:
+        return 0, f"of {rarest} there {'is' if counts[rarest] == 1 else 'are'} {counts[rarest]}, and two folds need 4"
+    parts = [Part(n) for n in range(len(examples))]
+    for count in range(most, 1, -1):
+        lacking = [_lacks(examples, fold.train, counts) for fold in _split(examples, parts, count)]
+        if not any(lacking):
+            return count, ""
+    where = "recording" if len(examples) > 1 else "stretch of the recording"
+    return 0, f"every {next(filter(None, lacking))} is in one {where}"
+
+
+def _lacks(examples: Sequence[Example], parts: Sequence[Part], labels: Iterable[str]) -> str | None:
+    """Return a label of which no event is in any of these parts, if there is one."""
+    for label in labels:
+        if not any(label in (of := examples[one.example].labels) and len(_inside(of[label], one)) for one in parts):
+            return label
+    return None
 
 
 def _reporting(progress: Callable[[str], object] | None) -> Callable[[str], object]:

@@ -345,7 +345,7 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     """Return what the neurons of a readout detect in the spikes that its encoder made."""
     trains = trains.split_by_sign() if trains.signed else trains
     trains = trains.delayed(readout.delays_ms)
-    trains = SpikeTrains(trains.times, trains.offsets, trains.start, trains.stop + SILENCE_MS)
+    trains = trains.lasting(trains.stop + SILENCE_MS)
     detections = Detections([], [], [])
     for label, one in readout.neurons.items():
         spikes, slopes = one.neuron._run(one.weights, trains, readout.run_threshold)

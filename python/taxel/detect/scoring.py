@@ -20,7 +20,7 @@ from taxel.spikes import to_us
 __all__ = ["Score", "Spread", "score", "score_together"]
 
 #: So far apart, us, no detection of one recording pairs with an event of another when all are scored together.
-_APART_US = 10**12
+APART_US = 10**12
 
 
 class Spread(NamedTuple):
@@ -239,7 +239,7 @@ def score_together(
     detections: Sequence[Detections], truths: Sequence[Mapping[str, NDArray[np.int64]]], window_ms: float
 ) -> Score:
     """Score the detections in several recordings as one, with the events of each by the same labels (us)."""
-    later = range(0, len(detections) * _APART_US, _APART_US)
+    later = range(0, len(detections) * APART_US, APART_US)
     moved = [
         Detections._of(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(detections, later, strict=True)
     ]

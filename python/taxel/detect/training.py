@@ -8,24 +8,25 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, finite, instance, mapping, number, parameters, several, shown, text
+from taxel._base.arguments import callback, finite, flag, instance, mapping, number, parameters, several, shown, text
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import recipes
+from taxel.detect.alignment import Alignment, align
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.encode import Encoder
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
-from taxel.spikes import SpikeTrains, to_ms
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
-__all__ = ["Recipe", "train"]
+__all__ = ["Recipe", "Trained", "train"]
 
 
 #: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
@@ -49,10 +50,16 @@ class Recipe:
         See `taxel.Readout`.
     about, source : str
         What it is for, and where its values come from.
+    align : bool
+        Whether labels are moved to what the sensor felt (`Alignment`) before they are learnt: then `t` of a detection
+        is when the sensor felt the event. For labels that one input follows each time, as it does contact and lift;
+        labels that say of which kind a touch is have none, so recipes for them leave it off. Scores are against the
+        labels as given.
 
     Raises
     ------
-    ProblemError : a parameter that is not known (names it) or is invalid
+    ProblemError : a parameter that is not known (names it) or is invalid; a `delay_ms` that is none of the encoder's
+        `ages_ms`
 
     Examples
     --------
@@ -68,6 +75,7 @@ class Recipe:
     run_threshold: float = 1.0
     about: str = ""
     source: str = ""
+    align: bool = False
 
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
@@ -75,13 +83,15 @@ class Recipe:
             raise ProblemError(f"run_threshold is {shown(self.run_threshold)}: must be above 0 and finite")
         text("about", self.about)
         text("source", self.source)
+        flag("align", self.align)
         if not isinstance(self.neurons, Mapping):
             raise ProblemError(f"neurons is {shown(self.neurons)}: must be parameters by label")
         learner_from("learner", self.learner)
         for label in self.neurons:
             self.learner_of(text("label", label))
             for point in self.points_of(label):
-                learner_from(f"neurons.{label}.search", {**self.learner, **point})
+                place = f"neurons.{label}.search"
+                _check_age(place, learner_from(place, {**self.learner, **point})[1], self.encoder)
 
     def learner_of(self, label: str) -> tuple[ConeR, float]:
         """Return the learner of a label, not yet fitted, and the delay with which it is trained.
@@ -97,7 +107,7 @@ class Recipe:
 
         Raises
         ------
-        ProblemError : a label that the recipe does not know
+        ProblemError : a label that the recipe does not know, or a delay that is none of the encoder's `ages_ms`
 
         Examples
         --------
@@ -108,7 +118,9 @@ class Recipe:
         own = self.neurons.get(text("label", label), {})
         if not isinstance(own, Mapping):
             raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
-        return learner_from(f"neurons.{label}", {**self.learner, **self.points_of(label)[0]})
+        learner, delay_ms = learner_from(f"neurons.{label}", {**self.learner, **self.points_of(label)[0]})
+        _check_age(f"neurons.{label}", delay_ms, self.encoder)
+        return learner, delay_ms
 
     def points_of(self, label: str) -> list[dict[str, Any]]:
         """Return the parameters of a label's neuron, and behind them the others that the recipe lists for a search.
@@ -138,7 +150,7 @@ class Recipe:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Recipe:
-        """Build a recipe from plain values with the keys ``encoder learner neurons run_threshold about source``.
+        """Build a recipe from plain values, whose keys are its parameters.
 
         The encoder is a table with its `name` and parameters, where "none" stands for None: TOML has no word for it.
         What a recipe's file says of the recordings that it `fits` and of any `other` label is for `load`.
@@ -217,6 +229,26 @@ class Recipe:
         return cls.from_dict(changed(values, {} if changes is None else changes))
 
 
+class Trained(NamedTuple):
+    """What one training made.
+
+    Attributes
+    ----------
+    recipe : Recipe
+        In a fold with the points that a search chose.
+    learners : mapping of str to ConeR
+        The fitted learners, by label.
+    readout : Readout
+    alignments : mapping of str to Alignment
+        By how much its labels were moved to what the sensor felt, by label; empty where the recipe does not align them.
+    """
+
+    recipe: Recipe
+    learners: Mapping[str, ConeR]
+    readout: Readout
+    alignments: Mapping[str, Alignment]
+
+
 def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return values changed at dotted keys; a change for all neurons takes precedence over a neuron's own value."""
     if not isinstance(changes, Mapping):
@@ -269,7 +301,8 @@ def train(
 
     Notes
     -----
-    Target = event + the encoder's latency + the trained delay (thesis 6.5; the delay is ours).
+    Target = event + the encoder's latency + the trained delay (thesis 6.5; the delay is ours). The event is the label,
+    or where the recipe aligns labels what the sensor felt of it.
 
     Examples
     --------
@@ -280,10 +313,15 @@ def train(
     >>> train([Example(frames, {"contact": [20_000]})], recipe)
     Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
     """
+    return trained(examples, recipe, progress).readout
+
+
+def trained(examples: Sequence[Example], recipe: Recipe, progress: Callable[[str], object] | None) -> Trained:
+    """Train a readout as `train` does, and return how its labels were aligned as well."""
     sound = checked(examples)
     report = (lambda _: None) if progress is None else callback("progress", progress)
     instance("recipe", recipe, Recipe)
-    return readout_of(fit(encoded(sound, recipe, report), recipe, report), recipe, array_of(sound))
+    return learn(encoded(sound, recipe, report), recipe, array_of(sound), report)
 
 
 def encoded(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> list[Example]:
@@ -306,12 +344,15 @@ def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | Non
     return Readout(recipe.encoder, learners, array=array, delay_ms=delays, run_threshold=float(recipe.run_threshold))
 
 
-def fit(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> dict[str, ConeR]:
+def learn(patterns: Sequence[Example], recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
     """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
-    learners = {}
-    for label in _labels_to_learn(examples, recipe):
-        learners[label] = Fitting(examples, recipe, label, report).fit(recipe)
-    return learners
+    learners, alignments = {}, {}
+    for label in _labels_to_learn(patterns, recipe):
+        fitting = Fitting(patterns, recipe, label, report)
+        learners[label] = fitting.fit(recipe)
+        if fitting.alignment is not None:
+            alignments[label] = fitting.alignment
+    return Trained(recipe, learners, readout_of(learners, recipe, array), alignments)
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
@@ -341,25 +382,22 @@ class Fitting:
         self._needs = _rows_of(recipe, label)
         learner, delay_ms = recipe.learner_of(label)
         self._shift_ms = recipe.encoder.latency_ms + delay_ms
-        self._targets: list[NDArray[np.float64]] = []
-        trains = []
-        for k, (source, labels, _) in enumerate(examples):
-            assert isinstance(source, SpikeTrains)
-            times = to_ms(np.sort(labels.get(label, np.empty(0, np.int64))))
-            outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
-            if len(outside):
-                raise ProblemError(
-                    f"example {k}: {label} at {outside[0]:g} ms lies outside it, {source.start:g} to {source.stop:g} ms"
-                )
-            self._targets.append(times + self._shift_ms)
-            trains.append(_until(source, self._targets[-1]))
-        count = sum(map(len, self._targets))
+        given = [_times(k, one, label) for k, one in enumerate(examples)]
+        count = sum(map(len, given))
         if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
+        sources: list[SpikeTrains] = [one.source for one in examples]  # type: ignore[misc]
+        self.alignment = align(sources, label, given, recipe.encoder.latency_ms) if recipe.align else None
+        felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
+        self._targets = [to_ms(times) + self._shift_ms for times in felt]
+        trains = [_until(source, targets) for source, targets in zip(sources, self._targets, strict=True)]
         self._what = f"learning {label} from {counted(count, 'event')}"
         self._report = report
         report(self._what)
-        self._rows = learner.prepare(trains, self._targets)
+        try:
+            self._rows = learner.prepare(trains, self._targets)
+        except ProblemError as error:
+            raise ProblemError(f"{label}: {error}") from None
         self._before: ConeR | None = None
 
     def fits(self, recipe: Recipe) -> bool:
@@ -379,8 +417,22 @@ class Fitting:
                 ),
             )
         for text_of in _remarks(cone, self._targets, self._shift_ms, caught):
-            warnings.warn(f"{self._label}: {text_of}", stacklevel=4)
+            warnings.warn(f"{self._label}: {text_of}", stacklevel=5)
         return cone
+
+
+def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
+    """Return the events of a label in the encoded example k, us, ascending; refuse one outside the example."""
+    source, labels, _ = example
+    assert isinstance(source, SpikeTrains)
+    events = np.sort(labels.get(label, np.empty(0, np.int64)))
+    times = to_ms(events)
+    outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
+    if len(outside):
+        raise ProblemError(
+            f"example {k}: {label} at {outside[0]:g} ms lies outside it, {source.start:g} to {source.stop:g} ms"
+        )
+    return events
 
 
 def _rows_of(recipe: Recipe, label: str) -> str:
@@ -409,8 +461,18 @@ def _remarks(
 
 def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:
     """Return the trains with an end after the last target, which may come after the last spike."""
-    stop = max(trains.stop, *targets, trains.start)
-    return SpikeTrains(trains.times, trains.offsets, trains.start, stop, trains.values)
+    return trains.lasting(max(trains.stop, *targets, trains.start))
+
+
+def _check_age(place: str, delay_ms: float, encoder: Encoder) -> None:
+    """Refuse a delay at which none of the encoder's trains of ages begins: such a neuron fires late, or never."""
+    ages = getattr(encoder, "ages_ms", None)
+    if ages is not None and round(to_us(delay_ms)) not in {round(to_us(age)) for age in ages}:
+        listed = ", ".join(f"{age:g}" for age in ages)
+        raise ProblemError(
+            f"{place}: delay_ms is {delay_ms:g}, and the encoder's ages_ms are {listed}: must be one of them, as a "
+            "neuron is trained to fire where an age begins"
+        )
 
 
 def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:

@@ -8,6 +8,7 @@ from taxel.encode.fa1 import FA1 as FA1
 from taxel.encode.fa2 import FA2 as FA2
 from taxel.encode.level_crossing import LevelCrossing as LevelCrossing
 from taxel.encode.level_crossing import RunningRange as RunningRange
+from taxel.encode.local_load import LocalLoad as LocalLoad
 from taxel.encode.moments import Moments as Moments
 from taxel.encode.sa1 import SA1 as SA1
 from taxel.encode.sa2 import SA2 as SA2

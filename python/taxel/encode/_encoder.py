@@ -18,6 +18,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains
+from taxel.spikes.exchange import Kind
 from taxel.tare import Tare
 
 __all__ = ["Encoder", "EncoderStream"]
@@ -118,9 +119,14 @@ class Encoder(Value):
         return _core.encoder_about(self._json(), instance("array", array, Array)._parts())[0]
 
     @property
+    def kind(self) -> Kind:
+        """The meaning of its spikes' values, as in `SpikeTrains`: "unsigned", "signed" or "graded"."""
+        return _core.encoder_about(self._json(), Array(1, 1)._parts())[1]  # type: ignore[return-value]
+
+    @property
     def signed(self) -> bool:
         """Whether spikes carry a signed value, so that each train is two inputs of a neuron, ON and OFF."""
-        return _core.encoder_about(self._json(), Array(1, 1)._parts())[1]
+        return self.kind == "signed"
 
     @property
     def latency_ms(self) -> float:
@@ -184,7 +190,7 @@ class Encoder(Value):
         x = recorded(x)
         if isinstance(x, Events):
             return SpikeTrains._from_parts(_core.encode_events(self._json(), x._parts()))
-        return SpikeTrains._from_parts(_core.encode_frames(self._json(), _frames(x)._parts()))
+        return SpikeTrains._from_parts(_core.encode_frames(self._json(), frames_of(x)._parts()))
 
     def fit(self, recordings: object = None, targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
         """Return the encoder itself, which learns nothing; a scikit-learn pipeline calls `fit` of each step.
@@ -320,7 +326,7 @@ class EncoderStream:
         """
         if isinstance(x, Events):
             return SpikeTrains._from_parts(self._begin(x.array).push_events(x._parts()))
-        frames = _frames(x)
+        frames = frames_of(x)
         return SpikeTrains._from_parts(self._begin(frames.array).push_frames(frames._parts()))
 
     def advance(self, t_us: int) -> SpikeTrains:
@@ -374,7 +380,8 @@ class EncoderStream:
         return SpikeTrains.from_lists([]) if parts is None else SpikeTrains._from_parts(parts)
 
 
-def _frames(x: object) -> Frames:
+def frames_of(x: object) -> Frames:
+    """Return `x` if it is frames; raise a ProblemError otherwise."""
     if not isinstance(x, Frames):
         raise ProblemError(f"{type(x).__name__}: encoders take taxel.Events or taxel.Frames")
     return x

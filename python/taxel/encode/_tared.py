@@ -67,17 +67,22 @@ class Tared(Encoder):
         ------
         ProblemError : as `Encoder.encode`; no tare, another array's, or one longer than half of the recording
         """
+        encoder, held = self._with_rest_of(x)
+        return super(Tared, encoder).encode(held)
+
+    def _with_rest_of(self, x: Events | Frames | Recorded) -> tuple[Self, Events | Frames | Recorded]:
+        """Return the encoder with its tare, measured at the beginning of `x` if it is a number of seconds, and `x`."""
         if self.tare is None or self._is_rest():
-            return super().encode(x)
+            return self, x
         held = recorded(x)
         if not isinstance(held, Events | Frames) or not len(held.t):
-            return super().encode(held)
+            return self, held
         first, last = int(held.t[0]), int(held.t[-1])
         rest_us = whole("tare, us", round(1e6 * number("tare", self.tare)), 1, 2**53)
         if 2 * rest_us > last - first:
             lasts = f"the recording lasts {(last - first) / 1e6:g} s"
             raise ProblemError(f"tare is {self.tare} s: more than half of it would be rest, {lasts}")
-        return self.with_tare(Tare.take(held, stop_us=first + rest_us)).encode(held)
+        return self.with_tare(Tare.take(held, stop_us=first + rest_us)), held
 
     def __eq__(self, other: object) -> bool:
         same = super().__eq__(other)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from taxel._base.parameters import defaults
@@ -28,12 +29,20 @@ class Moments(Tared):
     first the trains of levels reached, then those of levels left, then (with `tonic_ms`) those that fire while beyond
     the level. The first sample is not a crossing. Computed in float64.
 
+    With `graded` all trains are graded. Those of the levels, whose spikes have the value 1, are followed by one for
+    each moment in the order area, total, peak, x, y. During a touch it fires at every sample with the value
+    log(1 + moment), of a displacement log(1 + its size) with its sign; where the value is 0 there is no spike. With
+    `ages_ms` the last trains are one an age. During a touch, at every sample, one of them fires: that of the largest of
+    the ages that the touch has reached. Age is counted from the encoder's own onset, the first sample at which area is
+    above 0. A sample is a frame, or of events the state every `period_ms` from the first stamp.
+
     Parameters
     ----------
     noise_floor : float, in the sensor's unit (ticks), 0 or more
         That of the board; 3 in its fast presets.
-    levels : int, from 1 to 1000
-        Number of levels of each moment, for a displacement on each side of 0.
+    levels : int, from 0 to 1000
+        Number of levels of each moment, for a displacement on each side of 0. With 0 there are no trains of levels, and
+        the least and largest levels only choose the moments; then `graded` or `ages_ms` is needed.
     area : (float, float), taxels, above 0, optional
         Least and largest level; None excludes the moment.
     total, peak : (float, float), in the sensor's unit, above 0, optional
@@ -42,8 +51,15 @@ class Moments(Tared):
         The same for the displacement of the centre, for x and for y.
     tonic_ms : float, ms, whole us, optional
         Adds tonic spikes: one when a level is reached, then one every `tonic_ms` while beyond it. None: crossings only.
+    graded : bool
+        Whether the moments themselves are encoded too, as graded spikes.
+    ages_ms : float sequence, ms, 0 or more, ascending, optional
+        Ages of a touch, each with a train that fires from that age to the next one, the last to the end of the touch.
+        Each is rounded to a whole us. A neuron that learns to fire at an age needs an age there: training refuses a
+        `delay_ms` that is none of them.
     period_ms : float, ms, whole us
-        Sampling period of events; the step of the wire's stamps is lossless.
+        Sampling period of events; the step of the wire's stamps is lossless. With `graded` or `ages_ms` each sample of
+        a touch gives spikes, so a longer period gives fewer.
     tare : Tare, or float, s, optional
         The taxels' rest, or the duration of rest at the beginning of each recording. It is valid for one board on one
         day, so a saved readout has none; encoding requires one.
@@ -62,6 +78,13 @@ class Moments(Tared):
     >>> encoder = Moments(levels=3, area=(1, 4), total=None, peak=None, displacement_mm=(0.3, 5), tonic_ms=None)
     >>> [reached.tolist() for reached in encoder.with_tare(Tare.take(rest)).encode(frames)][:4]
     [[0.2], [0.2], [], [0.4]]
+
+    The logarithm of the area at each frame, and which of two ages has been reached.
+
+    >>> encoder = Moments(levels=0, total=None, peak=None, displacement_mm=None, graded=True, ages_ms=[0.0, 0.2])
+    >>> spikes = encoder.with_tare(Tare.take(rest)).encode(frames)
+    >>> [train.tolist() for train in spikes], spikes.values.round(2)
+    ([[0.2, 0.4], [0.2], [0.4]], array([1.1 , 1.39, 1.  , 1.  ], dtype=float32))
     """
 
     name = "moments"
@@ -73,5 +96,7 @@ class Moments(Tared):
     peak: tuple[float, float] | None = _DEFAULT.peak
     displacement_mm: tuple[float, float] | None = _DEFAULT.displacement_mm
     tonic_ms: float | None = _DEFAULT.tonic_ms
+    graded: bool = _DEFAULT.graded
+    ages_ms: Sequence[float] | None = _DEFAULT.ages_ms
     period_ms: float = _DEFAULT.period_ms
     tare: Tare | float | None = _DEFAULT.tare

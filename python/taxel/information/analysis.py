@@ -8,17 +8,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from taxel._base.arguments import callback, instance, several, text, whole
 from taxel.encode import ChangeEvents, Encoder
+from taxel.information._threads import threads
 from taxel.information.answers import Answer, Point, is_above_chance
 from taxel.information.controls import controls
-from taxel.information.estimate import Estimate, estimate, zero_test
+from taxel.information.estimate import Estimate, bits_of, estimate, zero_test
 from taxel.information.keeping import Verdict, keeps
-from taxel.information.nested import Nested, training_curve
+from taxel.information.nested import WORTH_THREADS, Matrices, Nested, predictions, training_curve
+from taxel.information.pace import Pace, Work
 from taxel.information.question import Question
-from taxel.information.rasters import features, frame_grams
+from taxel.information.rasters import frame_grams
 from taxel.information.sampling import (
     Spikes,
     pictures_of,
@@ -34,8 +35,6 @@ __all__ = ["CLASSIFIERS", "answer"]
 CLASSIFIERS = ("neighbours", "cone_r", "tempotron")
 #: Numbers of neighbours that are tried.
 NEIGHBOURS = (1, 3, 5, 9, 15)
-#: Number of trials from which several threads are used for their matrices.
-_WORTH_THREADS = 1000
 #: Pictures are compared with events only where they have at most so many values.
 _MOST_VALUES = 2**28
 
@@ -56,6 +55,7 @@ def answer(
     classifiers: Sequence[str] = ("neighbours",),
     seed: int = 0,
     progress: Callable[[str, int, int], object] | None = None,
+    watch: Callable[[float, float, float], object] | None = None,
 ) -> Answer:
     """Estimate how many bits the events of labelled trials hold about the labels, by period, time, taxels and cost.
 
@@ -85,7 +85,10 @@ def answer(
         Beside the discriminants, at the full setting.
     seed : int, 0 or more
     progress : function of (what, done, all), optional
-        What it raises ends the work.
+        What is computed next, and how much of the expected time of all has passed, in ms of one core. The first call
+        comes before the work (done is 0); what it raises ends the work.
+    watch : function of (period_ms, window_ms, bits), optional
+        Called whenever a draw of a setting of all taxels is done, with the bits by the draws so far.
 
     Returns
     -------
@@ -97,51 +100,66 @@ def answer(
         in any trial
     """
     listed = [instance(f"trials[{k}]", one, LabelledTrial) for k, one in enumerate(several("trials", trials))]
-    if progress is not None:
-        callback("progress", progress)
+    for name, function in (("progress", progress), ("watch", watch)):
+        if function is not None:
+            callback(name, function)
     for name, value, least in (("draws", draws, 1), ("folds", folds, 2), ("shuffles", shuffles, 1), ("seed", seed, 0)):
         whole(name, value, least)
     also = [text("classifiers", one, CLASSIFIERS) for one in several("classifiers", classifiers)]
-    answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed), progress)
-    answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms, len(also), int(shuffles))
+    answering = _Answering(listed, encoder, window_ms, int(draws), int(folds), int(seed))
+    answering.set_out(periods_ms, windows_ms, taxels, pools, taxels_at_ms)
     # On small matrices several threads are slower than one, and far slower where other processes compute as well.
-    with threadpool_limits(1 if len(listed) < _WORTH_THREADS else None):
-        return answering.answer(also, int(shuffles))
+    with threads(several=len(listed) >= WORTH_THREADS):
+        return answering.answer(also, int(shuffles), Pace(progress), watch)
 
 
 class _Answering(Question):
     """Computes the answer to a question, setting by setting."""
 
-    def answer(self, classifiers: list[str], shuffles: int) -> Answer:
+    def answer(
+        self,
+        classifiers: list[str],
+        shuffles: int,
+        pace: Pace,
+        watch: Callable[[float, float, float], object] | None,
+    ) -> Answer:
         """Return the answer for all settings."""
+        self.pace, self.work = pace, Work(self)
+        pace.expect(self.work.all(classifiers, shuffles))
         values = isinstance(self.encoder, ChangeEvents) and self.encoder.bits > 1
         responses_at: dict[tuple[int, float], list[Any]] = {}
         about: dict[tuple[int, float], list[tuple[float, float, float]]] = {}
         frames: dict[int, list[Any]] = {}
         by_column: dict[tuple[str, int], list[Any]] = {}
-        reference: tuple[Spikes, list[NDArray[np.float64]], list[int], Nested] | None = None
+        reference: tuple[Spikes, Matrices, Nested] | None = None
         missing: set[str] = set()
-        for period in self.periods:
-            for draw in range(self.draws):
-                self.tell(f"{to_ms(period):g} ms, draw {draw + 1}")
+        for draw in range(self.draws):
+            for period in self.periods:
+                pace.begin(f"{to_ms(period):g} ms, draw {draw + 1}", self.work.rasters(period))
                 spikes = self.spikes(period, draw)
-                for window, grams in zip(self.windows, self.grams(spikes, self.windows), strict=True):
-                    sizes = [features(spikes, window)] * len(grams)
-                    nested = self.nested(grams, sizes, draw=draw)
+                for window, matrices in zip(self.windows, self.matrices(spikes, self.windows), strict=True):
+                    at = f"{to_ms(period):g} ms to {to_ms(window):g} ms"
+                    pace.begin(f"{at}, draw {draw + 1}", self.work.prediction(period))
+                    nested = self.nested(matrices, draw=draw)
                     responses_at.setdefault((period, window), []).append(nested.responses)
                     about.setdefault((period, window), []).append(_about(spikes, window, values))
                     missing |= {f"fold {fold + 1} has no training trial of {name}" for fold, name in nested.missing}
                     if reference is None and window == self.windows[-1]:
-                        reference = spikes, grams, sizes, nested
-                for name, column in self.columns.items():
-                    self.tell(f"{to_ms(period):g} ms, {name}")
-                    by_column.setdefault((name, period), []).append(self.nested(grams, sizes, column, draw).responses)
-                self.tell(f"{to_ms(period):g} ms, pictures")
+                        reference = spikes, matrices, nested
+                    if watch is not None:
+                        watch(to_ms(period), to_ms(window), bits_of(self.labels, responses_at[period, window]))
+                for name in self.columns:
+                    pace.begin(f"{to_ms(period):g} ms, {name}", self.work.prediction(period))
+                    by_column.setdefault((name, period), []).append(self.nested(matrices, name, draw).responses)
+                pace.begin(f"{to_ms(period):g} ms, pictures", self.work.pictures(period))
                 picture = self._pictures(spikes)
                 if picture is not None:
-                    frames.setdefault(period, []).append(self.nested(*picture, draw=draw).responses)
+                    frames.setdefault(period, []).append(self.nested(picture, draw=draw).responses)
         assert reference is not None  # there are a period, a draw and a window at least
-        estimates = {key: self.estimate(responses) for key, responses in responses_at.items()}
+        estimates = {}
+        for key, responses in responses_at.items():
+            pace.begin("intervals", self.work.estimate())
+            estimates[key] = self.estimate(responses)
         everything = len(self.active)
         points = []
         for (period, window), one in estimates.items():
@@ -150,10 +168,9 @@ class _Answering(Question):
                 verdict = keeps(one, estimates[self.periods[0], window], groups=self.groups)
             points.append(_point(period, window, everything, "all", one, about[period, window], verdict))
         full = next(p for p in points if p.verdict is None and p.window_ms == to_ms(self.windows[-1]))
-        spikes, grams, sizes, first = reference
-        self.tell("labels shuffled", 0)
+        spikes, matrices, first = reference
         zero = zero_test(
-            lambda labels: self._shuffled(grams, sizes, labels),
+            lambda labels: self._shuffled(matrices, labels),
             self.labels,
             full.found.bits,
             groups=self.groups,
@@ -162,6 +179,9 @@ class _Answering(Question):
         )
         self._warn(missing)
         taxels = self._by_taxels(full, values)
+        answered = self._columns_answered(by_column, about, everything)
+        pace.begin("controls", self.work.controls())
+        beside = controls(self)
         if not is_above_chance(full.found, zero):
             points = [_with_nothing(p) if p.window_ms == full.window_ms else p for p in points]
             taxels = tuple(map(_with_nothing, taxels))
@@ -173,76 +193,80 @@ class _Answering(Question):
             points=tuple(points),
             taxels=taxels,
             frames={to_ms(period): self.estimate(responses) for period, responses in frames.items()},
-            controls=controls(self),
+            controls=beside,
             zero=zero,
-            training=self._training(grams, sizes, first),
-            classifiers={name: self._classified(name, spikes, grams, sizes) for name in classifiers},
-            parameters=self._columns_answered(by_column, about, everything),
+            training=self._training(matrices, first),
+            classifiers={name: self._classified(name, spikes, matrices) for name in classifiers},
+            parameters=answered,
             notes=tuple(self.notes),
             draws=self.draws,
             seed=self.seed,
         )
 
-    def _shuffled(self, grams: list[NDArray[np.float64]], sizes: list[int], labels: Any) -> NDArray[np.generic]:
-        self.tell("labels shuffled")
-        return self.nested(grams, sizes, labels).responses
+    def _shuffled(self, matrices: Matrices, labels: Any) -> NDArray[np.generic]:
+        self.pace.begin("labels shuffled", self.work.prediction(self.periods[0]))
+        return predictions(matrices, self.split(labels)).responses
 
-    def _pictures(self, spikes: Spikes) -> tuple[list[NDArray[np.float64]], list[int]] | None:
+    def _pictures(self, spikes: Spikes) -> Matrices | None:
         """Return the pictures' inner products to the whole window; None without values, or where they are too many."""
         bins = int(spikes.bins_to(self.window_us).max(initial=0))
         active = len(np.unique(spikes.taxel))
         if not all(held.has_values for held in self.held) or not 0 < bins * active * spikes.trials <= _MOST_VALUES:
             return None
         values = pictures_of(self.trials, self.held, spikes, self.contact, bins)
-        return frame_grams(values, spikes, [self.window_us]), [bins * active]
+        return Matrices(frame_grams(values, spikes, [self.window_us]), [bins * active])
 
     def _by_taxels(self, full: Point, values: bool) -> tuple[Point, ...]:
         """Return the points with fewer or larger taxels."""
         period = self.taxels_at
         window = self.window_us
-        points = []
-        for kind, size in [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]:
-            responses, about, taxels = [], [], size
-            for draw in range(self.draws):
-                self.tell(f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}")
+        settings = [*(("random", n) for n in self.random_taxels), *(("pooled", n) for n in self.pools)]
+        responses: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
+        about: dict[tuple[str, int], list[Any]] = {setting: [] for setting in settings}
+        taxels = {setting: setting[1] for setting in settings}
+        for draw in range(self.draws):
+            every = self.spikes(period, draw)
+            for kind, size in settings:
+                what = f"{size} taxels at random" if kind == "random" else f"taxels of {size} x {size}"
+                self.pace.begin(what, self.work.taxels(kind, size))
                 if kind == "random":
                     random = np.random.default_rng([self.seed, draw, size, 1])
-                    chosen = np.sort(random.choice(self.active, size, replace=False))
-                    spikes = self.spikes(period, draw).of(chosen)
+                    spikes = every.of(np.sort(random.choice(self.active, size, replace=False)))
                 else:
                     spikes = self.spikes(period, draw, size)
-                    taxels = spikes.taxels
-                grams = self.grams(spikes, [window])[0]
-                responses.append(self.nested(grams, [features(spikes, window)] * len(grams), draw=draw).responses)
-                about.append(_about(spikes, window, values))
-            one = self.estimate(responses)
-            points.append(_point(period, window, taxels, kind, one, about, keeps(one, full.found, groups=self.groups)))
+                    taxels[kind, size] = spikes.taxels
+                nested = self.nested(self.matrices(spikes, [window])[0], draw=draw)
+                responses[kind, size].append(nested.responses)
+                about[kind, size].append(_about(spikes, window, values))
+        points = []
+        for kind, size in settings:
+            one, mine = self.estimate(responses[kind, size]), (kind, size)
+            verdict = keeps(one, full.found, groups=self.groups)
+            points.append(_point(period, window, taxels[mine], kind, one, about[mine], verdict))
         return tuple(points)
 
-    def _training(
-        self, grams: list[NDArray[np.float64]], sizes: list[int], first: Nested
-    ) -> tuple[tuple[int, float], ...]:
-        self.tell("by number of training trials")
+    def _training(self, matrices: Matrices, first: Nested) -> tuple[tuple[int, float], ...]:
+        self.pace.begin("by number of training trials", self.work.prediction(self.periods[0]))
         least = int(np.unique(self.labels, return_counts=True)[1].min())
         most = least - -(-least // self.folds)
         steps = sorted({max(2, most // k) for k in (12, 6, 3, 2)} - {most})
         steps = [n for n in steps if n < most]
-        responses = training_curve(grams, sizes, self.labels, first, steps, seed=self.seed)
+        responses = training_curve(matrices.squares, matrices.features, self.labels, first, steps, seed=self.seed)
         curve = [(n, estimate(self.labels, one, redraws=2).bits) for n, one in zip(steps, responses, strict=True)]
         return (*curve, (most, estimate(self.labels, first.responses, redraws=2).bits))
 
-    def _classified(self, name: str, spikes: Spikes, grams: list[NDArray[np.float64]], sizes: list[int]) -> Estimate:
-        self.tell(name)
+    def _classified(self, name: str, spikes: Spikes, matrices: Matrices) -> Estimate:
+        self.pace.begin(name, self.work.classifier(name))
         if name == "neighbours":
-            return self.estimate(self.nested(grams, sizes, neighbours=NEIGHBOURS).responses)
-        fold = self.nested([grams[-1]], [sizes[-1]], ridges=[1.0]).folds
-        return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, fold))
+            return self.estimate(self.nested(matrices, neighbours=NEIGHBOURS).responses)
+        return self.estimate(readout_responses(name, spikes, self.window_us, self.labels, self.split(self.labels).fold))
 
     def _columns_answered(
         self, by_column: dict[tuple[str, int], list[Any]], about: dict[Any, Any], everything: int
     ) -> dict[str, tuple[Point, ...]]:
         by_name: dict[str, list[Point]] = {}
         for (name, period), responses in by_column.items():
+            self.pace.begin(f"intervals, {name}", self.work.estimate())
             one = self.estimate(responses, self.columns[name])
             by_name.setdefault(name, []).append(
                 _point(period, self.windows[-1], everything, "all", one, about[period, self.windows[-1]], None)

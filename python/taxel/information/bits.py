@@ -7,7 +7,6 @@ takes one table or a stack of them, and all trials count alike.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +17,7 @@ from taxel.information._labels import words
 
 __all__ = [
     "confusion_matrix",
+    "corrected",
     "label_entropy",
     "local_information",
     "panzeri_treves",
@@ -219,11 +219,30 @@ def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
     (0.191, 0.155)
     """
     table = _table(counts)
+    return np.asarray(np.clip(corrected(table), 0.0, label_entropy(table)))
+
+
+def corrected(counts: ArrayLike) -> NDArray[np.float64]:
+    """Return the corrected information in bits as `panzeri_treves` does, but not held within 0 and the labels' entropy.
+
+    Parameters
+    ----------
+    counts : int, shape (..., labels, responses), 0 or more
+
+    Returns
+    -------
+    float64, shape (...), bits
+
+    Raises
+    ------
+    ProblemError : counts that are invalid
+    """
+    table = _table(counts)
     trials = table.sum((-1, -2))
     by_label = table.sum(-1)
     occupied = np.where(by_label > 0, relevant_responses(table) - 1, 0).sum(-1)
     bias = (occupied - (relevant_responses(table.sum(-2)) - 1)) / (2 * trials * np.log(2))
-    return np.asarray(np.clip(plug_in(table) - bias, 0.0, label_entropy(table)))
+    return np.asarray(plug_in(table) - bias)
 
 
 def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: int = 0) -> float:
@@ -267,12 +286,11 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
     means = [float(plug_in(table))]
     for parts in (2, 4):
         ends = np.linspace(0, trials, parts + 1).astype(int)
-        values: list[Any] = []
+        tables = []
         for _ in range(rounds):
             dealt = random.permutation(cells)
-            tables = (np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends))
-            values += [plug_in(one.reshape(table.shape)) for one in tables]
-        means.append(float(np.mean(values)))
+            tables += [np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends)]
+        means.append(float(np.mean(plug_in(np.reshape(tables, (-1, *table.shape))))))
     # The value at 0 of the parabola through (1, whole), (2, half) and (4, quarter), in units of 1/N.
     at_zero = (8 * means[0] - 6 * means[1] + means[2]) / 3
     return float(np.clip(at_zero, 0.0, label_entropy(table)))

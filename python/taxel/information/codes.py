@@ -94,7 +94,7 @@ class Code(ABC):
         >>> FirstSpikeLatency(window_ms=10.0).decode(SpikeTrains.from_lists([[5.0]], stop=10.0))
         array([0.5])
         """
-        instance("trains", trains, SpikeTrains)
+        instance("trains", trains, SpikeTrains)._ungraded(type(self).__name__)
         onset = trains.start if onset_ms is None else number("onset_ms", onset_ms, "ms")
         return self._values(trains, onset)
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from taxel.frames import Frames
 from taxel.information.answers import Control
 from taxel.information.estimate import Estimate, estimate
+from taxel.information.nested import Matrices
 from taxel.information.question import Question
-from taxel.information.rasters import features
 from taxel.information.sampling import (
     spikes_of,
 )
@@ -23,7 +23,6 @@ __all__ = ["controls"]
 
 def controls(question: Question) -> tuple[Control, ...]:
     """Return the bits of the stretch before the contact, the length, the count of events and the first picture."""
-    question.tell("controls")
     finest, window = question.periods[0], question.window_us
     spikes = question.spikes(finest, 0)
     count = spikes.counts(window).astype(np.float64)
@@ -42,8 +41,8 @@ def controls(question: Question) -> tuple[Control, ...]:
         ]
         first = np.array(start, np.float64)
         if np.ptp(first, axis=0).any():
-            gram = [first @ first.T]
-            bits = question.estimate(question.nested(gram, [first.shape[1]]).responses)
+            gram = Matrices([first @ first.T], [first.shape[1]])
+            bits = question.estimate(question.nested(gram).responses)
             results.append(Control("first picture", bits, "the pressure itself before the start, no change since"))
     return tuple(results)
 
@@ -55,7 +54,7 @@ def _scalar(question: Question, value: NDArray[np.float64]) -> Estimate | None:
             question.labels, np.full(len(value), question.labels[0]), groups=question.groups, seed=question.seed
         )
     unit = ((value - value.mean()) / value.std())[:, None]
-    return question.estimate(question.nested([unit @ unit.T], [1]).responses)
+    return question.estimate(question.nested(Matrices([unit @ unit.T], [1])).responses)
 
 
 def _before(question: Question) -> Control:
@@ -88,8 +87,7 @@ def _before(question: Question) -> Control:
     spikes = spikes_of(
         moved, question.held, question.encoder, period_us=period, contact_us=at, window_us=length, random=random
     )
-    grams = question.grams(spikes, [length])[0]
-    estimate = question.estimate(question.nested(grams, [features(spikes, length)] * len(grams)).responses)
+    estimate = question.estimate(question.nested(question.matrices(spikes, [length])[0]).responses)
     without = int((room < length).sum())
     about = f"{to_ms(length):g} ms before it" + (
         f", {without} of {len(room)} have less and count as silent" if without else ""

@@ -8,29 +8,54 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import numbers
 from taxel._core import ProblemError
 
-__all__ = ["Regression", "gram_matrix", "left_out", "solved_without_ridge"]
+__all__ = ["Regressions", "gram_matrix", "residual", "solved_without_ridge"]
 
 #: Directions in which classes vary less than this share of the largest count as none.
 _CUT = 1e-10
 #: Decimal digits to which the regression's predictions and the discriminants are rounded.
 _DIGITS = 9
+#: Numbers of residual matrices that are solved in one call of NumPy: Ctrl-C is answered between calls.
+_CELLS = 1 << 20
 
 
-class Regression:
-    """Ridge regression on the classes by the centred Gram matrix, with an intercept, and its discriminants.
+def residual(square: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    """Return the share of any classes that a ridge regression on them leaves over, as a matrix on the trials.
 
     Parameters
     ----------
     square : float64, shape (trials, trials)
-        Inner products of the trials.
-    which : float64, shape (trials, classes)
-        1 where a trial is of a class, else 0.
+        Inner products of the trials, which are centred: the regression has an intercept.
     level : float, above 0
         The ridge, in the units of `square`.
+
+    Returns
+    -------
+    float64, shape (trials, trials)
+        The same for whatever labels.
 
     Raises
     ------
     ProblemError : a matrix of no inner product
+    """
+    from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
+
+    trials = len(square)
+    factor, fault = lapack.dpotrf(_centred(square) / level + np.eye(trials), lower=1, clean=1)
+    if fault:
+        raise ProblemError("grams: a matrix has a direction of negative length, so it is of no inner product")
+    inverse = lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
+    return np.asarray(inverse + np.tril(inverse, -1).T - 1 / trials)
+
+
+class Regressions:
+    """Ridge regressions on the classes, one for each residual matrix, and their discriminants.
+
+    Parameters
+    ----------
+    residuals : float64, shape (regressions, trials, trials)
+        As `residual` returns them.
+    which : float64, shape (trials, classes)
+        1 where a trial is of a class, else 0.
 
     Notes
     -----
@@ -38,43 +63,58 @@ class Regression:
     J. Am. Stat. Assoc. 89:1255). Leaving trials out is a small solve with their part of the residual matrix.
     """
 
-    def __init__(self, square: NDArray[np.float64], which: NDArray[np.float64], level: float) -> None:
-        from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
+    def __init__(self, residuals: NDArray[np.float64], which: NDArray[np.float64]) -> None:
+        self._residuals, self._which = residuals, which
+        self._left: NDArray[np.float64] = residuals @ which
+        self._sums: NDArray[np.float64] = which.T @ self._left
 
-        trials = len(which)
-        factor, fault = lapack.dpotrf(_centred(square) / level + np.eye(trials), lower=1, clean=1)
-        if fault:
-            raise ProblemError("grams: a matrix has a direction of negative length, so it is of no inner product")
-        inverse = lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
-        self.which, self.level = which, level
-        #: The share of the classes that the regression leaves over, as a matrix on the trials.
-        self.residual: NDArray[np.float64] = inverse + np.tril(inverse, -1).T - 1 / trials
-        self.left: NDArray[np.float64] = self.residual @ which
-        self.sums: NDArray[np.float64] = which.T @ self.left
+    def discriminants(self, level: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the first regression's weights (trials, classes), and what is added to a class (without its prior).
 
-    def discriminants(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the weights of the trials (trials, classes), and what is added to a class (without its prior)."""
-        counts = self.which.sum(0)
-        turn, offset = _discriminant(np.diag(counts) - np.outer(counts, counts) / counts.sum() - self.sums, counts)
-        return self.left / self.level @ turn, offset
+        Parameters
+        ----------
+        level : float, above 0
+            Its ridge.
+        """
+        counts = self._which.sum(0)
+        sums = np.diag(counts) - np.outer(counts, counts) / counts.sum() - self._sums[0]
+        turn, offset = _discriminant(sums, counts)
+        return self._left[0] / level @ turn, offset
 
+    def left_out(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the classes that all other trials' discriminants predict for trials that are left out.
 
-def left_out(regressions: list[Regression], out: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the classes that all other trials' discriminants predict for the trials `out`; (regressions, trials)."""
-    which = regressions[0].which
-    mine = np.ix_(out, out)
-    left = np.stack([one.left[out] for one in regressions])
-    off = np.linalg.solve(np.stack([one.residual[mine] for one in regressions]), left)
-    counts = which.sum(0) - which[out].sum(0)
-    share = counts / counts.sum()
-    # Predictions of the regression on the other trials, summed by class, less the classes' shares.
-    sums = np.diag(counts) - np.stack([one.sums for one in regressions]) + np.swapaxes(left, 1, 2) @ off
-    turn, offset = _discriminant(sums - counts[:, None] * share, np.broadcast_to(counts, (len(off), len(counts))))
-    # Rounding errors depend on the trial's own label, so without this they would decide ties correctly.
-    predicted = np.round(which[out] - off - share, _DIGITS)
-    with np.errstate(divide="ignore"):
-        scores = predicted @ turn + (offset + np.log(share))[:, None, :]
-    return np.asarray(np.round(scores, _DIGITS).argmax(-1))
+        Parameters
+        ----------
+        number : int64, shape (cases,)
+            Which regression.
+        out : int64, shape (cases, left out)
+            Which trials.
+
+        Returns
+        -------
+        int64, shape (cases, left out)
+        """
+        predicted = np.empty(out.shape, np.int64)
+        at_once = max(1, _CELLS // max(1, out.shape[1]) ** 2)
+        for first in range(0, len(out), at_once):
+            some = slice(first, first + at_once)
+            predicted[some] = self._some_left_out(number[some, None], out[some])
+        return predicted
+
+    def _some_left_out(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
+        which, left = self._which[out], self._left[number, out]
+        off = np.linalg.solve(self._residuals[number[:, :, None], out[:, :, None], out[:, None, :]], left)
+        counts = self._which.sum(0) - which.sum(1)
+        share = counts / counts.sum(1, keepdims=True)
+        # Predictions of the regression on the other trials, summed by class, less the classes' shares.
+        sums = counts[:, :, None] * np.eye(counts.shape[1]) - self._sums[number[:, 0]] + np.swapaxes(left, 1, 2) @ off
+        turn, offset = _discriminant(sums - counts[:, :, None] * share[:, None, :], counts)
+        # Rounding errors depend on the trial's own label, so without this they would decide ties correctly.
+        predicted = np.round(which - off - share[:, None, :], _DIGITS)
+        with np.errstate(divide="ignore"):
+            scores = predicted @ turn + (offset + np.log(share))[:, None, :]
+        return np.asarray(np.round(scores, _DIGITS).argmax(-1))
 
 
 def solved_without_ridge(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +13,7 @@ from taxel._base.arguments import callback, number, shown, whole
 from taxel._core import ProblemError
 from taxel.information._labels import belonging, distinct, numbered, one_label_a_group, words
 from taxel.information.bits import (
+    corrected,
     label_entropy,
     local_information,
     panzeri_treves,
@@ -42,7 +43,7 @@ class Estimate:
     Attributes
     ----------
     bits : float, bits
-        Corrected (`panzeri_treves`), the mean over draws.
+        `corrected`, held within 0 and `most` as the interval is.
     interval : (float, float), bits
         Where trials, or whole groups, redrawn put it, shifted onto `bits`. Where trials are few it holds the truth less
         often than it says: of 95 % some 55 to 99 at 20 trials a label, 78 to 95 at 40. Where fewer trials were named
@@ -50,6 +51,8 @@ class Estimate:
         of the largest share of errors that so few allow (Clopper and Pearson, trial by trial).
     plug_in, extrapolated : float, bits
         As counted, and by `quadratic_extrapolation`. That the three agree does not mean that they are right.
+    corrected : float, bits
+        As counted less the bias of Panzeri and Treves, the mean over draws; of few trials below 0 or above `most`.
     most : float, bits
         The labels' entropy: the most there can be.
     right : float, from 0 to 1
@@ -68,6 +71,7 @@ class Estimate:
     interval: tuple[float, float]
     plug_in: float
     extrapolated: float
+    corrected: float
     most: float
     right: float
     counts: NDArray[np.int64]
@@ -83,6 +87,7 @@ class Estimate:
             "interval": [round(end, 4) for end in self.interval],
             "plug_in": round(self.plug_in, 4),
             "extrapolated": round(self.extrapolated, 4),
+            "corrected": round(self.corrected, 4),
             "most": round(self.most, 4),
             "right": round(self.right, 4),
             "trials_for_tenth": self.trials_for_tenth,
@@ -183,8 +188,8 @@ def estimate(
     belongs = None if groups is None else belonging(groups, len(truth))
     cells = row * len(classes) + column
     counts = _tables(cells, np.ones((1, len(truth)), np.int64), len(classes))[0]
-    bits = float(np.mean(panzeri_treves(counts)))
     most = float(label_entropy(counts[0]))
+    bits = float(_held(counts[None])[0])
     local = np.mean([local_information(table).ravel()[cell] for table, cell in zip(counts, cells, strict=True)], 0)
     low, high = _interval(cells, row, belongs, len(classes), rounds, share, random)
     n = np.bincount(row)
@@ -192,10 +197,10 @@ def estimate(
     prior, wrong = n[n > 0] / len(truth), int((row != counts.sum(0).argmax(0)[column]).any(0).sum())
     if wrong <= len(prior):
         # With so few errors, redraws do not show where others would lie.
-        low = min(low, most - bits - _left_open(prior, wrong, len(truth), share))
+        low = min(low, most - bits - float(_left_open(prior, np.array(wrong), np.array(len(truth)), share)))
         times = np.geomspace(1, 100, 400)
-        needed = (len(truth) * m for m in times if _left_open(prior, m * wrong, m * len(truth), 0.95) <= _FIFTH)
-        tenth = max(tenth, int(np.ceil(next(needed, 100 * len(truth)))))
+        few = np.flatnonzero(_left_open(prior, times * wrong, times * len(truth), 0.95) <= _FIFTH)
+        tenth = max(tenth, int(np.ceil(len(truth) * (times[few[0]] if len(few) else 100))))
     relevant = relevant_responses(counts)[:, np.unique(row)].mean()
     interval = max(0.0, bits + low), min(most, bits + high)
     return Estimate(
@@ -205,6 +210,7 @@ def estimate(
         extrapolated=float(np.mean([quadratic_extrapolation(c, repetitions=5, seed=seed) for c in counts]))
         if len(truth) >= 4
         else bits,
+        corrected=float(np.mean(corrected(counts))),
         most=most,
         right=float(np.mean(answered == truth)),
         counts=counts,
@@ -213,6 +219,13 @@ def estimate(
         trials_for_tenth=tenth,
         warnings=_warnings(int(n[n > 0].min()), float(relevant), interval, tenth),
     )
+
+
+def bits_of(labels: NDArray[Any], responses: Sequence[NDArray[Any]]) -> float:
+    """Return the bits of draws of responses, each one of the labels, without an interval."""
+    classes = distinct(labels)
+    cells = numbered(classes, labels) * len(classes) + numbered(classes, np.stack(responses))
+    return float(_held(_tables(cells, np.ones((1, len(labels)), np.int64), len(classes)))[0])
 
 
 def zero_test(
@@ -291,14 +304,31 @@ def _shuffled(row: NDArray[np.int64], belongs: NDArray[np.int64] | None, random:
 def _tables(cells: NDArray[np.int64], weights: NDArray[Any], classes: int) -> NDArray[np.int64]:
     """Return the tables of each redraw and draw, shape (redraws, draws, labels, labels)."""
     draws = np.atleast_2d(cells)
-    tables = np.empty((len(weights), len(draws), classes, classes), np.int64)
-    for k, weight in enumerate(weights):
-        for d, cell in enumerate(draws):
-            # In pieces, as one NumPy call does not answer Ctrl-C; sums of whole numbers are exact.
-            pieces = (slice(first, first + _DRAWN) for first in range(0, len(cell), _DRAWN))
-            table = sum(np.bincount(cell[piece], weight[piece], classes**2) for piece in pieces)
-            tables[k, d] = np.rint(table).reshape(classes, classes)
-    return tables if cells.ndim == 2 else tables[:, 0]
+    tables = np.zeros((len(draws), len(weights) * classes**2))
+    # In pieces, as one NumPy call does not answer Ctrl-C; sums of whole numbers are exact.
+    step = max(1, _DRAWN // len(weights))
+    for d, cell in enumerate(draws):
+        for first in range(0, len(cell), step):
+            piece = slice(first, first + step)
+            place = np.arange(len(weights))[:, None] * classes**2 + cell[piece]
+            tables[d] += np.bincount(place.ravel(), weights[:, piece].ravel(), tables.shape[1])
+    shaped = np.rint(tables).astype(np.int64).reshape(len(draws), len(weights), classes, classes).swapaxes(0, 1)
+    return np.ascontiguousarray(shaped if cells.ndim == 2 else shaped[:, 0])
+
+
+def _held(tables: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the corrected bits of draws, the mean over these, within 0 and the labels' entropy.
+
+    Parameters
+    ----------
+    tables : int64, shape (redraws, draws, labels, labels)
+        All draws of a redraw are of the same labels.
+
+    Returns
+    -------
+    float64, shape (redraws,), bits
+    """
+    return np.asarray(np.clip(corrected(tables).mean(axis=1), 0.0, label_entropy(tables[:, 0])))
 
 
 def _interval(
@@ -325,7 +355,7 @@ def _interval(
         weights = np.zeros((count, len(owner)), np.int64)
         for mine in members:
             weights[:, mine] = _redrawn(random, len(mine), count)
-        estimates.append(np.mean(panzeri_treves(_tables(cells, weights[:, units], classes)), axis=1))
+        estimates.append(_held(_tables(cells, weights[:, units], classes)))
     redrawn = np.concatenate(estimates)
     ends = np.quantile(redrawn, [(1 - confidence) / 2, (1 + confidence) / 2]) - redrawn.mean()
     if belongs is not None:
@@ -361,18 +391,19 @@ def _redrawn(random: np.random.Generator, units: int, count: int) -> NDArray[np.
     return draws
 
 
-def _left_open(prior: NDArray[np.float64], wrong: float, trials: float, confidence: float) -> float:
-    """Return how many bits the labels may lose where so few of the trials were named wrongly.
+def _left_open(
+    prior: NDArray[np.float64], wrong: NDArray[Any], trials: NDArray[Any], confidence: float
+) -> NDArray[np.float64]:
+    """Return how many bits the labels may lose where so few of so many trials were named wrongly.
 
     By Fano's inequality, with Clopper and Pearson's upper end for the share of errors.
     """
     from scipy.special import betaincinv  # noqa: PLC0415  loads slowly
 
-    share = float(betaincinv(wrong + 1, max(trials - wrong, 1e-9), (1 + confidence) / 2))
-    even = np.full((len(prior), len(prior)), share / (len(prior) - 1))
-    np.fill_diagonal(even, 1 - share)
+    share = betaincinv(wrong + 1, np.maximum(trials - wrong, 1e-9), (1 + confidence) / 2)[..., None, None]
+    even = np.where(np.eye(len(prior), dtype=bool), 1 - share, share / (len(prior) - 1))
     table = np.rint(_FINE * prior[:, None] * even)
-    return float(label_entropy(table) - plug_in(table))
+    return np.asarray(label_entropy(table) - plug_in(table))
 
 
 def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth: int) -> tuple[str, ...]:

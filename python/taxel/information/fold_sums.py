@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from threadpoolctl import threadpool_limits
 
 from taxel._base.arguments import callback, instance, numbers, text, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
 from taxel.information._labels import words
+from taxel.information._threads import threads
 from taxel.information.lda import LDA
 from taxel.information.primal import ClassMoments, blocks, feature_table, is_exact
 
@@ -84,7 +84,7 @@ class FoldSums:
         self._shift = None if self._dtype == np.float32 else self._table.mean(0, dtype=np.float64)
         self._sums: dict[int, ClassMoments] = {}
         total: ClassMoments | None = None
-        with self._threads():
+        with threads(several=self._table.shape[1] >= _WORTH_THREADS):
             for k, name in enumerate(self._names):
                 one = self._summed(name)
                 total = one if total is None else total + one
@@ -95,9 +95,6 @@ class FoldSums:
                     progress(k + 1, len(self._names))
         assert total is not None  # there are two folds at least
         self._total = total
-
-    def _threads(self) -> threadpool_limits:
-        return threadpool_limits(1 if self._table.shape[1] < _WORTH_THREADS else None)
 
     def _summed(self, name: np.int64) -> ClassMoments:
         if int(name) in self._sums:
@@ -154,7 +151,7 @@ class FoldSums:
         model.classes_ = classes
         shift = None if self._shift is None else self._shift[:used]
         predicted = np.empty(len(self._table), classes.dtype)
-        with self._threads():
+        with threads(several=self._table.shape[1] >= _WORTH_THREADS):
             for k, name in enumerate(self._names):
                 training = self._total - self._summed(name)
                 if into is not None:

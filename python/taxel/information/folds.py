@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import shown, whole
 from taxel._core import ProblemError
+from taxel.information._estimator import labelled
 from taxel.information._labels import belonging, words
 
-__all__ = ["folds"]
+__all__ = ["Part", "Split", "folds", "split"]
 
 
 def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None, seed: int = 0) -> NDArray[np.int64]:
@@ -65,6 +68,77 @@ def folds(labels: ArrayLike, *, count: int = 10, groups: ArrayLike | None = None
                 f"trained and tested; must be two groups at least"
             )
     return _whole_groups(row, belongs, parts, random)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Trials that are tested together, those that train for them, and test sets among the latter.
+
+    Attributes
+    ----------
+    test, train : int64
+    inner : tuple of int64
+        Empty where a label of the training trials cannot be dealt out.
+    """
+
+    test: NDArray[np.int64]
+    train: NDArray[np.int64]
+    inner: tuple[NDArray[np.int64], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Labelled trials dealt out to folds, and the training trials of each fold to folds of their own.
+
+    Attributes
+    ----------
+    classes : labels, shape (classes,)
+    row : int64, shape (trials,)
+        The number of each trial's class.
+    fold : int64, shape (trials,)
+    parts : tuple of Part, one a fold
+    """
+
+    classes: NDArray[np.generic]
+    row: NDArray[np.int64]
+    fold: NDArray[np.int64]
+    parts: tuple[Part, ...]
+
+    @property
+    def which(self) -> NDArray[np.float64]:
+        """1 where a trial is of a class, else 0; shape (trials, classes)."""
+        return np.asarray(self.row[:, None] == np.arange(len(self.classes)), np.float64)
+
+
+def split(
+    labels: ArrayLike, trials: int, *, count: int, inner: int = 5, groups: ArrayLike | None = None, seed: int = 0
+) -> Split:
+    """Deal so many trials out to folds, and within each training set to `inner` folds.
+
+    Raises
+    ------
+    ProblemError : as `folds`, or another number of labels
+    """
+    classes, row = labelled(labels, trials)
+    fold = folds(labels, count=count, groups=groups, seed=seed)
+    belongs = None if groups is None else belonging(groups, trials)
+    parts = []
+    for name in range(int(fold.max()) + 1):
+        train = np.flatnonzero(fold != name)
+        mine = _inside(row[train], None if belongs is None else belongs[train], inner, seed)
+        parts.append(Part(np.flatnonzero(fold == name), train, tuple(train[one] for one in mine)))
+    return Split(classes, row, fold, tuple(parts))
+
+
+def _inside(
+    row: NDArray[np.int64], belongs: NDArray[np.int64] | None, count: int, seed: int
+) -> list[NDArray[np.int64]]:
+    """Return the inner test sets; none where a label cannot be dealt out."""
+    try:
+        fold = folds(row, count=min(count, len(row)), groups=belongs, seed=seed + 1)
+    except ProblemError:
+        return []
+    return [np.flatnonzero(fold == k) for k in range(int(fold.max()) + 1)]
 
 
 def _dealt(row: NDArray[np.int64], count: int, random: np.random.Generator) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import number, numbers, shown, text, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
-from taxel.information.dual import Regression, gram_matrix, solved_without_ridge
+from taxel.information.dual import Regressions, gram_matrix, residual, solved_without_ridge
 from taxel.information.primal import ClassMoments, blocks, feature_table, solved
 
 __all__ = ["LDA", "GramLDA"]
@@ -260,7 +260,8 @@ class GramLDA(Classifier):
         prior = counts / trials if self.priors == "training" else np.full(classes, 1 / classes)
         spread = float(np.trace(square) - ((which / counts) * (square @ which)).sum())
         if self.ridge > 0 and spread > 0:
-            weights, offset = Regression(square, which, self.ridge * spread / self.features).discriminants()
+            level = self.ridge * spread / self.features
+            weights, offset = Regressions(residual(square, level)[None], which).discriminants(level)
             self.rank_ = trials - classes
         else:
             weights, offset, self.rank_ = solved_without_ridge(square, which)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import instance, numbers, several, shown, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
-from taxel.information._labels import belonging
-from taxel.information.dual import Regression, gram_matrix, left_out
-from taxel.information.folds import folds as dealt
+from taxel.information._threads import threads
+from taxel.information.dual import Regressions, gram_matrix, residual
+from taxel.information.folds import Split, split
 from taxel.information.neighbours import majority, squared_distances
 
-__all__ = ["RIDGES", "Nested", "nested_predictions", "training_curve"]
+__all__ = ["RIDGES", "WORTH_THREADS", "Matrices", "Nested", "nested_predictions", "predictions", "training_curve"]
 
 #: Ridges that are tried, in units of the mean variance.
 RIDGES = (10.0, 1.0, 0.1)
+#: Number of trials from which several threads are used for their matrices.
+WORTH_THREADS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,33 +91,59 @@ def nested_predictions(
     The discriminants are those of `GramLDA`. Leaving trials out of a ridge regression is a small solve with their part
     of its residual matrix, so all folds and inner folds cost one inverse a matrix and ridge.
     """
-    squares, sizes = _matrices(grams, features)
-    trials = len(squares[0])
+    matrices = Matrices(grams, features)
     levels = numbers("ridges", ridges, np.float64)
     if levels.ndim != 1 or not len(levels) or not ((levels > 0) & np.isfinite(levels)).all():
         raise ProblemError(f"ridges is {shown(ridges)}: must be numbers above 0")
-    nearest = [whole("neighbours", k, 1) for k in several("neighbours", neighbours)]
-    classes, row = labelled(y, trials)
-    fold = dealt(y, count=count, groups=groups, seed=seed)
-    belongs = None if groups is None else belonging(groups, trials)
-    if nearest:
-        ways: _Ways = _Neighbours(squares, row, len(classes), nearest)
+    nearest = tuple(whole("neighbours", k, 1) for k in several("neighbours", neighbours))
+    parts = whole("inner", inner, 2)
+    dealt = split(y, matrices.trials, count=count, inner=parts, groups=groups, seed=seed)
+    with threads(several=matrices.trials >= WORTH_THREADS):
+        return predictions(matrices, dealt, ridges=tuple(levels.tolist()), neighbours=nearest)
+
+
+def predictions(
+    matrices: Matrices, dealt: Split, *, ridges: tuple[float, ...] = RIDGES, neighbours: tuple[int, ...] = ()
+) -> Nested:
+    """Predict each trial as `nested_predictions` does, from what other questions about the same trials share."""
+    row, classes = dealt.row, len(dealt.classes)
+    ways: _Ways
+    if neighbours:
+        ways = _Neighbours(matrices, row, classes, neighbours)
     else:
-        ways = _Discriminants(squares, sizes, row, len(classes), levels)
-    predicted, chosen, missing = np.empty(trials, np.int64), {}, []
-    for name in range(int(fold.max()) + 1):
-        test, train = np.flatnonzero(fold == name), np.flatnonzero(fold != name)
-        absent = np.setdiff1d(np.arange(len(classes)), row[train])
-        missing += [(name, str(classes[k])) for k in absent]
-        right = np.zeros(ways.count)
-        if ways.count > 1:
-            for part in _inside(row[train], None if belongs is None else belongs[train], inner, seed):
-                held = train[part]
-                right += (ways.predict(test, held)[:, len(test) :] == row[held]).sum(1)
-        best = int(right.argmax())
-        predicted[test] = ways.predict(test, np.empty(0, np.int64), best)[0]
-        chosen[name] = ways.way(best)
-    return Nested(classes[predicted], fold, chosen, tuple(missing))
+        ways = _Discriminants(matrices, dealt.which, ridges)
+    best = _best(ways, dealt) if ways.count > 1 else np.zeros(len(dealt.parts), np.int64)
+    predicted = np.empty(len(row), np.int64)
+    for folds, out in _of_one_size([part.test for part in dealt.parts]):
+        predicted[out] = ways.predict(best[folds], out)
+    missing = [
+        (name, str(dealt.classes[k]))
+        for name, part in enumerate(dealt.parts)
+        for k in np.setdiff1d(np.arange(classes), row[part.train])
+    ]
+    chosen = {name: ways.way(int(number)) for name, number in enumerate(best)}
+    return Nested(dealt.classes[predicted], dealt.fold, chosen, tuple(missing))
+
+
+def _best(ways: _Ways, dealt: Split) -> NDArray[np.int64]:
+    """Return for each fold the way that classifies most of its training trials correctly, in folds among themselves."""
+    right = np.zeros((len(dealt.parts), ways.count), np.int64)
+    inner = [(name, held) for name, part in enumerate(dealt.parts) for held in part.inner]
+    both = [np.concatenate([dealt.parts[name].test, held]) for name, held in inner]
+    for cases, out in _of_one_size(both):
+        correct = ways.predict_all(out) == dealt.row[out]
+        for case, here in zip(cases, np.swapaxes(correct, 0, 1), strict=True):
+            name, held = inner[case]
+            right[name] += here[:, -len(held) :].sum(1)
+    return np.asarray(right.argmax(1))
+
+
+def _of_one_size(sets: list[NDArray[np.int64]]) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Give sets of equally many trials together: their numbers, and the trials of each."""
+    sizes = np.array([len(one) for one in sets], np.int64)
+    for size in np.unique(sizes):
+        cases = np.flatnonzero(sizes == size)
+        yield cases, np.stack([sets[case] for case in cases])
 
 
 def training_curve(
@@ -147,48 +175,68 @@ def training_curve(
     ------
     ProblemError : matrices and labels that do not fit
     """
-    squares, features = _matrices(grams, features)
-    classes, row = labelled(y, len(squares[0]))
+    matrices = Matrices(grams, features)
+    classes, row = labelled(y, matrices.trials)
     random, curve = np.random.default_rng(whole("seed", seed, 0)), []
     used = sorted(set(instance("nested", nested, Nested).chosen.values()))
-    if len(nested.folds) != len(row) or any(matrix >= len(squares) for matrix, _ in used):
+    if len(nested.folds) != len(row) or any(matrix >= len(matrices.squares) for matrix, _ in used):
         raise ProblemError("nested is of other trials or matrices")
-    ways = {
-        (matrix, ridge): _Discriminants([squares[matrix]], [features[matrix]], row, len(classes), np.array([ridge]))
-        for matrix, ridge in used
-    }
+    which = np.asarray(row[:, None] == np.arange(len(classes)), np.float64)
+    regressions = Regressions(np.stack([matrices.residual(*way) for way in used]), which)
     for size in several("sizes", sizes):
         predicted = np.empty(len(row), np.int64)
         for name, way in nested.chosen.items():
             test, train = np.flatnonzero(nested.folds == name), np.flatnonzero(nested.folds != name)
             mixed = random.permutation(train)
             sample = np.concatenate([mixed[row[mixed] == k][: whole("sizes", size, 1)] for k in range(len(classes))])
-            predicted[test] = ways[way].predict(test, np.setdiff1d(train, sample))[0, : len(test)]
+            out = np.concatenate([test, np.setdiff1d(train, sample)])
+            predicted[test] = regressions.left_out(np.array([used.index(way)]), out[None])[0, : len(test)]
         curve.append(classes[predicted])
     return curve
 
 
-def _matrices(grams: object, features: object) -> tuple[list[NDArray[np.float64]], list[int]]:
-    squares = [gram_matrix(one) for one in several("grams", grams)]
-    if not squares:
-        raise ProblemError("grams is []: must hold a matrix at least")
-    if any(len(one) != len(squares[0]) for one in squares):
-        raise ProblemError(f"grams are of {[len(one) for one in squares]} trials: must all be of the same")
-    sizes = [whole("features", one, 1) for one in several("features", features)]
-    if len(sizes) != len(squares):
-        raise ProblemError(f"features has {len(sizes)} entries: must be {len(squares)}, one a matrix")
-    return squares, sizes
+class Matrices:
+    """Inner products of all trials, a matrix for each way to see them; what is computed of them serves all labels.
 
+    Parameters
+    ----------
+    grams, features
+        As `nested_predictions` takes them.
 
-def _inside(
-    row: NDArray[np.int64], belongs: NDArray[np.int64] | None, count: int, seed: int
-) -> list[NDArray[np.int64]]:
-    """Return the inner test sets; none where a label cannot be dealt out, so that the first way is taken."""
-    try:
-        fold = dealt(row, count=min(count, len(row)), groups=belongs, seed=seed + 1)
-    except ProblemError:
-        return []
-    return [np.flatnonzero(fold == k) for k in range(int(fold.max()) + 1)]
+    Raises
+    ------
+    ProblemError : matrices that are invalid
+    """
+
+    def __init__(self, grams: object, features: object) -> None:
+        self.squares = [gram_matrix(one) for one in several("grams", grams)]
+        if not self.squares:
+            raise ProblemError("grams is []: must hold a matrix at least")
+        self.trials = len(self.squares[0])
+        if any(len(one) != self.trials for one in self.squares):
+            raise ProblemError(f"grams are of {[len(one) for one in self.squares]} trials: must all be of the same")
+        self.features = [whole("features", one, 1) for one in several("features", features)]
+        if len(self.features) != len(self.squares):
+            raise ProblemError(f"features has {len(self.features)} entries: must be {len(self.squares)}, one a matrix")
+        self._residuals: dict[tuple[float, ...], NDArray[np.float64]] = {}
+
+    def residual(self, matrix: int, ridge: float) -> NDArray[np.float64]:
+        """Return the residual matrix of a matrix and a ridge in units of the mean variance."""
+        square = self.squares[matrix]
+        spread = float(np.trace(square) - square.mean(0).sum())
+        # Where all trials are alike only rounding errors remain, which are no variance.
+        unit = max(spread / self.features[matrix], 1e-9 * float(np.trace(square)) / self.trials, 1e-300)
+        return residual(square, ridge * unit)
+
+    def residuals(self, ridges: tuple[float, ...]) -> NDArray[np.float64]:
+        """Return the residual matrices of all matrices and ridges, shape (matrices * ridges, trials, trials)."""
+        if ridges not in self._residuals:
+            ways = [(matrix, ridge) for matrix in range(len(self.squares)) for ridge in ridges]
+            table = np.empty((len(ways), self.trials, self.trials))
+            for k, way in enumerate(ways):
+                table[k] = self.residual(*way)
+            self._residuals[ridges] = table
+        return self._residuals[ridges]
 
 
 class _Ways(ABC):
@@ -197,61 +245,47 @@ class _Ways(ABC):
     count: int
 
     @abstractmethod
-    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
-        """Return the predictions of `test` and `held` when both are left out, by way; shape (ways, trials)."""
+    def predict(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return one way's predictions of trials that are left out; number (cases,), out and result (cases, trials)."""
 
     @abstractmethod
     def way(self, number: int) -> tuple[int, float]:
         """Return the matrix and the ridge or number of neighbours of a way."""
 
+    def predict_all(self, out: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return all ways' predictions of trials that are left out; shapes (cases, trials), (ways, cases, trials)."""
+        number = np.repeat(np.arange(self.count), len(out))
+        return self.predict(number, np.tile(out, (self.count, 1))).reshape(self.count, *out.shape)
+
 
 class _Discriminants(_Ways):
-    def __init__(
-        self,
-        squares: list[NDArray[np.float64]],
-        features: list[int],
-        row: NDArray[np.int64],
-        classes: int,
-        ridges: NDArray[np.float64],
-    ) -> None:
-        which = np.zeros((len(row), classes))
-        which[np.arange(len(row)), row] = 1.0
-        self.ridges = ridges
-        self.regressions = []
-        for square, size in zip(squares, features, strict=True):
-            spread = float(np.trace(square) - square.mean(0).sum())
-            # Where all trials are alike only rounding errors remain, which are no variance.
-            unit = max(spread / size, 1e-9 * float(np.trace(square)) / len(row), 1e-300)
-            self.regressions += [Regression(square, which, ridge * unit) for ridge in ridges]
-        self.count = len(self.regressions)
+    def __init__(self, matrices: Matrices, which: NDArray[np.float64], ridges: tuple[float, ...]) -> None:
+        self._ridges, self._regressions = ridges, Regressions(matrices.residuals(ridges), which)
+        self.count = len(matrices.squares) * len(ridges)
 
     def way(self, number: int) -> tuple[int, float]:
-        return number // len(self.ridges), float(self.ridges[number % len(self.ridges)])
+        return number // len(self._ridges), float(self._ridges[number % len(self._ridges)])
 
-    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
-        ways = self.regressions if only is None else [self.regressions[only]]
-        return left_out(ways, np.concatenate([test, held]))
+    def predict(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
+        return self._regressions.left_out(number, out)
 
 
 class _Neighbours(_Ways):
-    def __init__(
-        self, squares: list[NDArray[np.float64]], row: NDArray[np.int64], classes: int, nearest: list[int]
-    ) -> None:
-        self.row, self.classes, self.nearest = row, classes, nearest
-        self.order = [np.argsort(squared_distances(one), axis=1, kind="stable") for one in squares]
-        self.count = len(squares) * len(nearest)
+    def __init__(self, matrices: Matrices, row: NDArray[np.int64], classes: int, nearest: tuple[int, ...]) -> None:
+        self._row, self._classes, self._nearest = row, classes, nearest
+        self._order = [np.argsort(squared_distances(one), axis=1, kind="stable") for one in matrices.squares]
+        self.count = len(matrices.squares) * len(nearest)
 
     def way(self, number: int) -> tuple[int, float]:
-        return number // len(self.nearest), float(self.nearest[number % len(self.nearest)])
+        return number // len(self._nearest), float(self._nearest[number % len(self._nearest)])
 
-    def predict(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
-        out = np.concatenate([test, held])
-        training = np.ones(len(self.row), bool)
-        training[out] = False
-        ways = range(self.count) if only is None else [only]
-        predicted = np.empty((len(ways), len(out)), np.int64)
-        for k, number in enumerate(ways):
-            order = self.order[number // len(self.nearest)][out]
-            near = order[training[order]].reshape(len(out), -1)[:, : self.nearest[number % len(self.nearest)]]
-            predicted[k] = majority(self.row[near], self.classes)
+    def predict(self, number: NDArray[np.int64], out: NDArray[np.int64]) -> NDArray[np.int64]:
+        predicted = np.empty(out.shape, np.int64)
+        for case, (way, mine) in enumerate(zip(number, out, strict=True)):
+            matrix, neighbours = self.way(int(way))
+            training = np.ones(len(self._row), bool)
+            training[mine] = False
+            order = self._order[matrix][mine]
+            near = order[training[order]].reshape(len(mine), -1)[:, : int(neighbours)]
+            predicted[case] = majority(self._row[near], self._classes)
         return predicted

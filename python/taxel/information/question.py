@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,8 +15,9 @@ from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.frames import Frames
 from taxel.information.estimate import Estimate, estimate
-from taxel.information.nested import Nested, nested_predictions
-from taxel.information.rasters import event_grams
+from taxel.information.folds import Split, split
+from taxel.information.nested import Matrices, Nested, predictions
+from taxel.information.rasters import event_grams, features
 from taxel.information.sampling import (
     STEP_US,
     HeldValues,
@@ -47,10 +48,8 @@ class Question:
     draws: int
     folds: int
     seed: int
-    progress: Callable[[str, int, int], object] | None
     notes: list[str] = field(default_factory=list)
-    done: int = 0
-    steps: int = 1
+    _splits: dict[tuple[str, int], Split] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         from taxel.information.folds import folds  # noqa: PLC0415  the argument has its name
@@ -113,8 +112,6 @@ class Question:
         taxels: Sequence[int] | None,
         pools: Sequence[int] | None,
         taxels_at_ms: float | None,
-        classifiers: int,
-        shuffles: int,
     ) -> None:
         """Choose the settings."""
         window = self.window_us
@@ -144,7 +141,8 @@ class Question:
             if not self.taxels_at:
                 listed = ", ".join(f"{to_ms(p):g}" for p in self.periods)
                 raise ProblemError(f"taxels_at_ms is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
-        self.active = np.unique(self.spikes(self.taxels_at, 0).taxel)
+        spikes = self.spikes(self.taxels_at, 0)
+        self.active, self.events = np.unique(spikes.taxel), len(spikes.taxel)
         there = len(self.active)
         numbers = [whole("taxels", n, 1) for n in several("taxels", (10, 30, 100, 300) if taxels is None else taxels)]
         if taxels is not None and any(n > there for n in numbers):
@@ -156,14 +154,6 @@ class Question:
             raise ProblemError(f"pools is {shown(pools)}: the array is {rows} x {columns}")
         self.pools = [n for n in sides if n <= max(rows, columns)]
         self.columns = self._parameter_columns()
-        settings = len(self.random_taxels) + len(self.pools)
-        self.steps = self.draws * (len(self.periods) * (2 + len(self.columns)) + settings) + shuffles + classifiers + 8
-
-    def tell(self, what: str, steps: int = 1) -> None:
-        """Report the next piece of work, and count the steps that are done."""
-        self.done += steps
-        if self.progress is not None:
-            self.progress(what, min(self.done, self.steps), self.steps)
 
     def spikes(self, period: int, draw: int, pool: int = 1) -> Spikes:
         """Return the spikes of all trials at a period (us), in one draw of the sampling phases."""
@@ -179,25 +169,32 @@ class Question:
             pool=pool,
         )
 
-    def nested(
-        self, grams: list[NDArray[np.float64]], sizes: list[int], y: Any = None, draw: int = 0, **ways: Any
-    ) -> Nested:
-        """Return the predictions for all trials in nested folds; `y` replaces the question's labels."""
-        labels = self.labels if y is None else y
-        return nested_predictions(
-            grams, sizes, labels, groups=self.groups, count=self.folds, seed=self.seed + draw, **ways
-        )
+    def nested(self, matrices: Matrices, column: str = "", draw: int = 0, **ways: Any) -> Nested:
+        """Return the predictions for all trials in nested folds, of the labels or of a column of parameters."""
+        if (column, draw) not in self._splits:
+            self._splits[column, draw] = self.split(self.columns[column] if column else self.labels, draw)
+        return predictions(matrices, self._splits[column, draw], **ways)
+
+    def split(self, labels: Any, draw: int = 0) -> Split:
+        """Return labels dealt out to folds."""
+        return split(labels, len(self.trials), count=self.folds, groups=self.groups, seed=self.seed + draw)
 
     def estimate(self, responses: Any, labels: Any = None) -> Estimate:
         """Return the information of responses (or draws of them) about the labels."""
         truth = self.labels if labels is None else labels
         return estimate(truth, responses, groups=self.groups, seed=self.seed)
 
-    def grams(self, spikes: Spikes, windows: Sequence[float]) -> list[list[NDArray[np.float64]]]:
-        """Return by window the matrices of all smoothings that a period can tell apart."""
+    def smoothings(self, period: int) -> list[float]:
+        """Return the smoothings, ms, that a period (us) can tell apart."""
         taus = [to_ms(share * self.window_us) for share in SMOOTHINGS]
-        taus = [tau for tau in taus if tau == 0 or to_us(tau) > spikes.period_us / 2]
-        return [list(one) for one in zip(*(event_grams(spikes, windows, tau) for tau in taus), strict=True)]
+        return [tau for tau in taus if tau == 0 or to_us(tau) > period / 2]
+
+    def matrices(self, spikes: Spikes, windows: Sequence[float]) -> list[Matrices]:
+        """Return by window the matrices of all smoothings that a period can tell apart."""
+        taus = self.smoothings(spikes.period_us)
+        by_tau = [event_grams(spikes, windows, tau) for tau in taus]
+        sizes = features(spikes, windows)
+        return [Matrices(grams, [size] * len(taus)) for size, *grams in zip(sizes, *by_tau, strict=True)]
 
     def _parameter_columns(self) -> dict[str, NDArray[np.generic]]:
         """Return the columns of parameters that can stand in for the labels; the notes name the others."""

@@ -37,13 +37,14 @@ def event_grams(spikes: Spikes, windows_us: Sequence[float], tau_ms: float) -> l
     """
     sums = _Sums(spikes, windows_us)
     decay = np.float32(np.exp(to_ms(-spikes.period_us) / tau_ms)) if tau_ms > 0 else np.float32(0)
-    active, taxel = np.unique(spikes.taxel, return_inverse=True)
-    state = np.zeros((spikes.trials, len(active)), np.float32)
+    there = np.bincount(spikes.taxel, minlength=1) > 0
+    state = np.zeros((spikes.trials, int(there.sum())), np.float32)
+    place = spikes.trial * state.shape[1] + (np.cumsum(there) - 1)[spikes.taxel]
     begins = np.searchsorted(spikes.bin, np.arange(sums.bins + 1))
     for b in range(sums.bins):
         state *= decay
         here = slice(begins[b], begins[b + 1])
-        np.add.at(state, (spikes.trial[here], taxel[here]), spikes.value[here])
+        np.add.at(state.ravel(), place[here], spikes.value[here])
         sums.add(state)
     return sums.finish()
 
@@ -68,10 +69,16 @@ def frame_grams(values: NDArray[np.float32], spikes: Spikes, windows_us: Sequenc
     return sums.finish()
 
 
-def features(spikes: Spikes, window_us: float) -> int:
-    """Return how many pairs of taxel and bin hold an event in any trial, one at least."""
-    inside = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
-    return max(1, len(np.unique(spikes.taxel[inside] * (int(spikes.bin.max(initial=0)) + 1) + spikes.bin[inside])))
+def features(spikes: Spikes, windows_us: Sequence[float]) -> list[int]:
+    """Return by window how many pairs of taxel and bin hold an event in any trial, one at least."""
+    bins = int(spikes.bin.max(initial=0)) + 1
+    pairs, pair = np.unique(spikes.taxel * bins + spikes.bin, return_inverse=True)
+    sizes = []
+    for window in windows_us:
+        there = np.zeros(len(pairs), bool)
+        there[pair[spikes.bin < spikes.bins_to(window)[spikes.trial]]] = True
+        sizes.append(max(1, int(there.sum())))
+    return sizes
 
 
 class _Sums:

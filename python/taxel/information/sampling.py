@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,8 @@ class HeldValues:
         exists = np.ones(self.array.shape, bool) if self.array.exists is None else self.array.exists
         self.taxels = np.flatnonzero(exists)
         if isinstance(source, Frames):
-            self._values = source.values.reshape(len(source), -1)
+            values = source.values.reshape(len(source), -1)
+            self._values = values if exists.all() else values[:, self.taxels]
         else:
             self._held = _core.HeldValues(source._parts(), self.taxels.astype(np.uint32), None)
 
@@ -58,7 +59,7 @@ class HeldValues:
         """
         if isinstance(self.source, Frames):
             rows = np.searchsorted(self.source.t, times, side="right") - 1
-            return np.asarray(self._values[np.maximum(rows, 0)][:, self.taxels])
+            return np.asarray(self._values[np.maximum(rows, 0)])
         return self._held.at(np.ascontiguousarray(times, np.int64)).reshape(len(times), len(self.taxels))
 
 
@@ -131,6 +132,13 @@ class Spikes:
         )
 
 
+class _Pools(NamedTuple):
+    """Squares of taxels: of each rank, the squares that have so many taxels and that taxel; one over their sizes."""
+
+    members: list[tuple[NDArray[np.int64], NDArray[np.int64]]]
+    share: NDArray[np.float64]
+
+
 def finest_us(sources: Sequence[Events | Frames]) -> int:
     """Return the finest period that recordings can show, us: between pictures, or what all stamps are multiples of."""
     pictures = [int(np.median(np.diff(one.t))) for one in sources if isinstance(one, Frames) and len(one) > 1]
@@ -198,10 +206,13 @@ def spikes_of(
     first = np.full(len(trials), np.inf)
     length = np.zeros(len(trials))
     phases = random.random(len(trials))
+    pools: dict[int, _Pools | None] = {}
     taxels = 1
     for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
-        pooled = _pooling(values, pool)
-        taxels = len(values.taxels) if pooled is None else pooled[1]
+        if id(values) not in pools:
+            pools[id(values)] = _pooling(values, pool)
+        pooled = pools[id(values)]
+        taxels = len(values.taxels) if pooled is None else len(pooled.share)
         if np.isnan(contact_us[k]):
             continue
         length[k] = np.inf if trial.stop_us is None else trial.stop_us - contact_us[k]
@@ -260,14 +271,16 @@ def _encoded(
     held: HeldValues,
     grid: NDArray[np.int64],
     period_us: int,
-    pooled: tuple[NDArray[np.int64], int, NDArray[np.float64]] | None = None,
+    pooled: _Pools | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
     """Return bin, taxel and value of the events that an encoder makes of the values held at a grid of times."""
     values = held.at(grid)
     if pooled is not None:
-        where, count, share = pooled
-        sums = np.zeros((len(values), count), np.float32)
-        np.add.at(sums.T, where, values.T)
+        members, share = pooled
+        sums = np.zeros((len(values), len(share)), np.float32)
+        # Sums begin with each square's first taxel and end with its last.
+        for cells, taxels in members:
+            sums[:, cells] += values[:, taxels]
         values = (sums * share).astype(np.float32)
     frames = Frames(values[:, None, :], grid, unit="held", array=Array(1, values.shape[1]))
     trains = _at_period(encoder, period_us).encode(frames)
@@ -283,15 +296,20 @@ def _at_period(encoder: Encoder, period_us: int) -> Encoder:
     return instance("encoder", encoder, ChangeEvents)
 
 
-def _pooling(held: HeldValues, pool: int) -> tuple[NDArray[np.int64], int, NDArray[np.float64]] | None:
-    """Return to which pooled taxel each belongs, how many there are, and one over how many lie in each."""
+def _pooling(held: HeldValues, pool: int) -> _Pools | None:
+    """Return the taxels that are averaged into each; None where each stands for itself."""
     if pool == 1:
         return None
     row, column = np.divmod(held.taxels, held.array.columns)
-    cells, where, size = np.unique(
-        (row // pool) * held.array.columns + column // pool, return_inverse=True, return_counts=True
-    )
-    return where, len(cells), 1.0 / size
+    square = (row // pool) * held.array.columns + column // pool
+    _, where, size = np.unique(square, return_inverse=True, return_counts=True)
+    order = np.argsort(where, kind="stable")
+    begins = np.cumsum(size) - size
+    members = []
+    for rank in range(int(size.max())):
+        large = np.flatnonzero(size > rank)
+        members.append((large, order[begins[large] + rank]))
+    return _Pools(members, 1.0 / size)
 
 
 def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:

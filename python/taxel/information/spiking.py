@@ -38,7 +38,7 @@ class _NeuronPerClass(Classifier):
         ------
         ProblemError : patterns or labels that are invalid
         """
-        trains = _listed(patterns)
+        trains = _listed(self, patterns)
         self.classes_, row = labelled(y, len(trains))
         self.learners_ = [self._trained(trains, row == k) for k in range(len(self.classes_))]
         return self
@@ -55,7 +55,7 @@ class _NeuronPerClass(Classifier):
         ProblemError : not fitted, or patterns that are invalid
         """
         learners = self._fitted("learners_")
-        trains = _listed(patterns)
+        trains = _listed(self, patterns)
         return np.array([[self._potential(one, s) for one in learners] for s in trains]).reshape(
             len(trains), len(learners)
         )
@@ -239,5 +239,10 @@ def readout_responses(
     return responses
 
 
-def _listed(patterns: object) -> list[SpikeTrains]:
-    return [instance(f"pattern {k}", one, SpikeTrains) for k, one in enumerate(several("patterns", patterns))]
+def _listed(reader: object, patterns: object) -> list[SpikeTrains]:
+    """Return the patterns; refuse graded ones on behalf of `reader`."""
+    name = type(reader).__name__
+    return [
+        instance(f"pattern {k}", one, SpikeTrains)._ungraded(name)
+        for k, one in enumerate(several("patterns", patterns))
+    ]

@@ -39,9 +39,8 @@ def kilobits_per_second(spikes: Spikes, window_us: float, *, values: bool) -> fl
     """
     inside = spikes.bin < spikes.bins_to(window_us)[spikes.trial]
     word = 4 if values else 2
-    at_once: NDArray[np.int64] = np.unique(
-        np.stack([spikes.trial[inside], spikes.bin[inside]]), axis=1, return_counts=True
-    )[1]
+    bins = int(spikes.bin.max(initial=0)) + 1
+    at_once: NDArray[np.int64] = np.unique(spikes.trial[inside] * bins + spikes.bin[inside], return_counts=True)[1]
     datagrams = np.ceil(at_once * word / (_MOST_BYTES - _OWN_BYTES)).sum()
     touched = np.minimum(window_us, spikes.length_us).sum()
     return float(8.0 * (word * at_once.sum() + _OWN_BYTES * datagrams) / touched * 1000.0) if touched > 0 else 0.0

@@ -74,7 +74,7 @@ class EpochLearner(SpikeLearner):
         Parameters
         ----------
         patterns : sequence of SpikeTrains
-            The same trains in each; signed ones split into ON and OFF.
+            The same trains in each; signed ones split into ON and OFF, graded ones are refused.
         targets : sequence of float sequences, ms
             Target spike times, one list a pattern; empty for a pattern without spikes.
         start : float64, shape (trains,), mV, optional

@@ -4,16 +4,28 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy import float64
 from numpy.typing import NDArray
 
-from taxel._base.arguments import floats, instance, several
+from taxel._base.arguments import floats, instance, numbers, several
+from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 
-__all__ = ["examples"]
+__all__ = ["examples", "windows"]
 
 
 def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[float64]]]:
     """Return patterns and targets as the compiled part reads them; refuse other types."""
     trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))]
     return trains, [floats(f"targets of pattern {p}", t, "ms") for p, t in enumerate(several("targets", targets))]
+
+
+def windows(name: str, given: object) -> NDArray[float64] | None:
+    """Return the windows in which silence counts as start, stop, start, stop ...; None for everywhere."""
+    if given is None:
+        return None
+    ends = numbers(name, given, np.float64, "ms")  # type: ignore[arg-type]
+    if ends.size and (ends.ndim != 2 or ends.shape[1] != 2):
+        raise ProblemError(f"{name} has shape {ends.shape}: must hold windows, a start and a stop each")
+    return ends.reshape(-1)

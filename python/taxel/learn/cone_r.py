@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import callback, floats, instance, parameters
+from taxel._base.arguments import callback, floats, instance, parameters, several
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError, ProblemError
-from taxel.learn._examples import examples
+from taxel.learn._examples import examples, windows
 from taxel.learn._learner import SpikeLearner, predicted
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
@@ -51,6 +51,15 @@ class ConeR(SpikeLearner):
         ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``, synapse by synapse.
     divide_b_by : {"B_max", "targets"}
         Divisor of B: its largest value, as printed, or the number of targets.
+    divide_c_by : {"C_max", "targets"}
+        Divisor of C, likewise; C over the number of targets is in mV.
+    divide_d_by : {"D_max", "targets"}
+        Divisor of D, likewise (1 if there are no targets).
+    sides_b : {"both", "below"}
+        The potentials after a target that count in B: all that differ from what `kappa` requires, as printed, or only
+        those below.
+    sides_c : {"both", "below"}
+        The potentials at a target that count in C, likewise.
     norm : {"norm", "square"}
         The l2 term as printed, or squared.
     margin : float, mV, 0 or more
@@ -122,6 +131,10 @@ class ConeR(SpikeLearner):
     lb: float | Sequence[float] = _DEFAULT.lb
     ub: float | Sequence[float] = _DEFAULT.ub
     divide_b_by: Literal["B_max", "targets"] = _DEFAULT.divide_b_by
+    divide_c_by: Literal["C_max", "targets"] = _DEFAULT.divide_c_by
+    divide_d_by: Literal["D_max", "targets"] = _DEFAULT.divide_d_by
+    sides_b: Literal["both", "below"] = _DEFAULT.sides_b
+    sides_c: Literal["both", "below"] = _DEFAULT.sides_c
     norm: Literal["norm", "square"] = _DEFAULT.norm
     margin: float = _DEFAULT.margin
     horizon: float | None = _DEFAULT.horizon
@@ -141,13 +154,15 @@ class ConeR(SpikeLearner):
     unreachable_: list[tuple[int, int]] = field(init=False)
     refires_: int = field(init=False)
     neuron_: Neuron = field(init=False)
-    _multipliers: tuple[int, tuple[NDArray[np.int64], NDArray[np.float64]]] = field(init=False)
+    #: What the multipliers belong to (the number of rows, `sides_c`), and these.
+    _multipliers: tuple[tuple[int, str], tuple[NDArray[np.int64], NDArray[np.float64]]] = field(init=False)
 
     def fit(
         self,
         patterns: Sequence[SpikeTrains],
         targets: Sequence[ArrayLike],
         *,
+        silence: Sequence[ArrayLike | None] | None = None,
         start: ConeR | ArrayLike | None = None,
         progress: Callable[[int, int, float, float], object] | None = None,
     ) -> Self:
@@ -156,9 +171,12 @@ class ConeR(SpikeLearner):
         Parameters
         ----------
         patterns : sequence of SpikeTrains
-            The same trains in each; signed ones split into ON and OFF.
+            The same trains in each, unsigned or graded; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
             Target spike times, one list a pattern; empty for a pattern without spikes.
+        silence : sequence of float sequences of shape (windows, 2), ms, optional
+            The windows in which silence counts, one list of (start, stop) a pattern, ascending, ends included; None
+            for one pattern, or for all: everywhere. Points outside have no row in D.
         start : ConeR, or float64 of shape (trains,), mV, optional
             A similar fit (other `lambdas`, other `kappa`), or its weights, as the starting point; it changes the run
             time, not the result. The multipliers of a fit to the same rows are used too.
@@ -172,7 +190,7 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : invalid patterns or targets (names pattern and target)
+        ProblemError : invalid patterns, targets or windows (names pattern and target or window)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second; the weights are the best so far
 
         Warns
@@ -180,16 +198,23 @@ class ConeR(SpikeLearner):
         UserWarning : unreachable targets; a neuron that fires repeatedly after its own spikes; a gap above the
         tolerance
         """
-        self.prepare(patterns, targets).fit(self, start=start, progress=progress)
+        self.prepare(patterns, targets, silence=silence).fit(self, start=start, progress=progress)
         return self
 
-    def prepare(self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> ConeRProblem:
-        """Compute the rows of these examples, for fits with different `lambdas`, `kappa`, bounds and divisors.
+    def prepare(
+        self,
+        patterns: Sequence[SpikeTrains],
+        targets: Sequence[ArrayLike],
+        *,
+        silence: Sequence[ArrayLike | None] | None = None,
+    ) -> ConeRProblem:
+        """Compute the rows of these examples, for fits with different `lambdas`, `kappa`, bounds, divisors and sides.
 
         Parameters
         ----------
         patterns : sequence of SpikeTrains
         targets : sequence of float sequences, ms
+        silence : sequence of float sequences of shape (windows, 2), ms, optional
             As in `fit`.
 
         Returns
@@ -198,10 +223,10 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : invalid patterns or targets (names pattern and target), or more than 10 000 trains
-            with spikes
+        ProblemError : invalid patterns, targets or windows (names pattern and target or window), or more than 10 000
+            trains with spikes
         """
-        return ConeRProblem(self, patterns, targets)
+        return ConeRProblem(self, patterns, targets, silence)
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
         """Return the output spikes of the trained neuron, one array a pattern, ms.
@@ -240,6 +265,7 @@ class ConeRProblem:
         The learner whose neuron, margin and horizon define the rows.
     patterns : sequence of SpikeTrains
     targets : sequence of float sequences, ms
+    silence : sequence of float sequences of shape (windows, 2), ms, optional
         As in `ConeR.fit`.
 
     Attributes
@@ -261,14 +287,22 @@ class ConeRProblem:
     [0.0046, 0.0055]
     """
 
-    def __init__(self, cone: ConeR, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
+    def __init__(
+        self,
+        cone: ConeR,
+        patterns: Sequence[SpikeTrains],
+        targets: Sequence[ArrayLike],
+        silence: Sequence[ArrayLike | None] | None = None,
+    ) -> None:
         trains, times = examples(patterns, targets)
+        each = [None] * len(trains) if silence is None else several("silence", silence)
+        asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
         self._trains = len(trains[0][1]) - 1 if trains else 0
         self._counted = _counted(instance("cone", cone, ConeR), trains)
         if self._counted is not None:
             trains = [(parts[0], np.append(parts[1][self._counted], parts[1][-1]), *parts[2:]) for parts in trains]
         _weighed("patterns", self._trains if self._counted is None else len(self._counted), "trains have spikes")
-        self._problem = _core.ConeRProblem(self._handed(cone)[0], trains, times)
+        self._problem = _core.ConeRProblem(self._handed(cone)[0], trains, times, asked)
         self.silent_rows: int = self._problem.silent_rows
 
     def _handed(self, cone: ConeR) -> tuple[str, NDArray[np.float64]]:
@@ -307,8 +341,8 @@ class ConeRProblem:
         Parameters
         ----------
         cone : ConeR
-            May differ from the learner of the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `norm`,
-            `tolerance`, `engine` and `max_seconds`.
+            May differ from the learner of the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `divide_c_by`,
+            `divide_d_by`, `sides_b`, `sides_c`, `norm`, `tolerance`, `engine` and `max_seconds`.
         start : ConeR, or float64 of shape (trains,), mV, optional
         progress : function of (round, rows, objective, gap), optional
             As in `ConeR.fit`.
@@ -322,7 +356,7 @@ class ConeRProblem:
         ------
         ProblemError : a learner that needs other rows
         """
-        first = None if start is None else self._start(start)
+        first = None if start is None else self._start(start, cone)
         if progress is not None:
             callback("progress", progress)
         (weights, *others), signal = self._problem.fit(*self._handed(instance("cone", cone, ConeR)), first, progress)
@@ -336,13 +370,14 @@ class ConeRProblem:
         _warn(cone)
         return cone
 
-    def _start(self, start: ConeR | ArrayLike) -> tuple[NDArray[np.float64], Any]:
+    def _start(self, start: ConeR | ArrayLike, cone: ConeR) -> tuple[NDArray[np.float64], Any]:
         if not isinstance(start, ConeR):
             return self._weighed(floats("start", start)), None
         if not hasattr(start, "weights_"):
             raise NotFittedError("start: not fitted yet, call fit first")
-        rows, multipliers = start._multipliers
-        return self._weighed(start.weights_), multipliers if rows == self._problem.rows else None
+        what, multipliers = start._multipliers
+        same = what == (self._problem.rows, instance("cone", cone, ConeR).sides_c)
+        return self._weighed(start.weights_), multipliers if same else None
 
     def _weighed(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
         if self._counted is None:
@@ -391,7 +426,7 @@ def _keep(cone: ConeR, result: Any, silent_rows: int, all_rows: int) -> None:
     cone.unreachable_ = unreachable
     cone.refires_ = refires
     cone.neuron_ = cone._on_grid()
-    cone._multipliers = (all_rows, multipliers)
+    cone._multipliers = ((all_rows, cone.sides_c), multipliers)
 
 
 def _shown(bound: float | Sequence[float]) -> str:

@@ -241,7 +241,7 @@ class ConeX(SpikeLearner):
         Parameters
         ----------
         patterns : sequence of SpikeTrains
-            The same trains in each; signed ones split into ON and OFF.
+            The same trains in each, unsigned or graded; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
             Target spike times, one list a pattern; empty for a pattern without spikes.
         start : ConeX, optional

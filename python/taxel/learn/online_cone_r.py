@@ -14,6 +14,7 @@ from taxel import _core
 from taxel._base.arguments import callback, floats, instance, several
 from taxel._base.parameters import defaults
 from taxel._core import ProblemError
+from taxel.learn._examples import windows
 from taxel.learn.cone_r import ConeR, _keep, _warn, _weighed
 from taxel.spikes import SpikeTrains
 
@@ -38,6 +39,9 @@ class OnlineConeR(ConeR):
     lambdas : five floats, 0 or more
     lb, ub : float, or float sequence of shape (trains,), mV
     divide_b_by : {"B_max", "targets"}
+    divide_c_by : {"C_max", "targets"}
+    divide_d_by : {"D_max", "targets"}
+    sides_b, sides_c : {"both", "below"}
     norm : {"norm", "square"}
     margin : float, mV, 0 or more
     horizon : float, ms, optional
@@ -84,10 +88,10 @@ class OnlineConeR(ConeR):
 
     #: Parameters and patterns of the window, from which a copy or a pickle is restored.
     _begun: str = field(init=False)
-    _held: deque[tuple[Any, Any]] = field(init=False)
+    _held: deque[tuple[Any, Any, Any]] = field(init=False)
     _stream: _core.OnlineConeR = field(init=False)
 
-    def partial_fit(self, pattern: SpikeTrains, targets: ArrayLike) -> Self:
+    def partial_fit(self, pattern: SpikeTrains, targets: ArrayLike, *, silence: ArrayLike | None = None) -> Self:
         """Add a pattern to the window, and fit the weights to all patterns that the window then holds.
 
         Parameters
@@ -96,6 +100,8 @@ class OnlineConeR(ConeR):
             The same trains as in all patterns before.
         targets : float sequence, ms
             Target spike times; empty for a pattern without spikes.
+        silence : float sequence of shape (windows, 2), ms, optional
+            The windows (start, stop) of this pattern in which silence counts, as in `ConeR.fit`; default: everywhere.
 
         Returns
         -------
@@ -116,7 +122,7 @@ class OnlineConeR(ConeR):
         with self._locked():
             if not hasattr(self, "_stream"):
                 self._begin()
-            self._add(pattern, targets, "pattern", "targets")
+            self._add(pattern, targets, windows("silence", silence), "pattern", "targets")
             return self._fit()
 
     def fit(
@@ -124,6 +130,7 @@ class OnlineConeR(ConeR):
         patterns: Sequence[SpikeTrains],
         targets: Sequence[ArrayLike],
         *,
+        silence: Sequence[ArrayLike | None] | None = None,
         start: ConeR | ArrayLike | None = None,
         progress: Callable[[int, int, float, float], object] | None = None,
     ) -> Self:
@@ -133,6 +140,7 @@ class OnlineConeR(ConeR):
         ----------
         patterns : sequence of SpikeTrains
         targets : sequence of float sequences, ms
+        silence : sequence of float sequences of shape (windows, 2), ms, optional
             As in `ConeR.fit`.
         start : ConeR, or float64 of shape (trains,), mV, refused
         progress : function, refused
@@ -155,10 +163,14 @@ class OnlineConeR(ConeR):
         trains, times = several("patterns", patterns), several("targets", targets)
         if len(trains) != len(times) or not trains:
             raise ProblemError(f"targets: {len(times)} lists for {len(trains)} patterns, must be one a pattern")
+        each = [None] * len(trains) if silence is None else several("silence", silence)
+        if len(each) != len(trains):
+            raise ProblemError(f"silence: {len(each)} lists for {len(trains)} patterns, must be one a pattern")
+        asked = [windows(f"silence of pattern {p}", one) for p, one in enumerate(each)]
         with self._locked():
             self._begin()
-            for p, (pattern, target) in enumerate(zip(trains, times, strict=True)):
-                self._add(pattern, target, f"pattern {p}", f"targets of pattern {p}")
+            for p, (pattern, target, here) in enumerate(zip(trains, times, asked, strict=True)):
+                self._add(pattern, target, here, f"pattern {p}", f"targets of pattern {p}")
             return self._fit()
 
     def _locked(self) -> Lock:
@@ -166,8 +178,8 @@ class OnlineConeR(ConeR):
         lock: Lock = vars(self).setdefault("_lock", Lock())
         return lock
 
-    def _add(self, pattern: SpikeTrains, targets: ArrayLike, name: str, targets_name: str) -> None:
-        example = instance(name, pattern, SpikeTrains)._parts(), floats(targets_name, targets, "ms")
+    def _add(self, pattern: SpikeTrains, targets: ArrayLike, asked: Any, name: str, targets_name: str) -> None:
+        example = instance(name, pattern, SpikeTrains)._parts(), floats(targets_name, targets, "ms"), asked
         # A train that is silent in this window may have spikes in the next.
         _weighed(name, len(pattern), "trains")
         self._stream.add(*example)

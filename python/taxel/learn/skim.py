@@ -119,7 +119,8 @@ class SKIM(BatchLearner):
         Parameters
         ----------
         patterns : sequence of SpikeTrains
-            The same trains in each; signed ones split into ON and OFF. Of any length: a whole recording is a pattern.
+            The same trains in each; signed ones split into ON and OFF, graded ones are refused. Of any length: a whole
+            recording is a pattern.
         targets : sequence of float sequences, ms
             Target spike times, one list a pattern, ascending; empty for a pattern without spikes.
 

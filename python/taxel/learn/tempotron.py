@@ -111,7 +111,7 @@ class Tempotron(Learner):
         Parameters
         ----------
         patterns : sequence of SpikeTrains
-            The same trains in each; signed ones split into ON and OFF.
+            The same trains in each; signed ones split into ON and OFF, graded ones are refused.
         labels : bool, shape (patterns,), one or more
             Whether the neuron should fire.
         start : float64, shape (trains,), in thresholds of 1 mV, optional

@@ -49,22 +49,23 @@ def distance(metric: str, a: Pattern, b: Pattern, options: Mapping[str, Any]) ->
     if isinstance(a, SpikeTrains) != isinstance(b, SpikeTrains):
         name, value, other = ("b", b, "a") if isinstance(a, SpikeTrains) else ("a", a, "b")
         raise ProblemError(f"{name} is {shown(value)}: must be a taxel.SpikeTrains, as {other} is")
-    return _core.distance(stated(metric, options), _one("a", a), _one("b", b))
+    return _core.distance(stated(metric, options), _one(metric, "a", a), _one(metric, "b", b))
 
 
-def _one(name: str, x: Pattern) -> tuple[Any, ...]:
+def _one(metric: str, name: str, x: Pattern) -> tuple[Any, ...]:
     if isinstance(x, SpikeTrains):
-        trains = x.split_by_sign() if x.signed else x
+        trains = _unvalued(metric, x)
         return name, 1, len(trains), trains.times, trains.offsets, (x.start, x.stop), False
     times = floats(name, x, "ms")
     return name, 1, 1, times, np.array([0, len(times)]), None, False
 
 
-def listed(name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[Any, ...]:
+def listed(metric: str, name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[Any, ...]:
     """Return several patterns: the trains of one `SpikeTrains`, a list of `SpikeTrains`, or a list of times a train."""
     if isinstance(x, SpikeTrains):
         if x.signed:
             raise ProblemError(f"{name} has signed trains: choose some by split_by_sign(), or give a list of patterns")
+        x._ungraded(metric)
         return name, len(x), 1, x.times, x.offsets, (x.start, x.stop), True
     entries = several(name, x)
     if not any(isinstance(entry, SpikeTrains) for entry in entries):
@@ -72,13 +73,18 @@ def listed(name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[Any, ...]:
         return name, len(times), 1, _joined(times), _offsets([len(t) for t in times]), None, True
     patterns = [instance(f"{name}[{p}]", entry, SpikeTrains) for p, entry in enumerate(entries)]
     window = (min(p.start for p in patterns), max(p.stop for p in patterns))
-    patterns = [p.split_by_sign() if p.signed else p for p in patterns]
+    patterns = [_unvalued(metric, p) for p in patterns]
     trains = len(patterns[0])
     for p, pattern in enumerate(patterns):
         if len(pattern) != trains:
             raise ProblemError(f"{name}[{p}] has {len(pattern)} trains, {name}[0] has {trains}: must be equally many")
     offsets = _offsets(np.concatenate([p.counts for p in patterns]))
     return name, len(patterns), trains, _joined([p.times for p in patterns]), offsets, window, True
+
+
+def _unvalued(metric: str, trains: SpikeTrains) -> SpikeTrains:
+    """Return trains without values: signed ones are split by sign, graded ones are refused."""
+    return trains.split_by_sign() if trains.signed else trains._ungraded(metric)
 
 
 def _joined(times: list[Any]) -> Any:

@@ -58,7 +58,7 @@ def pairwise(
     [[0.0, 0.2, 1.0], [0.2, 0.0, 1.0], [1.0, 1.0, 0.0]]
     """
     stating = stated(metric, parameters)
-    rows, columns = listed("a", a), None if b is None else listed("b", b)
+    rows, columns = listed(metric, "a", a), None if b is None else listed(metric, "b", b)
     count = None if threads is None else whole("threads", threads, 1, 4096)
     if progress is not None:
         callback("progress", progress)

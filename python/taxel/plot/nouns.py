@@ -31,7 +31,7 @@ def axes(ax: Axes | None, size: tuple[float, float]) -> Axes:
 
 
 def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
-    """Draw spike times to the right (ms), trains upwards; ON and OFF in two colours where spikes are signed.
+    """Draw spike times to the right (ms), trains upwards; values above and below 0 in two colours.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
     if trains.values is None:
         ax.scatter(times, train, size, "black", marker="|", linewidths=0.8)
     else:
-        for on, colour, name in ((True, ON, "ON"), (False, OFF, "OFF")):
+        names = ("ON", "OFF") if trains.signed else ("above 0", "below 0")
+        for on, colour, name in zip((True, False), (ON, OFF), names, strict=True):
             chosen = (trains.values > 0) == on
             ax.scatter(times[chosen], train[chosen], size, colour, marker="|", linewidths=0.8, label=name)
         ax.legend(loc="upper right")

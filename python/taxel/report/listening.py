@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect import Outcome, PlainRule, Readout, Score
+from taxel.detect import Alignment, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
 from taxel.detect.examples import array_of
 from taxel.report.charts import INK, STYLE, chart
@@ -58,6 +58,7 @@ def write_listening(
     title: str,
     judged: str = "",
     held_out: Sequence[Score] = (),
+    alignments: Mapping[str, Alignment] | None = None,
 ) -> Path:
     """Write the detections of a readout in recordings as a page with pictures, ``report.html`` in a new folder.
 
@@ -73,6 +74,8 @@ def write_listening(
         On what the scores of `listened` are: held-out data, or the readout's own training data.
     held_out : list of Score, one a recording, or none
         How readouts trained without each recording, or without parts of it, did on it.
+    alignments : mapping of str to Alignment, optional
+        By how much labels were moved to what the sensor felt before they were learnt; examples are those of `listened`.
 
     Returns
     -------
@@ -89,11 +92,13 @@ def write_listening(
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     moments = {label: _moments(listened, label) for label in readout.labels}
+    aligned = {} if alignments is None else alignments
     with mpl.rc_context(STYLE):
         drawn = {
             label: {
-                **_of_neuron(readout, listened, label, moments[label]),
+                **_of_neuron(readout, listened, label, moments[label], aligned.get(label)),
                 "errors": _drawn(_errors(listened, label)),
+                "moved": _drawn(_moved(aligned.get(label))),
             }
             for label in readout.labels
         }
@@ -104,6 +109,7 @@ def write_listening(
         readout=repr(readout),
         labels=readout.labels,
         drawn=drawn,
+        aligned={label: aligned.get(label) for label in readout.labels},
         rows=[_row(one, label, one.score) for one in listened for label in readout.labels],
         held_out=[
             _row(one, label, own)
@@ -118,13 +124,17 @@ def write_listening(
 
 
 def _of_neuron(
-    readout: Readout | PlainRule, listened: Sequence[Outcome], label: str, moments: list[_Moment]
+    readout: Readout | PlainRule,
+    listened: Sequence[Outcome],
+    label: str,
+    moments: list[_Moment],
+    alignment: Alignment | None,
 ) -> dict[str, Markup | None]:
     """Return the drawings of a label's neuron; a plain rule has none."""
     if isinstance(readout, PlainRule):
         return {"potential": None, "weights": None}
     return {
-        "potential": _drawn(_potential(readout, listened, label, moments)),
+        "potential": _drawn(_potential(readout, listened, label, moments, alignment)),
         "weights": _drawn(_weights(readout, listened[0], label)),
     }
 
@@ -138,7 +148,7 @@ def _drawn(figure: Figure | None) -> Markup | None:
 
 
 def _row(one: Outcome, label: str, score: Score | None) -> dict[str, Any]:
-    own = None if score is None else score[label]
+    own = None if score is None else score.by_label.get(label)
     count = len(one.found[label]) if own is None else own.found + own.false
     return {"recording": one.name, "label": label, "detections": count, "score": own}
 
@@ -149,6 +159,8 @@ def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
     for k, one in enumerate(listened):
         if one.score is None:
             moments += [_Moment(k, label, float(t), "detected", 0.0) for t in one.found[label].t]
+            continue
+        if label not in one.score.by_label:
             continue
         own, times = one.score[label], one.found.t
         happened = times[own.pairs[:, 0]] - np.rint(to_us(own.errors_ms)).astype(np.int64)
@@ -162,8 +174,10 @@ def _moments(listened: Sequence[Outcome], label: str) -> list[_Moment]:
     return sorted(moments, key=lambda moment: -moment.badness)[:_MOMENTS]
 
 
-def _potential(readout: Readout, listened: Sequence[Outcome], label: str, moments: list[_Moment]) -> Figure | None:
-    """Draw potential and threshold around moments, with detections and labels."""
+def _potential(
+    readout: Readout, listened: Sequence[Outcome], label: str, moments: list[_Moment], aligned: Alignment | None
+) -> Figure | None:
+    """Draw potential and threshold around moments, with detections, and labels as given and as learnt."""
     if not moments:
         return None
     one = readout.neurons[label]
@@ -187,10 +201,29 @@ def _potential(readout: Readout, listened: Sequence[Outcome], label: str, moment
         true = to_ms(np.asarray(outcome.example.labels.get(label, ()), np.float64))
         for k, t in enumerate(true[np.abs(true - at) < reach]):
             axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--", label="true" * (k == 0))
+        felt = np.empty(0) if aligned is None else to_ms(aligned.felt(moment.recording))
+        for k, t in enumerate(felt[np.abs(felt - at) < reach]):
+            axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle=":", label="felt" * (k == 0))
         axis.set_title(f"{moment.what}, {at / 1000.0:.3f} s", fontsize=9)
         axis.set_xlabel("ms from then")
         axis.legend()
     axes[0][0].set_ylabel("potential, mV")
+    return figure
+
+
+def _moved(aligned: Alignment | None) -> Figure | None:
+    """Draw how far each label was moved to what the sensor felt, one recording after the other."""
+    if aligned is None or aligned.train is None:
+        return None
+    figure, axis = plt.subplots(figsize=(6.5, 2.2), layout="constrained")
+    number = np.arange(len(aligned.given))
+    axis.vlines(number, 0.0, aligned.moved_ms, color=_TRUE, linewidth=0.8)
+    axis.plot(number, aligned.moved_ms, ".", color=_TRUE, label="felt")
+    axis.plot(number[aligned.unpaired], np.zeros(aligned.unpaired.sum()), "x", color=_DETECTED, label="nothing felt")
+    axis.axhline(0, color="#999999", linewidth=0.8)
+    axis.set_xlabel("label, in the order of recordings and time")
+    axis.set_ylabel("felt minus given, ms")
+    axis.legend()
     return figure
 
 
@@ -269,7 +302,8 @@ def _nth(what: str, count: int, n: int) -> str:
 
 def _errors(listened: Sequence[Outcome], label: str) -> Figure | None:
     """Draw how far detections lay from their events."""
-    errors = [one.score[label].errors_ms for one in listened if one.score is not None]
+    scores = [one.score.by_label.get(label) for one in listened if one.score is not None]
+    errors = [own.errors_ms for own in scores if own is not None]
     if not errors or not sum(map(len, errors)):
         return None
     figure, axis = plt.subplots(figsize=(4.2, 2.2), layout="constrained")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
+from typing import Any, Literal
 from uuid import uuid4
 from warnings import catch_warnings, filterwarnings
 
@@ -20,14 +21,17 @@ from taxel._core import FormatError, ProblemError
 
 __all__ = ["read_nwb", "write_nwb"]
 
-#: Times (ms) train by train, start, stop, and values train by train.
-Read = tuple[list[NDArray[np.float64]], float, float, list[NDArray[np.float32]] | None]
+Kind = Literal["unsigned", "signed", "graded"]
+
+#: Times (ms) train by train, start, stop, values train by train, and their kind.
+Read = tuple[list[NDArray[np.float64]], float, float, list[NDArray[np.float32]] | None, Kind]
 
 
 def write_nwb(
     path: str | os.PathLike[str],
     times: list[NDArray[np.float64]],
     values: list[NDArray[np.float32]] | None,
+    kind: Kind,
     window_ms: tuple[float, float],
     *,
     begun: datetime | None,
@@ -49,11 +53,17 @@ def write_nwb(
         raise ProblemError(f"description is {shown(description)}: NWB takes no zero in a text")
     file = NWBFile(description, str(uuid4()), begun)
     if values is not None:
-        file.add_unit_column("value", "signed value of each spike: polarity or bits", index=True)
+        meaning = "factor of the weight" if kind == "graded" else "polarity or bits"
+        file.add_unit_column("value", f"{kind} value of each spike: {meaning}", index=True)
+    valued: dict[str, object] = {}
+    if kind == "graded":
+        file.add_unit_column("value_kind", "what the values of the spikes mean")
+        valued["value_kind"] = kind
     window_s = np.array([window_ms]) / 1000.0
     for n, train in enumerate(times):
-        signed = {} if values is None else {"value": values[n]}
-        file.add_unit(id=n, spike_times=train / 1000.0, obs_intervals=window_s, **signed)
+        if values is not None:
+            valued["value"] = values[n]
+        file.add_unit(id=n, spike_times=train / 1000.0, obs_intervals=window_s, **valued)
     with whole_file(path, overwrite=overwrite) as part, _quiet_about_names(), NWBHDF5IO(part, "w") as io:
         io.write(file)
     return Path(path)
@@ -75,8 +85,10 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
             if "spike_times" not in columns:
                 raise FormatError(f"{place}: an NWB file without spike times in a table of units")
             times = [1000.0 * np.asarray(units["spike_times"][n], np.float64) for n in range(len(units))]
-            values = None
+            values: list[NDArray[np.float32]] | None = None
+            kind: Kind = "unsigned"
             if "value" in columns:
+                kind = _kind_of(units, columns)
                 values = [np.asarray(units["value"][n], np.float32) for n in range(len(units))]
             watched = np.empty((0, 2))
             if "obs_intervals" in columns and len(units):
@@ -90,7 +102,15 @@ def read_nwb(path: str | os.PathLike[str], start: float | None, stop: float | No
     first, last = (
         float(outermost) if chosen is None else chosen for chosen, outermost in zip(window_ms, widest, strict=True)
     )
-    return times, first, last, values
+    return times, first, last, values, kind
+
+
+def _kind_of(units: Any, columns: Iterable[str]) -> Kind:
+    """Return the kind of the values in a table of units: signed, unless all units are graded."""
+    graded = {str(kind) == "graded" for kind in units["value_kind"][:]} if "value_kind" in columns else {False}
+    if graded == {True, False}:
+        raise FormatError("units of different value_kind: must be one for all")
+    return "graded" if graded == {True} else "signed"
 
 
 @contextmanager

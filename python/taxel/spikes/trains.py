@@ -6,26 +6,28 @@ import os
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.archive import read_arrays
-from taxel._base.arguments import bare, column, floats, nth, number, several, shown, window
+from taxel._base.arguments import bare, column, floats, instance, nth, number, several, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, own_column
 from taxel._base.drawing import draw
 from taxel._base.files import write_whole
 from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
-from taxel.spikes.exchange import read_nwb, write_nwb
+from taxel.spikes.exchange import Kind, read_nwb, write_nwb
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["SpikeTrains"]
+
+_KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class SpikeTrains(Columns):
@@ -39,12 +41,17 @@ class SpikeTrains(Columns):
         Index of each train's first spike in `times`; the last entry is the number of spikes.
     start, stop : float, ms
         The window: a train without spikes was silent in it.
-    values : float32, shape (spikes,), polarity or bits, optional
-        A signed value a spike, where the encoder has one.
+    values : float32, shape (spikes,), optional
+        A value a spike: polarity or bits of signed trains, the factor of the weight of graded ones.
+    kind : "unsigned", "signed" or "graded", optional
+        What the values mean, one for all trains. Signed trains are split by sign before a neuron reads them. The values
+        of graded trains multiply the weight; they are finite, of either sign, and never 0, which would be no spike.
+        Default: signed if there are `values`, else unsigned.
 
     Raises
     ------
-    ProblemError : times not finite, not ascending or outside the window (names train and spike)
+    ProblemError : times not finite, not ascending or outside the window (names train and spike); values that are not
+        finite or not those of the kind, or a graded value of 0 (names it)
 
     Notes
     -----
@@ -58,6 +65,8 @@ class SpikeTrains(Columns):
     SpikeTrains(3 trains, 3 spikes, 0 to 10 ms)
     >>> trains[0]
     array([1., 5.])
+    >>> SpikeTrains([1.0, 5.0], [0, 2], 0.0, 10.0, [0.5, -2.0], kind="graded")
+    SpikeTrains(1 train, 2 spikes, graded, 0 to 10 ms)
     """
 
     def __init__(
@@ -67,11 +76,13 @@ class SpikeTrains(Columns):
         start: float,
         stop: float,
         values: ArrayLike | None = None,
+        *,
+        kind: Kind | None = None,
     ) -> None:
         self.times: NDArray[np.float64] = own_column("times", times, np.float64, "ms")
         self.offsets: NDArray[np.int64] = own_column("offsets", offsets, np.int64)
         self.values: NDArray[np.float32] | None = None if values is None else own_column("values", values, np.float32)
-        _finite_values(self.values)
+        self.kind: Kind = _kind(kind, self.values)
         self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())
 
@@ -82,6 +93,8 @@ class SpikeTrains(Columns):
         start: float = 0.0,
         stop: float | None = None,
         values: Sequence[ArrayLike] | None = None,
+        *,
+        kind: Kind | None = None,
     ) -> SpikeTrains:
         """Build spike trains from one list of times a train.
 
@@ -92,7 +105,9 @@ class SpikeTrains(Columns):
         start : float, ms
         stop : float, ms, optional
             Default: the time of the last spike.
-        values : sequence of float sequences, a polarity or bits a spike, optional
+        values : sequence of float sequences, a polarity or bits, or a factor of the weight, a spike, optional
+        kind : "unsigned", "signed" or "graded", optional
+            As in `SpikeTrains`.
 
         Returns
         -------
@@ -100,7 +115,7 @@ class SpikeTrains(Columns):
 
         Raises
         ------
-        ProblemError : invalid times (names train and spike)
+        ProblemError : invalid times or values (names train and spike)
 
         Examples
         --------
@@ -108,17 +123,16 @@ class SpikeTrains(Columns):
         SpikeTrains(2 trains, 2 spikes, 0 to 10 ms)
         """
         flat, counts = _by_train("times", bare("times", times, "ms"), np.float64)
-        signed = None
+        valued = None
         if values is not None:
-            signed, valued = _by_train("values", bare("values", values), np.float32)
-            if valued != counts:
+            valued, lengths = _by_train("values", bare("values", values), np.float32)
+            if lengths != counts:
                 raise ProblemError("values: must have the lengths of the trains, one value a spike")
-            _finite_values(signed)
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # Values that are not finite are refused below, with their positions.
             stop = float(max(number("start", start, "ms"), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
-        return cls._of_own(flat, offsets, start, stop, signed)
+        return cls._of_own(flat, offsets, start, stop, valued, kind)
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -136,6 +150,8 @@ class SpikeTrains(Columns):
     def __add__(self, other: SpikeTrains) -> SpikeTrains:
         """Return the spikes of both, train by train in order of time; the window holds both windows.
 
+        With graded trains, the spikes of unsigned ones have the value 1.
+
         Raises
         ------
         ProblemError : another number of trains, or only one of the two is signed
@@ -145,17 +161,20 @@ class SpikeTrains(Columns):
         if len(self) != len(other):
             raise ProblemError(f"{len(self)} trains and {len(other)}: only equally many are merged")
         if self.signed != other.signed:
-            raise ProblemError("signed and unsigned trains: only alike ones are merged; see split_by_sign")
+            one, two = sorted((self.kind, other.kind))
+            raise ProblemError(f"{one} and {two} trains: only alike ones are merged; see split_by_sign")
         times = np.concatenate([self.times, other.times])
         train = np.concatenate(
             [np.repeat(np.arange(len(self)), self.counts), np.repeat(np.arange(len(self)), other.counts)]
         )
         order = np.lexsort((times, train))
         values = None
-        if self.values is not None and other.values is not None:
-            values = np.concatenate([self.values, other.values])[order]
+        kind = max(self.kind, other.kind, key=_KINDS.index)
+        if kind != "unsigned":
+            values = np.concatenate([self._ones_without(), other._ones_without()])[order]
         offsets = self.offsets + other.offsets
-        return self._of_own(times[order], offsets, min(self.start, other.start), max(self.stop, other.stop), values)
+        start, stop = min(self.start, other.start), max(self.stop, other.stop)
+        return self._of_own(times[order], offsets, start, stop, values, kind)
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -164,11 +183,58 @@ class SpikeTrains(Columns):
 
     @property
     def signed(self) -> bool:
-        """Whether spikes carry a signed value."""
-        return self.values is not None
+        """Whether the values are polarities or bits: each train is two inputs of a neuron, ON and OFF."""
+        return self.kind == "signed"
+
+    @classmethod
+    def side_by_side(cls, parts: Sequence[SpikeTrains]) -> SpikeTrains:
+        """Return the trains of all parts as the inputs of one neuron: first those of part 0, then those of part 1.
+
+        Signed trains are split by sign first. If a part is graded, all are, and the spikes of the others have the
+        value 1.
+
+        Parameters
+        ----------
+        parts : sequence of SpikeTrains, one or more
+
+        Returns
+        -------
+        SpikeTrains
+            Unsigned or graded; the window holds the windows of all parts.
+
+        Raises
+        ------
+        ProblemError : no part, or something else than spike trains
+
+        Examples
+        --------
+        >>> touch = SpikeTrains.from_lists([[1.0]], stop=9.0)
+        >>> area = SpikeTrains.from_lists([[2.0], [3.0]], stop=9.0, values=[[0.5], [2.5]], kind="graded")
+        >>> both = SpikeTrains.side_by_side([touch, area])
+        >>> both, both.values
+        (SpikeTrains(3 trains, 3 spikes, graded, 0 to 9 ms), array([1. , 0.5, 2.5], dtype=float32))
+        """
+        each = [instance(f"parts[{n}]", one, SpikeTrains) for n, one in enumerate(several("parts", parts))]
+        if not each:
+            raise ProblemError("parts: there is none, one or more is needed")
+        each = [one.split_by_sign() if one.signed else one for one in each]
+        graded = any(one.kind == "graded" for one in each)
+        return cls._of_own(
+            np.concatenate([one.times for one in each]),
+            np.concatenate([[0], np.cumsum(np.concatenate([one.counts for one in each]))]).astype(np.int64),
+            min(one.start for one in each),
+            max(one.stop for one in each),
+            np.concatenate([one._ones_without() for one in each]) if graded else None,
+            "graded" if graded else "unsigned",
+        )
 
     def split_by_sign(self) -> SpikeTrains:
-        """Return all ON trains (value above 0), then all OFF trains; unsigned trains are returned unchanged."""
+        """Return all ON trains (value above 0), then all OFF trains; unsigned trains are returned unchanged.
+
+        Raises
+        ------
+        ProblemError : graded trains, whose values multiply the weight
+        """
         return self._from_parts(_core.split_by_sign(self._parts()))
 
     def between(self, start: float, stop: float) -> SpikeTrains:
@@ -230,7 +296,7 @@ class SpikeTrains(Columns):
         values = None
         if self.values is not None:
             values = [self.values[self.offsets[n] : self.offsets[n + 1]] for n in numbers]
-        return SpikeTrains.from_lists([self[n] for n in numbers], self.start, self.stop, values)
+        return SpikeTrains.from_lists([self[n] for n in numbers], self.start, self.stop, values, kind=self.kind)
 
     def delayed(self, delays_ms: ArrayLike) -> SpikeTrains:
         """Return every train once at each delay, so that a learner can choose among the delays.
@@ -266,19 +332,53 @@ class SpikeTrains(Columns):
         offsets = np.add.outer(np.arange(len(delays)) * len(self.times), self.offsets[:-1]).reshape(-1)
         values = None if self.values is None else np.tile(self.values, len(delays))
         ends = np.append(offsets, len(times))
-        return self._of_own(times, ends, self.start, self.stop + delays[-1], values)
+        return self._of_own(times, ends, self.start, self.stop + delays[-1], values, self.kind)
+
+    def lasting(self, stop: float) -> SpikeTrains:
+        """Return the same spikes in a window that ends at `stop`.
+
+        Parameters
+        ----------
+        stop : float, ms, the last spike or later
+
+        Returns
+        -------
+        SpikeTrains
+
+        Raises
+        ------
+        ProblemError : a spike after `stop` (names train and spike)
+
+        Examples
+        --------
+        >>> SpikeTrains.from_lists([[1.0]]).lasting(5.0)
+        SpikeTrains(1 train, 1 spike, 0 to 5 ms)
+        """
+        return SpikeTrains(self.times, self.offsets, self.start, stop, self.values, kind=self.kind)
+
+    def _ones_without(self) -> NDArray[np.float32]:
+        """Return the values, 1 a spike of unsigned trains."""
+        return np.ones(len(self.times), np.float32) if self.values is None else self.values
+
+    def _ungraded(self, reader: str) -> SpikeTrains:
+        """Return the trains; refuse graded ones on behalf of `reader`, which reads no values."""
+        if self.kind == "graded":
+            raise ProblemError(f"{reader} takes no graded trains: their spikes have values, which it does not read")
+        return self
 
     def _where(self, keep: NDArray[np.bool_], start: float, stop: float) -> SpikeTrains:
         offsets = np.concatenate([[0], np.cumsum(keep)])[self.offsets]
         values = None if self.values is None else self.values[keep]
-        return self._of_own(self.times[keep], offsets, start, stop, values)
+        return self._of_own(self.times[keep], offsets, start, stop, values, self.kind)
 
     def to_numpy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return times (ms) and train numbers of all spikes, by train."""
         return self.times.copy(), np.repeat(np.arange(len(self)), self.counts)
 
     def to_neo(self) -> list[Any]:
-        """Return one ``neo.SpikeTrain`` a train; signed values become the array annotation ``value``.
+        """Return one ``neo.SpikeTrain`` a train; values become the array annotation ``value``.
+
+        Trains that are graded have the annotation ``value_kind``, "graded".
 
         Raises
         ------
@@ -288,9 +388,9 @@ class SpikeTrains(Columns):
 
         trains = []
         for n in range(len(self)):
-            notes = {}
+            notes: dict[str, Any] = {"value_kind": self.kind} if self.kind == "graded" else {}
             if self.values is not None:
-                notes = {"array_annotations": {"value": self.values[self.offsets[n] : self.offsets[n + 1]]}}
+                notes["array_annotations"] = {"value": self.values[self.offsets[n] : self.offsets[n + 1]]}
             trains.append(SpikeTrain(self[n], units="ms", t_start=self.start, t_stop=self.stop, **notes))
         return trains
 
@@ -305,7 +405,8 @@ class SpikeTrains(Columns):
         Returns
         -------
         SpikeTrains
-            Their window is the widest of those of `trains`.
+            Their window is the widest of those of `trains`. They are graded if all of `trains` have the annotation
+            ``value_kind`` that `to_neo` makes.
 
         Raises
         ------
@@ -323,12 +424,14 @@ class SpikeTrains(Columns):
         start = min(float(t.t_start.rescale("ms").magnitude) for t in trains)
         stop = max(float(t.t_stop.rescale("ms").magnitude) for t in trains)
         values = None
+        kind: Kind = "unsigned"
         if all("value" in t.array_annotations for t in trains):
             values = [np.asarray(t.array_annotations["value"], np.float32) for t in trains]
-        return cls.from_lists(times, start, stop, values)
+            kind = "graded" if all(t.annotations.get("value_kind") == "graded" for t in trains) else "signed"
+        return cls.from_lists(times, start, stop, values, kind=kind)
 
     def to_pandas(self) -> Any:
-        """Return a table with a row a spike, ``train t_ms``, and ``value`` of signed ones, train after train.
+        """Return a table with a row a spike, ``train t_ms``, and ``value`` if there are values, train after train.
 
         Raises
         ------
@@ -349,7 +452,8 @@ class SpikeTrains(Columns):
     ) -> Path:
         """Write the trains to an NWB file, one unit a train; return its path.
 
-        The window becomes each unit's observation interval, signed values a column ``value``. NWB counts in seconds.
+        The window becomes each unit's observation interval, values a column ``value``; of graded trains a further
+        column ``value_kind`` says so. NWB counts in seconds.
 
         Parameters
         ----------
@@ -370,6 +474,7 @@ class SpikeTrains(Columns):
             path,
             list(self),
             self._values(),
+            self.kind,
             (self.start, self.stop),
             begun=begun,
             description=description,
@@ -395,16 +500,18 @@ class SpikeTrains(Columns):
         FileNotFoundError : no such file
         ImportError : pynwb is not installed (``pip install taxel[nwb]``)
         """
-        times, first, last, values = read_nwb(path, start, stop)
+        times, first, last, values, kind = read_nwb(path, start, stop)
         try:
-            return cls.from_lists(times, first, last, values)
+            return cls.from_lists(times, first, last, values, kind=kind)
         except ProblemError as error:
             # With the caller's own window the window may be wrong, otherwise the file is.
-            kind = FormatError if start is None and stop is None else ProblemError
-            raise kind(f"{path}: {error}") from None
+            fault = FormatError if start is None and stop is None else ProblemError
+            raise fault(f"{path}: {error}") from None
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the trains to a .npz (``times offsets start stop``, and ``values`` of signed ones); return its path.
+        """Write the trains to a .npz (``times offsets start stop``, ``values`` if any); return its path.
+
+        Graded trains have a further entry, ``kind``.
 
         Parameters
         ----------
@@ -423,6 +530,8 @@ class SpikeTrains(Columns):
         columns: dict[str, Any] = {"times": self.times, "offsets": self.offsets, "start": self.start, "stop": self.stop}
         if self.values is not None:
             columns["values"] = self.values
+        if self.kind == "graded":
+            columns["kind"] = np.array(self.kind)
         return write_whole(path, lambda file: np.savez_compressed(file, **columns), overwrite=overwrite)
 
     @classmethod
@@ -451,13 +560,15 @@ class SpikeTrains(Columns):
         """
         place = checked_path("path", path)
         try:
-            held = read_arrays(place, ("times", "offsets", "start", "stop", "values"))
-            return cls(held["times"], held["offsets"], held["start"].item(), held["stop"].item(), held.get("values"))
+            held = read_arrays(place, ("times", "offsets", "start", "stop", "values", "kind"), texts=("kind",))
+            kind = held["kind"].item() if "kind" in held else None
+            start, stop = held["start"].item(), held["stop"].item()
+            return cls(held["times"], held["offsets"], start, stop, held.get("values"), kind=kind)
         except (ValueError, KeyError, ProblemError, FormatError) as error:
             raise FormatError(f"{place}: holds no spike trains: {shown(str(error))}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the raster: time (ms) to the right, trains upwards, OFF spikes in another colour."""
+        """Draw the raster: time (ms) to the right, trains upwards, OFF spikes and values below 0 in another colour."""
         return draw("raster", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
@@ -468,12 +579,12 @@ class SpikeTrains(Columns):
         return None if self.values is None else np.split(self.values, self.offsets[1:-1])
 
     def _parts(self) -> tuple[Any, ...]:
-        return self.times, self.offsets, self.values, self.start, self.stop
+        return self.times, self.offsets, self.values, self.kind, self.start, self.stop
 
     @classmethod
     def _from_parts(cls, parts: tuple[Any, ...]) -> SpikeTrains:
-        times, offsets, values, start, stop = parts
-        return cls._of_own(times, offsets, start, stop, values)
+        times, offsets, values, kind, start, stop = parts
+        return cls._of_own(times, offsets, start, stop, values, kind)
 
     @classmethod
     def _of_own(
@@ -483,18 +594,17 @@ class SpikeTrains(Columns):
         start: float,
         stop: float,
         values: NDArray[np.float32] | None,
+        kind: Kind | None,
     ) -> SpikeTrains:
         """Build spike trains from new arrays of our own."""
-        return cls(frozen(times), frozen(offsets), start, stop, None if values is None else frozen(values))
+        return cls(frozen(times), frozen(offsets), start, stop, None if values is None else frozen(values), kind=kind)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, SpikeTrains):
             return NotImplemented
-        values = (self.values is None) == (other.values is None) and (
-            self.values is None or np.array_equal(self.values, other.values)  # type: ignore[arg-type]
-        )
         return (
-            values
+            self.kind == other.kind
+            and np.array_equal(self._ones_without(), other._ones_without())
             and (self.start, self.stop) == (other.start, other.stop)
             and np.array_equal(self.offsets, other.offsets)
             and np.array_equal(self.times, other.times)
@@ -503,9 +613,9 @@ class SpikeTrains(Columns):
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        signed = ", signed" if self.signed else ""
+        kind = "" if self.kind == "unsigned" else f", {self.kind}"
         size = f"{counted(len(self), 'train')}, {counted(len(self.times), 'spike')}"
-        return f"SpikeTrains({size}{signed}, {self.start:g} to {self.stop:g} ms)"
+        return f"SpikeTrains({size}{kind}, {self.start:g} to {self.stop:g} ms)"
 
 
 def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[NDArray[Any], list[int]]:
@@ -525,8 +635,10 @@ def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[
         return np.concatenate(columns), [len(values) for values in columns]
 
 
-def _finite_values(values: NDArray[np.float32] | None) -> None:
-    """Raise an error for a value that is not finite, with the position of its spike."""
-    if values is not None and not np.isfinite(values).all():
-        k = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise ProblemError(f"values[{k}] is {values[k]}: must be finite")
+def _kind(kind: object, values: NDArray[np.float32] | None) -> Kind:
+    """Return the kind; by default that of trains with or without values."""
+    if kind is None:
+        return "unsigned" if values is None else "signed"
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise ProblemError(f"kind is {shown(kind)}: must be one of {', '.join(_KINDS)}")
+    return kind

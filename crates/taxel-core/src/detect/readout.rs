@@ -9,7 +9,7 @@ use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainedNeuron};
 use crate::encode::{Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
-use crate::{Array, Error, Result, problem};
+use crate::{Array, Error, Result, SpikeKind, problem};
 
 mod file;
 #[cfg(test)]
@@ -118,11 +118,11 @@ impl Readout {
 
     fn check_weights(&self, label: &str, one: &TrainedNeuron, array: &Array) -> Result<()> {
         let copies = self.delays_ms.len();
-        let inputs = self.encoder.trains(array) * if self.encoder.signed() { 2 } else { 1 } * copies;
+        let inputs = self.encoder.trains(array) * self.encoder.kind().inputs_per_train() * copies;
         if one.weights.len() == inputs {
             return Ok(());
         }
-        let (rows, columns, signed) = (array.rows, array.columns, self.encoder.signed());
+        let (rows, columns, signed) = (array.rows, array.columns, self.encoder.kind() == SpikeKind::Signed);
         Err(problem!(
             "{label}: {} weights, the encoder makes {inputs} trains{}{} of {rows} x {columns} taxels: must be one each",
             one.weights.len(),

@@ -254,7 +254,7 @@ impl ReadoutStream {
         let spikes = emitted.into_iter().map(|spike| (spike, self.repairs.may_give(spike.t)));
         match &mut self.decides {
             Decides::Neurons(neurons) => {
-                neurons.receive(spikes, self.encoder.trains(), self.encoder.signed());
+                neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());
                 // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
                 self.repairs.forget_before(ms(until));
                 neurons.settle(ms(until), &self.clock, out)

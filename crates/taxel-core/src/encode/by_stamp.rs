@@ -7,7 +7,7 @@ use super::sampled::Source;
 use super::stream::Stream;
 use crate::held::Held;
 use crate::spikes::ms;
-use crate::{Array, EventsView, Result, Spike, problem};
+use crate::{Array, EventsView, Result, Spike, SpikeKind, problem};
 
 /// What is computed at the end of each stamp.
 pub(super) trait Measure: Clone + Send + 'static {
@@ -60,8 +60,8 @@ impl<M: Measure> Stream for ByStamp<M> {
         self.measure.trains()
     }
 
-    fn signed(&self) -> bool {
-        false
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Unsigned
     }
 
     fn latency_ms(&self) -> f64 {

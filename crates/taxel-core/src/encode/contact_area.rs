@@ -12,7 +12,7 @@ use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::spikes::ms;
-use crate::{Array, Result, Spike, problem};
+use crate::{Array, Result, Spike, SpikeKind, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.
 ///
@@ -71,8 +71,8 @@ impl Law for ContactArea {
         2 * self.levels.len()
     }
 
-    fn signed(&self) -> bool {
-        false
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Unsigned
     }
 
     fn set_tare(&mut self, tare: &Tare) {

@@ -10,7 +10,7 @@ use super::sampled::Sampled;
 use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
-use crate::{Array, Result};
+use crate::{Array, Result, SpikeKind};
 
 /// The FA-2 afferent (Pacini): silent while pressure is constant or changes slowly; one spike per cycle at 200 to 250
 /// Hz.
@@ -100,8 +100,8 @@ impl Law for Fa2 {
         Ok(Box::new(Sampled::new(self, afferents, array, self.period_ms)?.steady()))
     }
 
-    fn signed(&self) -> bool {
-        false
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Unsigned
     }
 }
 

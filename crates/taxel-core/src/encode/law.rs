@@ -4,7 +4,7 @@ use super::channels::Channels;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::parameters::Described;
-use crate::{Array, Result};
+use crate::{Array, Result, SpikeKind};
 
 /// An encoder's parameters, checks, stream and number of trains.
 pub(super) trait Law {
@@ -24,9 +24,9 @@ pub(super) trait Law {
         Channels::new(array).len()
     }
 
-    /// Whether spikes carry a signed value.
-    fn signed(&self) -> bool {
-        true
+    /// The meaning of its spikes' values.
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Signed
     }
 
     /// The latency that the encoder's own algorithm adds between a touch and its spike, ms.

@@ -23,18 +23,13 @@ wide! {
     }
 }
 
-/// The loaded places of an array.
-///
-/// A place is loaded while its value exceeds its rest by more than the noise floor and half a tick; it counts only if
-/// one of its 8 neighbours is loaded too, which rejects noise.
+/// The places of an array at or above a value of their own, and how many of them have such a neighbour.
 #[derive(Clone)]
-pub(super) struct Loaded {
+pub(super) struct Paired {
     rows: usize,
     columns: usize,
-    /// Smallest value at which each place is loaded; infinite if its rest is not known.
+    /// Smallest value at which each place is loaded; infinite if there is none.
     from: Vec<Block>,
-    noise_floor: f64,
-    rest: Rest<f64>,
     /// 1 for each loaded place, otherwise 0.
     loaded: Vec<[u32; BLOCK]>,
     /// Number of loaded neighbours of each place.
@@ -43,95 +38,43 @@ pub(super) struct Loaded {
     area: u32,
 }
 
-/// Sums over the taxels that count.
-#[derive(Default)]
-pub(super) struct Sums {
-    /// Sum of the values above rest.
-    pub(super) total: f64,
-    /// Largest value above rest.
-    pub(super) peak: f64,
-    /// Sum of the columns, weighted by the values above rest.
-    pub(super) x: f64,
-    /// Sum of the rows, likewise.
-    pub(super) y: f64,
-}
-
-impl Loaded {
-    /// Starts with no taxel loaded; `what` names the encoder in an error.
-    pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
-        let Some(tare) = tare else {
-            return Err(problem!("{what} without a tare: take one at rest and give it as tare"));
-        };
-        let (rest, n) = (tare.rest_of(array)?, blocks(array.len()));
-        let mut fresh = Self {
-            rows: usize::from(array.rows),
-            columns: usize::from(array.columns),
-            loaded: vec![[0; BLOCK]; n],
+impl Paired {
+    /// Starts with no place loaded, and no value at which one is.
+    pub(super) fn new(rows: usize, columns: usize) -> Self {
+        let n = blocks(rows * columns);
+        Self {
+            rows,
+            columns,
             from: vec![[f32::INFINITY; BLOCK]; n],
-            noise_floor,
-            rest,
-            neighbours: vec![0; array.len()],
+            loaded: vec![[0; BLOCK]; n],
+            neighbours: vec![0; rows * columns],
             area: 0,
-        };
-        (0..array.len()).for_each(|place| fresh.rest_changed(place));
-        Ok(fresh)
+        }
     }
 
-    /// Changes the rest of a place; the caller must pass its value again.
-    pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
-        self.rest.set(place, rest);
-        self.rest_changed(place);
-    }
-
-    fn rest_changed(&mut self, place: usize) {
-        let from = touched_from(self.rest.values()[place], self.noise_floor);
+    /// Sets the smallest value at which a place is loaded; the caller must pass its value again.
+    pub(super) fn set_from(&mut self, place: usize, from: f64) {
         self.from[place / BLOCK][place % BLOCK] = round_up(from);
     }
 
-    /// The rest of a place; `None` if it is not known.
-    pub(super) fn rest(&self, place: usize) -> Option<f64> {
-        Some(self.rest.values()[place]).filter(|rest| rest.is_finite())
+    /// Number of blocks of places.
+    pub(super) fn blocks(&self) -> usize {
+        self.loaded.len()
     }
 
-    /// Difference between a value and a place's rest.
-    fn above(&self, place: usize, value: f32) -> f64 {
-        self.rest.above(place, f64::from(value))
-    }
-
-    /// Number of taxels that count.
+    /// Number of loaded places with a loaded neighbour.
     pub(super) fn area(&self) -> u32 {
         self.area
     }
 
     /// Whether any place of a block is loaded.
-    fn any(&self, block: usize) -> bool {
+    pub(super) fn any(&self, block: usize) -> bool {
         self.loaded[block].iter().any(|&l| l != 0)
     }
 
     /// Whether a place counts: it and one of its neighbours are loaded.
-    fn counts(&self, place: usize) -> bool {
+    pub(super) fn counts(&self, place: usize) -> bool {
         self.is_loaded(place) && self.neighbours[place] > 0
-    }
-
-    /// Sums over the taxels that count, from the values of all places; they are added in the order of places.
-    pub(super) fn sums(&self, held: &[Block]) -> Sums {
-        let mut sums = Sums::default();
-        if self.area == 0 {
-            return sums;
-        }
-        let places = self.neighbours.len();
-        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.any(block)) {
-            for (place, &value) in (block * BLOCK..places).zip(values) {
-                if self.counts(place) {
-                    let above = self.above(place, value);
-                    sums.total += above;
-                    sums.peak = sums.peak.max(above);
-                    sums.x += above * (place % self.columns) as f64;
-                    sums.y += above * (place / self.columns) as f64;
-                }
-            }
-        }
-        sums
     }
 
     /// Updates the value of a place.
@@ -181,4 +124,103 @@ impl Loaded {
             self.area = if loaded { self.area + 1 } else { self.area - 1 };
         }
     }
+}
+
+/// The loaded places of an array.
+///
+/// A place is loaded while its value exceeds its rest by more than the noise floor and half a tick; it counts only if
+/// one of its 8 neighbours is loaded too, which rejects noise.
+#[derive(Clone)]
+pub(super) struct Loaded {
+    places: Paired,
+    noise_floor: f64,
+    rest: Rest<f64>,
+}
+
+/// Sums over the taxels that count.
+#[derive(Default)]
+pub(super) struct Sums {
+    /// Sum of the values above rest.
+    pub(super) total: f64,
+    /// Largest value above rest.
+    pub(super) peak: f64,
+    /// Sum of the columns, weighted by the values above rest.
+    pub(super) x: f64,
+    /// Sum of the rows, likewise.
+    pub(super) y: f64,
+}
+
+impl Loaded {
+    /// Starts with no taxel loaded; `what` names the encoder in an error.
+    pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
+        let rest = given(what, tare)?.rest_of(array)?;
+        let places = Paired::new(usize::from(array.rows), usize::from(array.columns));
+        let mut fresh = Self { places, noise_floor, rest };
+        (0..array.len()).for_each(|place| fresh.rest_changed(place));
+        Ok(fresh)
+    }
+
+    /// Changes the rest of a place; the caller must pass its value again.
+    pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
+        self.rest.set(place, rest);
+        self.rest_changed(place);
+    }
+
+    fn rest_changed(&mut self, place: usize) {
+        self.places.set_from(place, touched_from(self.rest.values()[place], self.noise_floor));
+    }
+
+    /// The rest of a place; `None` if it is not known.
+    pub(super) fn rest(&self, place: usize) -> Option<f64> {
+        Some(self.rest.values()[place]).filter(|rest| rest.is_finite())
+    }
+
+    /// Difference between a value and a place's rest.
+    fn above(&self, place: usize, value: f32) -> f64 {
+        self.rest.above(place, f64::from(value))
+    }
+
+    /// Sums over the taxels that count, from the values of all places; they are added in the order of places.
+    pub(super) fn sums(&self, held: &[Block]) -> Sums {
+        let (mut sums, columns) = (Sums::default(), self.places.columns);
+        if self.area() == 0 {
+            return sums;
+        }
+        let places = self.places.neighbours.len();
+        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.any(block)) {
+            for (place, &value) in (block * BLOCK..places).zip(values) {
+                if self.counts(place) {
+                    let above = self.above(place, value);
+                    sums.total += above;
+                    sums.peak = sums.peak.max(above);
+                    sums.x += above * (place % columns) as f64;
+                    sums.y += above * (place / columns) as f64;
+                }
+            }
+        }
+        sums
+    }
+
+    /// Updates the value of a place.
+    pub(super) fn take(&mut self, place: usize, value: f32) {
+        self.places.take(place, value);
+    }
+
+    /// Updates the values of a block of places.
+    pub(super) fn take_block(&mut self, block: usize, values: &Block) {
+        self.places.take_block(block, values);
+    }
+}
+
+impl std::ops::Deref for Loaded {
+    type Target = Paired;
+
+    fn deref(&self) -> &Paired {
+        &self.places
+    }
+}
+
+/// The tare of an encoder that needs one; `what` names the encoder in an error.
+pub(super) fn given<'a>(what: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
+    tare.ok_or_else(|| problem!("{what} without a tare: take one at rest and give it as tare"))
 }

@@ -1,4 +1,4 @@
-//! Area, force and displacement of a touch. None of them depends on where the touch began, so what is learnt at one
+//! Area, force, displacement and age of a touch. None of them depends on where the touch began, so what is learnt at one
 //! position holds at others.
 
 use std::collections::VecDeque;
@@ -14,8 +14,8 @@ use super::stream::{Stream, sort_from};
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
-use crate::spikes::ms;
-use crate::{Array, Result, Spike, problem};
+use crate::spikes::{ms, us};
+use crate::{Array, Result, Spike, SpikeKind, problem};
 
 /// Moments of the current values above rest, each with levels in a geometric series.
 ///
@@ -28,12 +28,20 @@ use crate::{Array, Result, Spike, problem};
 /// Trains, unsigned; levels in the order area, total, peak, x right, x left, y down, y up, ascending within each. First
 /// a train per level that spikes when the level is reached, then one per level that spikes when it is left, then, with
 /// `tonic_ms`, one that spikes while the level is exceeded. The first sample causes no spike of the first two kinds.
+///
+/// With `graded` all trains are graded: those of the levels, with the value 1, are followed by one per moment in the
+/// order area, total, peak, x, y. During a touch it spikes at every sample (each frame; of events every `period_ms` from
+/// the first stamp) with the value `log(1 + moment)`, of a displacement `log(1 + |moment|)` with its sign; never with 0.
+///
+/// With `ages_ms` the last trains are one per age. During a touch, at every sample, the train of the largest of these
+/// ages that the touch has reached spikes; its age is counted from the sample at which it began.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Moments {
     /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
     pub noise_floor: f64,
-    /// Number of levels of each moment, for a displacement on each side of 0. Default 20.
+    /// Number of levels of each moment, for a displacement on each side of 0; with 0 there are no trains of levels.
+    /// Default 20.
     pub levels: usize,
     /// Smallest and largest level of the number of taxels; `None` omits the moment.
     pub area: Option<[f64; 2]>,
@@ -46,6 +54,12 @@ pub struct Moments {
     /// Period of the tonic spikes while a level is exceeded, ms, the first when it is reached; `None` for none. Default
     /// 0.5.
     pub tonic_ms: Option<f64>,
+    /// Whether the moments themselves are emitted, as graded spikes.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub graded: bool,
+    /// The ages of a touch that have a train each, ms, ascending, each rounded to a whole us; `None` for none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ages_ms: Option<Vec<f64>>,
     /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
     pub period_ms: f64,
     /// The taxels' rest. It is valid for one board on one day: a saved readout has none and receives one when it is
@@ -64,6 +78,8 @@ impl Default for Moments {
             peak: Some([4.0, 120.0]),
             displacement_mm: Some([0.2, 20.0]),
             tonic_ms: Some(0.5),
+            graded: false,
+            ages_ms: None,
             period_ms: super::periods::stamp_period(),
             tare: None,
         }
@@ -73,12 +89,13 @@ impl Default for Moments {
 impl Moments {
     ranges! {
         noise_floor: "", Range::FROM_0;
-        levels: "", Range::within(1.0, 1000.0);
+        levels: "", Range::within(0.0, 1000.0);
         area: "", Range::ABOVE_0;
         total: "", Range::ABOVE_0;
         peak: "", Range::ABOVE_0;
         displacement_mm: "mm", Range::ABOVE_0;
         tonic_ms: "ms", Range::WHOLE_US;
+        ages_ms: "ms", Range::FROM_0;
         period_ms: "ms", Range::WHOLE_US;
     }
 
@@ -100,17 +117,35 @@ impl Moments {
         }
         all
     }
+
+    /// The moments that are emitted as graded spikes, numbered as in `all_levels`.
+    fn all_graded(&self) -> Vec<usize> {
+        let [area, total, peak, way] = self.ranges().map(|(_, range)| range.is_some());
+        let present = [area, total, peak, way, way].into_iter().enumerate();
+        present.filter(|&(_, present)| self.graded && present).map(|(moment, _)| moment).collect()
+    }
+
+    /// The ages that have a train each, us.
+    fn all_ages(&self) -> Vec<i64> {
+        self.ages_ms.iter().flatten().map(|&age| us(age).round() as i64).collect()
+    }
+
+    /// The number of trains of levels.
+    fn level_trains(&self) -> usize {
+        self.all_levels().len() * if self.tonic_ms.is_some() { 3 } else { 2 }
+    }
 }
 
 impl Law for Moments {
     fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
+        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare").or_nothing("ages_ms").or("graded", false)
     }
 
     fn check(&self) -> Result<()> {
         self.check_ranges()?;
         let ranges = self.ranges();
-        if ranges.iter().all(|(_, range)| range.is_none()) {
+        let ages = self.all_ages();
+        if ranges.iter().all(|(_, range)| range.is_none()) && (self.graded || ages.is_empty()) {
             return Err(problem!("area, total, peak and displacement_mm are all left out: give one or more"));
         }
         for (name, range) in ranges {
@@ -119,6 +154,15 @@ impl Law for Moments {
             {
                 return Err(problem!("{name} is {least} to {most}: must ascend"));
             }
+        }
+        if self.ages_ms.as_ref().is_some_and(Vec::is_empty) {
+            return Err(problem!("ages_ms is empty: must hold one age or more, or be left out"));
+        }
+        if let Some(k) = ages.windows(2).position(|pair| pair[0] >= pair[1]) {
+            return Err(problem!("ages_ms[{}]: must be a us or more above the one before", k + 1));
+        }
+        if self.levels == 0 && !self.graded && ages.is_empty() {
+            return Err(problem!("levels is 0, and neither graded nor ages_ms is given: choose one or more of them"));
         }
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
@@ -129,9 +173,13 @@ impl Law for Moments {
         let passing = Passing {
             loaded,
             pitch_mm: array.pitch_mm,
-            origin: None,
+            touch: None,
+            moments: [0.0; 5],
             since: vec![None; levels.len()],
             levels,
+            first_graded: self.level_trains(),
+            graded: self.all_graded(),
+            ages: self.all_ages(),
             every: self.tonic_ms.map(|every| micros("tonic_ms", every)).transpose()?,
             due: VecDeque::new(),
         };
@@ -141,11 +189,11 @@ impl Law for Moments {
     }
 
     fn trains(&self, _array: &Array) -> usize {
-        self.all_levels().len() * if self.tonic_ms.is_some() { 3 } else { 2 }
+        self.level_trains() + self.all_graded().len() + self.all_ages().len()
     }
 
-    fn signed(&self) -> bool {
-        false
+    fn kind(&self) -> SpikeKind {
+        if self.graded { SpikeKind::Graded } else { SpikeKind::Unsigned }
     }
 
     fn set_tare(&mut self, tare: &Tare) {
@@ -181,9 +229,17 @@ impl Level {
 struct Passing {
     loaded: Loaded,
     pitch_mm: f64,
-    /// The centre when the current touch began, in taxels.
-    origin: Option<[f64; 2]>,
+    /// When the current touch began, us, and its centre then, in taxels.
+    touch: Option<(i64, [f64; 2])>,
+    /// The moments of the last sample: area, total, peak, and the displacement of the centre in x and y, mm.
+    moments: [f64; 5],
     levels: Vec<Level>,
+    /// The number of the first train after those of the levels.
+    first_graded: usize,
+    /// The moments that are emitted as graded spikes.
+    graded: Vec<usize>,
+    /// The ages that have a train each, us.
+    ages: Vec<i64>,
     /// The time at which each level was reached, us; `None` below it.
     since: Vec<Option<i64>>,
     /// Period of the tonic spikes, us.
@@ -194,17 +250,39 @@ struct Passing {
 }
 
 impl Passing {
-    /// Area, total, peak, and the displacement of the centre in x and y, mm.
-    fn moments(&mut self, held: &[Block]) -> [f64; 5] {
+    /// Computes the moments at `t` us.
+    fn measure(&mut self, t: i64, held: &[Block]) {
         if self.loaded.area() == 0 {
-            self.origin = None;
-            return [0.0; 5];
+            (self.touch, self.moments) = (None, [0.0; 5]);
+            return;
         }
         let Sums { total, peak, x, y } = self.loaded.sums(held);
         let centre = [x / total, y / total];
-        let origin = *self.origin.get_or_insert(centre);
+        let (_, origin) = *self.touch.get_or_insert((t, centre));
         let way = |axis: usize| (centre[axis] - origin[axis]) * self.pitch_mm;
-        [f64::from(self.loaded.area()), total, peak, way(0), way(1)]
+        self.moments = [f64::from(self.loaded.area()), total, peak, way(0), way(1)];
+    }
+
+    /// Whether every sample during a touch causes spikes.
+    fn at_every_sample(&self) -> bool {
+        !self.graded.is_empty() || !self.ages.is_empty()
+    }
+
+    /// Emits the graded spikes of the moments at `t`, and the spike of the age.
+    fn emit_sample(&self, t: i64, out: &mut Vec<Spike>) {
+        let Some((since, _)) = self.touch else { return };
+        let mut emit = |n: usize, value: f32| {
+            if value != 0.0 {
+                out.push(Spike { t: ms(t), train: (self.first_graded + n) as u32, value });
+            }
+        };
+        for (n, &moment) in self.graded.iter().enumerate() {
+            let value = self.moments[moment];
+            emit(n, value.abs().ln_1p().copysign(value) as f32);
+        }
+        if let Some(reached) = self.ages.partition_point(|&age| age <= t - since).checked_sub(1) {
+            emit(self.graded.len() + reached, 1.0);
+        }
     }
 
     /// Notes that a level is reached: its tonic spikes begin.
@@ -236,25 +314,30 @@ impl Rule for Passing {
         for (block, values) in held.iter().enumerate() {
             self.loaded.take_block(block, values);
         }
-        let moments = self.moments(held);
+        self.measure(t, held);
         for level in 0..self.levels.len() {
-            if self.levels[level].is_reached(&moments) {
+            if self.levels[level].is_reached(&self.moments) {
                 self.reach(t, level, out);
             }
         }
+        self.emit_sample(t, out);
     }
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
-        if !changed.contains(&true) {
+        let changes = changed.contains(&true);
+        if !changes && !self.at_every_sample() {
             return;
         }
+        let from = out.len();
         for (block, values) in held.iter().enumerate().filter(|&(block, _)| changed[block]) {
             self.loaded.take_block(block, values);
         }
-        let (moments, from) = (self.moments(held), out.len());
+        if changes {
+            self.measure(t, held);
+        }
         for level in 0..self.levels.len() {
-            let (is, was) = (self.levels[level].is_reached(&moments), self.since[level].is_some());
+            let (is, was) = (self.levels[level].is_reached(&self.moments), self.since[level].is_some());
             if is && !was {
                 out.push(Spike { t: ms(t), train: level as u32, value: 1.0 });
                 self.reach(t, level, out);
@@ -263,6 +346,7 @@ impl Rule for Passing {
                 self.since[level] = None;
             }
         }
+        self.emit_sample(t, out);
         self.speak(t, true, out);
         sort_from(out, from);
     }
@@ -282,6 +366,6 @@ impl Rule for Passing {
     }
 
     fn idle(&self) -> bool {
-        self.due.is_empty()
+        self.due.is_empty() && (self.touch.is_none() || !self.at_every_sample())
     }
 }

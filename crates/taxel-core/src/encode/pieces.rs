@@ -94,6 +94,6 @@ impl Pieces {
             self.known = Some(stop);
         }
         let earliest = out.first().map_or(start, |s| s.t.min(start));
-        SpikeTrains::from_spikes(out, self.stream.trains(), self.stream.signed(), earliest, stop)
+        SpikeTrains::from_spikes(out, self.stream.trains(), self.stream.kind(), earliest, stop)
     }
 }

@@ -14,7 +14,7 @@ use crate::held::Held;
 use crate::rest::Rest;
 use crate::spikes::{ms, us};
 use crate::vectors::wide;
-use crate::{Array, EventsView, Result, Spike, problem};
+use crate::{Array, EventsView, Result, Spike, SpikeKind, problem};
 
 /// How an encoder processes samples; `sample` and `pass` are `#[inline(always)]`, so that they are compiled for wider
 /// vectors.
@@ -139,7 +139,7 @@ pub(super) struct Sampled<R> {
     channels: Channels,
     period: i64,
     trains: usize,
-    signed: bool,
+    kind: SpikeKind,
     latency_ms: f64,
     held: Held<f32>,
     changed: Vec<bool>,
@@ -172,7 +172,7 @@ impl Above {
 }
 
 impl<R: Rule> Sampled<R> {
-    /// Feeds a rule with samples; `law` defines the number of trains, whether they are signed, and the latency.
+    /// Feeds a rule with samples; `law` defines the number of trains, their kind, and the latency.
     pub(super) fn new(law: &impl Law, rule: R, array: &Array, period_ms: f64) -> Result<Self> {
         let channels = Channels::new(array);
         let n = blocks(channels.len());
@@ -181,7 +181,7 @@ impl<R: Rule> Sampled<R> {
             channels,
             period: micros("period_ms", period_ms)?,
             trains: law.trains(array),
-            signed: law.signed(),
+            kind: law.kind(),
             latency_ms: law.latency_ms(),
             held: Held::all(n * BLOCK, 0.0),
             changed: vec![false; n],
@@ -250,8 +250,8 @@ impl<R: Rule> Stream for Sampled<R> {
         self.trains
     }
 
-    fn signed(&self) -> bool {
-        self.signed
+    fn kind(&self) -> SpikeKind {
+        self.kind
     }
 
     fn latency_ms(&self) -> f64 {

@@ -19,7 +19,7 @@ use super::stream::{Stream, sort_from};
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
-use crate::{Array, Result, Spike, problem};
+use crate::{Array, Result, Spike, SpikeKind, problem};
 
 /// SA-1, FA-1, SA-2 and FA-2 afferents with given densities, at positions drawn by a seed; each has a field of taxels.
 ///
@@ -218,8 +218,8 @@ impl Law for Skin {
         self.types().iter().map(|&(_, density, _)| Self::count(array, density)).sum()
     }
 
-    fn signed(&self) -> bool {
-        false
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Unsigned
     }
 
     fn set_tare(&mut self, tare: &Tare) {

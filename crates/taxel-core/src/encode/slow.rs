@@ -75,7 +75,7 @@ macro_rules! slowly_adapting {
         use super::tare::Tare;
         use $crate::allowed::{Range, ranges};
         use $crate::parameters::Described;
-        use $crate::{Array, Result};
+        use $crate::{Array, Result, SpikeKind};
 
         $(#[$about])*
         #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -180,8 +180,8 @@ macro_rules! slowly_adapting {
                 Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
             }
 
-            fn signed(&self) -> bool {
-                false
+            fn kind(&self) -> SpikeKind {
+                SpikeKind::Unsigned
             }
 
             fn set_tare(&mut self, tare: &Tare) {

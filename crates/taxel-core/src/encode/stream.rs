@@ -1,6 +1,6 @@
 //! The interface of a running encoder.
 
-use crate::{EventsView, Result, Spike};
+use crate::{EventsView, Result, Spike, SpikeKind};
 
 /// A running encoder: it reads events or frames in order of time and emits spikes as soon as they are certain.
 ///
@@ -11,8 +11,8 @@ pub trait Stream: Send {
     /// The number of the encoder's spike trains.
     fn trains(&self) -> usize;
 
-    /// Whether spikes carry a signed value (polarity, bits), which a neuron receives as ON and OFF.
-    fn signed(&self) -> bool;
+    /// The meaning of the spikes' values. A graded spike with a value of 0 must not be emitted.
+    fn kind(&self) -> SpikeKind;
 
     /// The latency that the encoder's own algorithm adds between a touch and its spike, ms.
     fn latency_ms(&self) -> f64;

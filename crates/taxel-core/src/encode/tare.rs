@@ -6,7 +6,7 @@ use crate::held::Held;
 use crate::rest::{Rest, Value};
 use crate::{Array, EventsView, FramesView, Result, problem, reading};
 
-/// The rest of each taxel: the time average of its value over an interval without contact.
+/// The rest of each taxel, the time average of its value over an interval without contact, and its noise there.
 ///
 /// Record it with the board's noise floor at 0; otherwise a taxel's rest is known only to within the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -16,6 +16,10 @@ pub struct Tare {
     pub array: Array,
     /// Rest by place (`row * columns + column`), in the sensor's unit; `None` for a taxel without any event.
     pub rest: Vec<Option<f64>>,
+    /// Standard deviation of the taxels' values over the interval, weighted by time, in the sensor's unit; `None` where
+    /// the rest is unknown, and as a whole in a tare that was saved before this was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<Vec<Option<f64>>>,
     /// Start of the interval at rest, us.
     pub start_us: i64,
     /// End of the interval, us.
@@ -26,7 +30,7 @@ pub struct Tare {
 }
 
 impl Tare {
-    /// Checks that there is one finite rest per place.
+    /// Checks that there is one finite rest per place, and one finite noise of 0 or more where there is any.
     ///
     /// # Errors
     ///
@@ -43,8 +47,15 @@ impl Tare {
         if self.start_us >= self.stop_us {
             return Err(problem!("tare from {} to {} us: start must lie before stop", self.start_us, self.stop_us));
         }
-        match self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
-            Some(place) => Err(problem!("tare: rest of taxel {place} is not finite")),
+        if let Some(place) = self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
+            return Err(problem!("tare: rest of taxel {place} is not finite"));
+        }
+        let Some(noise) = &self.noise else { return Ok(()) };
+        if noise.len() != self.array.len() {
+            return Err(problem!("tare: noise of {} taxels for {rows} x {columns}: must be one each", noise.len()));
+        }
+        match noise.iter().position(|noise| noise.is_some_and(|n| !(n >= 0.0 && n.is_finite()))) {
+            Some(place) => Err(problem!("tare: noise of taxel {place} must be 0 or more and finite")),
             None => Ok(()),
         }
     }
@@ -68,6 +79,18 @@ impl Tare {
         let exists = |place: usize| array.exists.as_ref().is_none_or(|exists| exists[place]);
         let of_place = |(place, rest): (usize, &Option<f64>)| rest.filter(|_| exists(place)).unwrap_or(f64::NO_REST);
         Ok(Rest::measured(self.rest.iter().enumerate().map(of_place).collect()))
+    }
+
+    /// The noise of each place; 0 where it is not known.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if the tare has no noise.
+    pub(super) fn noise_of_places(&self) -> Result<Vec<f64>> {
+        let Some(noise) = &self.noise else {
+            return Err(problem!("the tare has no noise of the taxels (an older taxel saved it): take it anew"));
+        };
+        Ok(noise.iter().map(|noise| noise.unwrap_or(0.0)).collect())
     }
 
     /// Computes a tare from events in order of time, from `start` to `stop` us, or from all of them.
@@ -169,6 +192,8 @@ struct Integral {
     area: f64,
     /// Duration of the integral, us.
     time: f64,
+    /// Integral of the squared deviation from the mean, in the square of the sensor's unit times us.
+    squares: f64,
 }
 
 impl Integral {
@@ -176,10 +201,23 @@ impl Integral {
     fn extend(&mut self, t: i64, value: f64) {
         if let Some(until) = self.until {
             let time = (t - until).max(0) as f64;
+            let before = self.mean().unwrap_or(value);
             self.area += value * time;
             self.time += time;
+            // Welford's update, which does not subtract large squares from each other.
+            self.squares += time * (value - before) * (value - self.mean().unwrap_or(value));
         }
         self.until = self.until.max(Some(t));
+    }
+
+    /// The mean over time; `None` without any time.
+    fn mean(&self) -> Option<f64> {
+        (self.time > 0.0).then(|| self.area / self.time)
+    }
+
+    /// The standard deviation over time; `None` without any time.
+    fn deviation(&self) -> Option<f64> {
+        (self.time > 0.0).then(|| (self.squares / self.time).max(0.0).sqrt())
     }
 }
 
@@ -265,13 +303,14 @@ impl TareBuilder {
             integral.extend(stop, held);
         }
         let exists = |place: usize| self.array.exists.as_ref().is_none_or(|e| e[place]);
-        let rest: Vec<Option<f64>> = (0..)
-            .zip(&self.integrals)
-            .map(|(place, integral)| (integral.time > 0.0 && exists(place)).then(|| integral.area / integral.time))
-            .collect();
+        let of_each = |measure: fn(&Integral) -> Option<f64>| -> Vec<Option<f64>> {
+            let known = (0..).zip(&self.integrals).map(|(place, integral)| (exists(place), integral));
+            known.map(|(exists, integral)| measure(integral).filter(|_| exists)).collect()
+        };
+        let (rest, noise) = (of_each(Integral::mean), of_each(Integral::deviation));
         if rest.iter().all(Option::is_none) {
             return Err(problem!("tare from {start} to {stop} us: no event came"));
         }
-        Ok(Tare { rest, array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
+        Ok(Tare { rest, noise: Some(noise), array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
     }
 }

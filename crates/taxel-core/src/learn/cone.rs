@@ -7,5 +7,6 @@ mod exact;
 mod mix;
 mod shortest;
 
+pub(crate) use cone_r::Asked;
 pub use cone_r::{ConeR, ConeRFit, ConeRProblem, Shares};
 pub use cone_x::{ConeX, ConeXFit, ConeXProblem, Horizon};

@@ -120,6 +120,11 @@ macro_rules! rules {
         }
 
         impl Law {
+            /// The name of the rule.
+            fn name(&self) -> &'static str {
+                match self { $($(Self::$law(_) => stringify!($module),)+)* }
+            }
+
             fn check(&self, neuron: &SteppedNeuron) -> Result<()> {
                 match self {
                     $($(Self::$law(law) => law.rule(neuron).map(drop),)+)*

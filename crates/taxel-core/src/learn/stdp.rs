@@ -182,6 +182,7 @@ impl StdpNeuron {
         if piece.len() != self.weights.len() {
             return Err(problem!("piece of {} trains: must be {}, as before", piece.len(), self.weights.len()));
         }
+        piece.check_ungraded("stdp")?;
         if piece.start < self.now {
             return Err(problem!("piece from {} ms: must begin at {} ms or later", piece.start, self.now));
         }
@@ -279,13 +280,14 @@ impl StdpNeuron {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::SpikeKind;
 
     fn trains(times: &[&[f64]], start: f64, stop: f64) -> SpikeTrains {
         let mut offsets = vec![0];
         for train in times {
             offsets.push(offsets.last().unwrap() + train.len());
         }
-        SpikeTrains { times: times.concat(), offsets, values: None, start, stop }
+        SpikeTrains { times: times.concat(), offsets, kind: SpikeKind::Unsigned, values: None, start, stop }
     }
 
     fn never() -> Stop<'static> {

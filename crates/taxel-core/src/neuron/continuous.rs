@@ -72,13 +72,13 @@ impl ContinuousStream {
         self.threshold.rise(t)
     }
 
-    pub(super) fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
+    pub(super) fn push(&mut self, t: f64, weight: f64, value: f64, out: &mut Vec<OutputSpike>) {
         self.settle_at_input(t, f64::INFINITY, out);
         if self.neuron.loses(t, self.threshold.fired) {
             return;
         }
         self.move_to(t);
-        self.shape.add(&mut self.state, weight, self.at - t);
+        self.shape.add(&mut self.state, weight, value, self.at - t);
     }
 
     /// Fires at every crossing up to and including `t`, the time of an input.

@@ -14,7 +14,7 @@ pub(super) struct GridStream {
     grid: Grid,
     /// The state at grid point `point`, including the inputs of the interval before it.
     state: KernelSum,
-    /// The sum of the weights of inputs exactly at `point`: they change potential and slope only after it.
+    /// The sum of the weights times values of inputs exactly at `point`: they change potential and slope only after it.
     arriving: f64,
     point: f64,
     /// Whether `point` has been compared with the threshold.
@@ -41,7 +41,7 @@ impl GridStream {
 
     /// Adds an input to the state at the first grid point at or after it, at the cost of one exponential and without a
     /// queue.
-    pub(super) fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
+    pub(super) fn push(&mut self, t: f64, weight: f64, value: f64, out: &mut Vec<OutputSpike>) {
         let place = self.grid.place(t);
         let point = place.from();
         if point > self.point {
@@ -52,9 +52,9 @@ impl GridStream {
         if !self.neuron.loses(t, self.threshold.fired) {
             let age = self.grid.between(place, Place::at(self.point));
             if age > 0.0 {
-                self.shape.add(&mut self.state, weight, age);
+                self.shape.add(&mut self.state, weight, value, age);
             } else {
-                self.arriving += weight;
+                self.arriving += weight * value;
             }
         }
     }
@@ -73,12 +73,15 @@ impl GridStream {
         if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
     }
 
-    /// Steps point by point while the potential could still reach the threshold without a further input.
+    /// Steps point by point while the potential could still reach the threshold without a further input, or has yet to
+    /// fall below `rearm`.
     ///
     /// Once it cannot, the state stays where it is and the next input advances it in one jump. The number of steps
     /// depends only on the state, so a stream that is cut elsewhere gives the same bits.
     fn step_through(&mut self, last: f64, out: &mut Vec<OutputSpike>) {
-        while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - self.slack() {
+        while self.point < last
+            && (self.threshold.is_unarmed() || self.shape.bound(self.leaving()) >= self.threshold.base - self.slack())
+        {
             self.jump(self.point + 1.0);
             self.compare(out);
         }
@@ -91,7 +94,7 @@ impl GridStream {
 
     fn leaving(&self) -> KernelSum {
         let mut state = self.state;
-        self.shape.add(&mut state, self.arriving, 0.0);
+        self.shape.add(&mut state, self.arriving, 1.0, 0.0);
         state
     }
 
@@ -112,7 +115,7 @@ impl GridStream {
             return;
         }
         let (t, slope) = (self.grid.time(self.point), self.shape.slope(self.state));
-        if !self.threshold.reached(t, self.state.b, slope, self.grid.rounding_ms(t)) {
+        if !self.threshold.compare(t, self.state.b, slope, self.grid.rounding_ms(t)) {
             return;
         }
         out.push(OutputSpike { t, slope });

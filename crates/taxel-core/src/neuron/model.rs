@@ -74,6 +74,9 @@ pub struct Neuron {
     pub after_spike: AfterSpike,
     /// The threshold before the first spike.
     pub first_threshold: FirstThreshold,
+    /// After a spike, none until the potential was below this share of the threshold; on a grid only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rearm: Option<f64>,
     /// Continuous time or a grid.
     pub time: Time,
     /// Step of the grid, ms.
@@ -107,6 +110,7 @@ impl Default for Neuron {
             refractory: 3.0,
             after_spike: AfterSpike::Keep,
             first_threshold: FirstThreshold::Base,
+            rearm: None,
             time: Time::Continuous,
             step_ms: 1.0,
         }
@@ -122,12 +126,13 @@ impl Neuron {
         refractory: "ms", Range::FROM_0;
         step_ms: "ms", Range::ABOVE_0;
         tau_s(tau_s): "ms", Range::ABOVE_0;
+        rearm: "", Range::ABOVE_0.at_most(1.0);
     }
 
     /// The parameters with their defaults and ranges.
     #[must_use]
     pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
+        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("rearm")
     }
 
     /// Checks the range of every parameter, and that `tau_s` is below `tau`.
@@ -144,6 +149,12 @@ impl Neuron {
             return Err(problem!(
                 "kernel is \"exponential\" and time \"continuous\": its potential only jumps, at inputs, so it never crosses \
                  the threshold at a time of its own; take time \"grid\" or another kernel"
+            ));
+        }
+        if let (Some(rearm), Time::Continuous) = (self.rearm, self.time) {
+            return Err(problem!(
+                "rearm is {rearm} and time \"continuous\": the potential is compared with it at grid points only; take time \
+                 \"grid\""
             ));
         }
         if self.refractory == 0.0 && self.after_spike != AfterSpike::Reset {

@@ -13,7 +13,7 @@ pub use lanes::Weight;
 use lanes::LANES;
 
 use super::model::{Neuron, Time};
-use crate::{Result, SpikeTrains, Stop, problem};
+use crate::{Result, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The input sequence, computed once for all neurons.
 enum Script {
@@ -52,8 +52,14 @@ impl Neuron {
             Time::Continuous => Script::Continuous(continuous::Script::new(self, trains, threshold, stop)?),
             Time::Grid => Script::Grid(grid::Script::new(self, trains, threshold, stop)?),
         };
-        let mut out =
-            SpikeTrains { times: vec![], offsets: vec![0], values: None, start: trains.start, stop: trains.stop };
+        let mut out = SpikeTrains {
+            kind: SpikeKind::Unsigned,
+            times: vec![],
+            offsets: vec![0],
+            values: None,
+            start: trains.start,
+            stop: trains.stop,
+        };
         let mut block = vec![[W::default(); LANES]; trains.len()];
         let mut fired: [Vec<f64>; LANES] = std::array::from_fn(|_| vec![]);
         for first in (0..neurons).step_by(LANES) {

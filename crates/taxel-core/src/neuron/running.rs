@@ -6,7 +6,7 @@ use super::points::{MOST_STEPPED, check_points};
 use super::streaming::NeuronStream;
 use super::threshold::OutputSpike;
 use crate::allowed::one_weight_a_train;
-use crate::{Result, SpikeTrains, Stop, problem};
+use crate::{Result, SpikeKind, SpikeTrains, Stop, problem};
 
 /// The number of grid points between two checks for Ctrl-C.
 const POINTS_A_LOOK: f64 = 65_536.0;
@@ -45,7 +45,7 @@ impl Neuron {
                 stop.check()?;
             }
             self.advance(&mut stream, trains.start, spike.t, &mut out, stop)?;
-            stream.push(spike.t, spike.train, &mut out)?;
+            stream.push(*spike, &mut out)?;
         }
         self.advance(&mut stream, trains.start, trains.stop, &mut out, stop)?;
         stream.advance(trains.stop, &mut out);
@@ -111,7 +111,7 @@ impl Neuron {
 
     pub(super) fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
         trains.check()?;
-        if trains.values.is_some() {
+        if trains.kind == SpikeKind::Signed {
             return Err(problem!("trains: spikes are signed, split them into ON and OFF trains first"));
         }
         one_weight_a_train(weights, trains.len())
@@ -147,7 +147,7 @@ fn potential(
                 if !neuron.loses(input.t, last) {
                     state = shape.after(state, age(at, input.t));
                     at = input.t;
-                    shape.add(&mut state, weights[input.train as usize], 0.0);
+                    shape.add(&mut state, weights[input.train as usize], f64::from(input.value), 0.0);
                 }
             } else if let Some(spike) = spike {
                 next_spike += 1;

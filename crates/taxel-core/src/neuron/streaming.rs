@@ -5,7 +5,7 @@ use super::grid::GridStream;
 use super::model::{Neuron, Time};
 use super::threshold::OutputSpike;
 use crate::allowed::{above_0, one_weight_a_train};
-use crate::{Result, problem};
+use crate::{Result, Spike, problem};
 
 /// A neuron that runs while its inputs arrive.
 ///
@@ -39,12 +39,13 @@ impl NeuronStream {
         Ok(Self { weights: weights.to_vec(), now: start, clock })
     }
 
-    /// Adds the next input spike, at `t` ms on train `train`, and appends the output spikes up to `t` to `out`.
+    /// Adds the next input spike, whose value multiplies the weight of its train (1 of an unsigned spike), and appends
+    /// the output spikes up to it to `out`.
     ///
     /// # Errors
     ///
     /// `Problem` if the spike is earlier than a previous one, or its train has no weight.
-    pub fn push(&mut self, t: f64, train: u32, out: &mut Vec<OutputSpike>) -> Result<()> {
+    pub fn push(&mut self, Spike { t, train, value }: Spike, out: &mut Vec<OutputSpike>) -> Result<()> {
         if t.is_nan() || t < self.now {
             return Err(problem!("input spike at {t} ms: time has come to {} ms already", self.now));
         }
@@ -52,9 +53,10 @@ impl NeuronStream {
             return Err(problem!("input spike at {t} ms: train {train} of {}", self.weights.len()));
         };
         self.now = t;
+        let value = f64::from(value);
         match &mut self.clock {
-            Clock::Continuous(stream) => stream.push(t, weight, out),
-            Clock::Grid(stream) => stream.push(t, weight, out),
+            Clock::Continuous(stream) => stream.push(t, weight, value, out),
+            Clock::Grid(stream) => stream.push(t, weight, value, out),
         }
         Ok(())
     }

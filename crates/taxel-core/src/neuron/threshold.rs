@@ -25,6 +25,9 @@ pub(super) struct Threshold {
     plus: f64,
     pub(super) tau_rec: f64,
     refractory: f64,
+    rearm: Option<f64>,
+    /// The share of the threshold below which the potential must fall before the next spike.
+    unarmed: Option<f64>,
     /// The last spike, or spike number 0 of the printed first threshold.
     since: Option<f64>,
     /// The last real spike.
@@ -39,6 +42,8 @@ impl Threshold {
             plus: neuron.theta_plus * factor,
             tau_rec: neuron.tau_rec(),
             refractory: neuron.refractory,
+            rearm: neuron.rearm,
+            unarmed: None,
             since: (neuron.first_threshold == FirstThreshold::Printed).then_some(start),
             fired: None,
         }
@@ -47,6 +52,12 @@ impl Threshold {
     pub(super) fn fire(&mut self, t: f64) {
         self.since = Some(t);
         self.fired = Some(t);
+        self.unarmed = self.rearm;
+    }
+
+    /// Whether the neuron cannot fire until its potential has fallen.
+    pub(super) fn is_unarmed(&self) -> bool {
+        self.unarmed.is_some()
     }
 
     /// The remaining rise at `t`, mV.
@@ -61,7 +72,18 @@ impl Threshold {
 
     /// Whether the neuron may fire at grid time `t` and its potential has reached the threshold. The time may be off by
     /// `rounding_ms`, which moves the potential by its slope times that, and the threshold likewise.
-    pub(super) fn reached(&self, t: f64, potential: f64, slope: f64, rounding_ms: f64) -> bool {
+    ///
+    /// A neuron that is unarmed does not fire; its potential here decides whether it may fire at the next point.
+    ///
+    /// Reading: in the refractory time, too, the sum of the inputs decides, not the 0 of 6.7, and is compared with the
+    /// share of `theta_0`. A potential that just reaches the share is not below it.
+    pub(super) fn compare(&mut self, t: f64, potential: f64, slope: f64, rounding_ms: f64) -> bool {
+        if let Some(share) = self.unarmed {
+            if potential < share * (self.base + self.rise(t) - self.touch) {
+                self.unarmed = None;
+            }
+            return false;
+        }
         let slope = slope.abs().min(STEEPEST * self.base) + self.plus / self.tau_rec;
         let potential = potential + self.touch + slope * rounding_ms;
         potential >= self.base && !self.silent_at(t) && potential >= self.base + self.rise(t)

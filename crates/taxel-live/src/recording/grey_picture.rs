@@ -128,7 +128,7 @@ mod tests {
     fn a_tare_is_what_is_subtracted_once_there_is_one() {
         let array = Array { rows: 1, columns: 3, ..Array::thesis() };
         let rest = vec![Some(90.5), None, Some(20.0)];
-        let tare = Tare { array, rest, start_us: 0, stop_us: 1, note: String::new() };
+        let tare = Tare { array, rest, noise: None, start_us: 0, stop_us: 1, note: String::new() };
         let mut scale = GreyScale::new(3);
         scale.draw(0, &[100, 50, 20]);
         scale.tare(&tare);

@@ -1,8 +1,9 @@
 """Recipes by name, one data file each: where none is named, `taxel train` chooses the one that fits the recording.
 
 A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", or units of frames), the
-encoder, what all neurons share (`learner`), what is a neuron's own (`neurons`), and whose parameters any `other` label
-has. A new recipe is a new file in this folder.
+encoder, whether labels are moved to what the sensor felt (`align`), what all neurons share (`learner`), what is a
+neuron's own (`neurons`), and whose parameters any `other` label has; without `other` it is for its neurons' labels
+alone. A new recipe is a new file in this folder.
 """
 
 from __future__ import annotations
@@ -39,8 +40,10 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in Path(__file__).parent.glob("*.toml")))
 
 
-def fitting(source: Events | Frames) -> str:
-    """Return the name of the recipe whose levels fit a recording, by what it holds: events, or the frames' unit.
+def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
+    """Return the name of the recipe that fits a recording, by what it holds (events, or the frames' unit) and labels.
+
+    Where several fit what it holds, a recipe for certain labels comes first, if all labels are among them.
 
     Examples
     --------
@@ -48,7 +51,10 @@ def fitting(source: Events | Frames) -> str:
     ('gait_insole', 'gait_channel')
     """
     kind = source.unit if isinstance(source, Frames) else "events"
-    return next((name for name in names() if kind in read(name).get("fits", ())), _ANY)
+    fit = {name: recipe for name in names() if kind in (recipe := read(name)).get("fits", ())}
+    asked = {_plain(label) for label in labels}
+    certain = [name for name, recipe in fit.items() if "other" not in recipe and asked <= set(recipe["neurons"])]
+    return next(iter(certain or [name for name, recipe in fit.items() if "other" in recipe]), _ANY)
 
 
 def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
@@ -84,13 +90,14 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
-    """Return a recipe's values with one neuron a label, where it says whose parameters any `other` label has.
+    """Return a recipe's values with one neuron a label, if it is one that is chosen by the recording (`fits`).
 
-    "foot off", "Foot-off" and "foot_off" are one. A recipe without `other` stays as it is.
+    "foot off", "Foot-off" and "foot_off" are one. Any other label than the recipe's own has the parameters of the
+    neuron that it names as `other`. A recipe with neither `fits` nor `other` stays as it is.
 
     Raises
     ------
-    ProblemError : `other` is none of its neurons
+    ProblemError : `other` is none of its neurons, or a label that the recipe is not for
 
     Examples
     --------
@@ -98,10 +105,21 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     >>> {label: neuron["tau"] for label, neuron in recipe["neurons"].items()}
     {'Heel-off': 70.0, 'step': 40.0}
     """
-    if "other" not in values:
+    if not {"fits", "other"} & set(values):
         return values
     own = values.get("neurons", {})
-    other = text("recipe: other", values["other"], own)
-    alike = {label: text("label", label).lower().replace(" ", "_").replace("-", "_") for label in labels}
-    neurons = {label: dict(own.get(label, own.get(name, own[other]))) for label, name in alike.items()}
+    other = own[text("recipe: other", values["other"], own)] if "other" in values else None
+    neurons = {}
+    for label in labels:
+        neuron = own.get(label, own.get(_plain(text("label", label)), other))
+        if neuron is None:
+            raise ProblemError(
+                f"recipe: it is for {' and '.join(own)}, not for {shown(label)}: leave that label out, or choose "
+                f"another recipe: there are {', '.join(names())}"
+            )
+        neurons[label] = dict(neuron)
     return {**values, "neurons": neurons}
+
+
+def _plain(label: str) -> str:
+    return label.lower().replace(" ", "_").replace("-", "_")

@@ -1,8 +1,8 @@
 //! A neuron of a readout in a stream: its label, its state, and its crossings so far.
 
-use crate::Result;
 use crate::detect::TrainedNeuron;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
+use crate::{Result, Spike};
 
 /// A neuron with its label.
 #[derive(Clone)]
@@ -35,23 +35,23 @@ impl NamedNeuron {
         }
     }
 
-    /// Passes a spike on an input to the neuron.
+    /// Passes a spike, whose train is the number of an input, to the neuron.
     ///
     /// # Errors
     ///
     /// Those of [`NeuronStream::push`].
-    pub fn push(&mut self, t: f64, input: u32) -> Result<()> {
+    pub fn push(&mut self, spike: Spike) -> Result<()> {
         let stream = match &mut self.stream {
             Some(stream) => stream,
             None => {
                 let start = match self.neuron.time {
-                    Time::Continuous => t,
-                    Time::Grid => (t / self.neuron.step_ms).floor() * self.neuron.step_ms,
+                    Time::Continuous => spike.t,
+                    Time::Grid => (spike.t / self.neuron.step_ms).floor() * self.neuron.step_ms,
                 };
-                self.stream.insert(self.neuron.stream(&self.weights, self.threshold, start.min(t))?)
+                self.stream.insert(self.neuron.stream(&self.weights, self.threshold, start.min(spike.t))?)
             }
         };
-        stream.push(t, input, &mut self.crossings)
+        stream.push(spike, &mut self.crossings)
     }
 
     /// Moves the crossings so far to `out`, each with the neuron's number and whether it may rest on repaired taxels.

@@ -4,7 +4,7 @@ use super::named_neuron::NamedNeuron;
 use crate::detect::{Detection, FrameClock};
 use crate::neuron::{NeuronStream, OutputSpike};
 use crate::spikes::us;
-use crate::{Result, Spike};
+use crate::{Result, Spike, SpikeKind};
 
 /// Neurons with the delays at which they receive the encoder's trains.
 #[derive(Clone)]
@@ -30,13 +30,15 @@ impl Neurons {
     ///
     /// The order of trains is that of training: of signed trains all ON, then all OFF (`SpikeTrains::split_by_sign`),
     /// and all of these once for each delay.
-    pub fn receive(&mut self, spikes: impl Iterator<Item = (Spike, bool)>, trains: usize, signed: bool) {
+    pub fn receive(&mut self, spikes: impl Iterator<Item = (Spike, bool)>, trains: usize, kind: SpikeKind) {
         let trains = u32::try_from(trains).unwrap_or(u32::MAX);
-        let inputs = if signed { 2 * trains } else { trains };
+        let inputs = if kind == SpikeKind::Signed { 2 * trains } else { trains };
         for (spike, repaired) in spikes {
-            let input = if signed && spike.value <= 0.0 { trains + spike.train } else { spike.train };
+            let off = kind == SpikeKind::Signed && spike.value <= 0.0;
+            let input = if off { trains + spike.train } else { spike.train };
+            let value = if kind == SpikeKind::Graded { spike.value } else { 1.0 };
             for (copy, delay) in (0_u32..).zip(&self.delays_ms) {
-                let delayed = Spike { t: spike.t + delay, train: copy * inputs + input, ..spike };
+                let delayed = Spike { t: spike.t + delay, train: copy * inputs + input, value };
                 self.waiting.push((delayed, repaired));
             }
         }
@@ -49,7 +51,7 @@ impl Neurons {
         let mut crossings: Vec<(OutputSpike, usize, bool)> = Vec::new();
         for (k, one) in self.neurons.iter_mut().enumerate() {
             for (spike, repaired) in &self.waiting[..certain] {
-                one.push(spike.t, spike.train)?;
+                one.push(*spike)?;
                 if *repaired {
                     // Crossings up to here cannot rest on the repaired taxel.
                     one.drain_crossings(k, &mut crossings);

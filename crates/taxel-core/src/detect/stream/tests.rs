@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 
 use super::*;
 use crate::neuron::{AfterSpike, Neuron, Time};
-use crate::{Events, Intensities};
+use crate::{Events, Intensities, SpikeKind};
 
 /// An encoder that turns each event into a signed spike of its taxel's train at its stamp, and a picture into a spike
 /// of each loaded taxel.
@@ -24,8 +24,8 @@ impl Stream for Plain {
     fn trains(&self) -> usize {
         4
     }
-    fn signed(&self) -> bool {
-        true
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Signed
     }
     fn latency_ms(&self) -> f64 {
         self.latency_ms

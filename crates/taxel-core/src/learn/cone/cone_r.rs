@@ -6,12 +6,11 @@ use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::learn::engines::Start;
 use crate::learn::fit::{Engine, Fit, Left, Round, Status};
 use crate::learn::statement::{
-    Bound, Choice, Divisor, Margin, Norm, Objective, Relaxed, Statement, bounds_of, check_bounds, check_examples,
-    check_trains, end_of,
+    Bound, Choice, Divisor, DivisorC, DivisorD, Margin, Norm, Objective, Relaxed, Sides, Statement, bounds_of,
+    check_bounds, check_examples, check_silence, check_trains, end_of,
 };
 use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
-use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// Parameters of CONE-R; defaults from Tables 6.1 and 6.2.
@@ -33,6 +32,14 @@ pub struct ConeR {
     pub ub: Bound,
     /// The normaliser of B.
     pub divide_b_by: Divisor,
+    /// The normaliser of C.
+    pub divide_c_by: DivisorC,
+    /// The normaliser of D.
+    pub divide_d_by: DivisorD,
+    /// The potentials after a target that count as a miss in B.
+    pub sides_b: Sides,
+    /// The potentials at a target that count as a miss in C.
+    pub sides_c: Sides,
     /// Whether the l2 term is the norm or its square.
     pub norm: Norm,
     /// The distance that silence must keep below the threshold, mV.
@@ -57,6 +64,10 @@ impl Default for ConeR {
             lb: Bound::All(-0.3),
             ub: Bound::All(0.3),
             divide_b_by: Divisor::Largest,
+            divide_c_by: DivisorC::Largest,
+            divide_d_by: DivisorD::Largest,
+            sides_b: Sides::Both,
+            sides_c: Sides::Both,
             norm: Norm::Norm,
             margin: 0.0,
             horizon: None,
@@ -128,8 +139,8 @@ impl ConeR {
 
 /// The multipliers that prove a fit: the nonzero ones, by row (silent rows first, then targets).
 ///
-/// Each is a share of its row's weight in 6.14 (of twice that weight for C): from 0 to 1 for a silent row, from -1/2 to
-/// 1/2 for a target.
+/// Each is a share of its row's weight in 6.14 (of twice that weight for a C of both sides): from 0 to 1 for a silent
+/// row; for a target from -1/2 to 1/2, from -1 to 0 if C counts only potentials below.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Shares {
     /// The numbers of the rows, ascending.
@@ -153,6 +164,17 @@ pub struct ConeRFit {
     pub refires: usize,
 }
 
+/// What is asked of a pattern.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Asked<'a> {
+    /// The times at which the neuron shall fire, ms.
+    pub(crate) targets: &'a [f64],
+    /// The windows in which it shall not, ms; `None`: everywhere else.
+    pub(crate) silence: Option<&'a [[f64; 2]]>,
+    /// The end of its silence, ms.
+    pub(crate) end: f64,
+}
+
 /// The rows of a set of examples, computed once and solved for many `lambdas`, `kappa`, bounds and divisors.
 ///
 /// Internally all potentials are in units of `Neuron::unit` mV.
@@ -165,15 +187,29 @@ pub struct ConeRProblem {
 }
 
 impl ConeRProblem {
-    /// Computes the rows of these patterns and targets (ms).
+    /// Computes the rows of these patterns and targets (ms). Silence counts in the windows of each pattern (start and
+    /// stop, ms, ascending, ends included), or everywhere.
     ///
     /// # Errors
     ///
     /// `Problem` for parameters or examples that are not valid (names pattern and target); `Interrupted`.
-    pub fn new(parameters: &ConeR, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
+    pub fn new(
+        parameters: &ConeR,
+        patterns: &[SpikeTrains],
+        targets: &[Vec<f64>],
+        silence: &[Option<Vec<[f64; 2]>>],
+        stop: Stop<'_>,
+    ) -> Result<Self> {
         parameters.check()?;
         let neuron = &parameters.neuron;
         check_examples(neuron, patterns, targets)?;
+        if silence.len() != patterns.len() {
+            let (given, there) = (silence.len(), patterns.len());
+            return Err(problem!("silence: {given} lists for {there} patterns, must be one a pattern"));
+        }
+        for (p, windows) in silence.iter().enumerate() {
+            check_silence(p, windows.as_deref())?;
+        }
         let (mut ends, mut points) = (Vec::with_capacity(patterns.len()), 0.0);
         for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
             let (end, more) = parameters.end_of(p, pattern, targets)?;
@@ -181,41 +217,36 @@ impl ConeRProblem {
             points += more;
         }
         neuron.check_rows(points)?;
-        Self::laid_out(parameters, patterns, targets, &ends, stop)
+        let asked = targets.iter().zip(silence).zip(ends);
+        let asked = asked.map(|((targets, silence), end)| Asked { targets, silence: silence.as_deref(), end });
+        Self::laid_out(parameters, patterns, asked, stop)
     }
 
     /// Computes the rows of a first pattern, which the caller has checked; `push` adds the others.
-    pub(crate) fn of_one(
-        parameters: &ConeR,
-        pattern: &SpikeTrains,
-        targets: &[f64],
-        end: f64,
-        stop: Stop<'_>,
-    ) -> Result<Self> {
-        Self::laid_out(parameters, std::slice::from_ref(pattern), &[targets.to_vec()], &[end], stop)
+    pub(crate) fn of_one(parameters: &ConeR, pattern: &SpikeTrains, asked: Asked<'_>, stop: Stop<'_>) -> Result<Self> {
+        Self::laid_out(parameters, std::slice::from_ref(pattern), [asked].into_iter(), stop)
     }
 
-    fn laid_out(
+    fn laid_out<'a>(
         parameters: &ConeR,
         patterns: &[SpikeTrains],
-        targets: &[Vec<f64>],
-        ends: &[f64],
+        asked: impl Iterator<Item = Asked<'a>>,
         stop: Stop<'_>,
     ) -> Result<Self> {
         let unit = parameters.neuron.unit();
         let base = parameters.in_units(unit);
         let margin = Margin { height: base.margin, slope: 0.0 };
         let mut statement = Statement::new(&base.neuron, margin, unit, patterns[0].len());
-        for ((pattern, targets), &end) in patterns.iter().zip(targets).zip(ends) {
-            statement.push(pattern, targets, end, stop)?;
+        for (pattern, Asked { targets, silence, end }) in patterns.iter().zip(asked) {
+            statement.push(pattern, targets, silence, end, stop)?;
         }
         let rows = Relaxed::new(&statement, base.delta_t(), stop)?;
         Ok(Self { base, patterns: patterns.to_vec(), statement, rows })
     }
 
     /// Adds a pattern, which the caller has checked; if the caller stops it, nothing changes.
-    pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64, stop: Stop<'_>) -> Result<()> {
-        self.statement.push(pattern, targets, end, stop)?;
+    pub(crate) fn push(&mut self, pattern: &SpikeTrains, asked: Asked<'_>, stop: Stop<'_>) -> Result<()> {
+        self.statement.push(pattern, asked.targets, asked.silence, asked.end, stop)?;
         if let Err(error) = self.rows.push(&self.statement, self.base.delta_t(), stop) {
             self.statement.drop_last();
             return Err(error);
@@ -260,9 +291,15 @@ impl ConeRProblem {
     /// The objective 6.14 with these parameters, in this problem's units.
     fn objective(&self, parameters: &ConeR, silent: &[f64]) -> Result<Objective> {
         let bounds = bounds_of(&parameters.lb, &parameters.ub, self.rows.trains)?;
-        let ConeR { lambdas, kappa, norm, divide_b_by: divisor, .. } = *parameters;
-        let choice = Choice { lambdas, kappa, norm, divisor };
-        let d_max = |most: &[f64]| self.rows.broken_silence(most);
+        let ConeR { lambdas, kappa, norm, .. } = *parameters;
+        let choice = Choice {
+            lambdas,
+            kappa,
+            norm,
+            divisors: (parameters.divide_b_by, parameters.divide_c_by, parameters.divide_d_by),
+            sides: (parameters.sides_b, parameters.sides_c),
+        };
+        let d_max = |most: &[f64]| self.rows.most_broken_silence(most);
         let unit = self.statement.unit;
         let silent: Vec<f64> = silent.iter().map(|most| most / unit).collect();
         Ok(Objective::new(choice, bounds, &silent, &self.rows.targets, unit, d_max))
@@ -270,7 +307,7 @@ impl ConeRProblem {
 
     /// Fits the weights.
     ///
-    /// `parameters` may differ from those of the problem in `lambdas`, `kappa`, bounds, `divide_b_by`, `norm`,
+    /// `parameters` may differ from those of the problem in `lambdas`, `kappa`, bounds, divisors, sides, `norm`,
     /// `tolerance` and `engine`; the others are part of the rows. `silent` are the largest absolute weights (mV) of
     /// trains without a spike, which were left out of the rows but count in the normalisers. `start` are the weights of
     /// a similar fit, with its multipliers if that fit had the same rows; a closer start is faster. If a stop is
@@ -344,7 +381,7 @@ impl ConeRProblem {
             let Some(place) = shares.get_mut(row) else {
                 return Err(problem!("start: a multiplier of row {row}, there are {all} rows"));
             };
-            let low = if row < silent { 0.0 } else { -0.5 };
+            let low = if row < silent { 0.0 } else { objective.kink_of_c().1 };
             if !(low <= share && share <= low + 1.0) {
                 return Err(problem!(
                     "start: the multiplier of row {row} is {share}, must lie from {low} to {}",
@@ -372,7 +409,7 @@ impl ConeRProblem {
     fn unreachable(&self, objective: &Objective) -> Vec<(usize, usize)> {
         let targets = &self.rows.targets;
         let names = targets.names.iter().zip(targets.iter());
-        names.filter(|(_, row)| dot(row.at, &objective.bounds.upper) < row.threshold).map(|(name, _)| *name).collect()
+        names.filter(|(_, row)| objective.bounds.range(row.at).1 < row.threshold).map(|(name, _)| *name).collect()
     }
 
     fn refires(&self, weights: &[f64], only: Option<usize>) -> Result<usize> {

@@ -12,8 +12,9 @@ use super::shortest::{End, Shortest};
 use crate::allowed::{Numbers, Range, ranges};
 use crate::learn::fit::{Engine, Fit, Round, Status};
 use crate::learn::statement::{
-    Bound, Bounds, Certificate, Choice, Divisor, Margin, NOTHING, Norm, Objective, Parts, Row, Stated, Statement,
-    bounds_of, check_bounds, check_examples, check_some_target, end_of, largest, relative_gap,
+    Bound, Bounds, Certificate, Choice, Divisor, DivisorC, DivisorD, Margin, NOTHING, Norm, Objective, Parts, Row,
+    Sides, Stated, Statement, bounds_of, check_bounds, check_examples, check_some_target, end_of, largest,
+    relative_gap,
 };
 use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
@@ -147,6 +148,11 @@ impl ConeX {
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
+        if let Some(rearm) = self.neuron.rearm {
+            return Err(problem!(
+                "rearm is {rearm}: CONE-X asks for silence at every point, whether the neuron is armed or not; must be None"
+            ));
+        }
         self.check_ranges()?;
         check_bounds(&self.lb, &self.ub)?;
         let Margin { height, slope } = self.margin();
@@ -251,14 +257,15 @@ impl ConeXProblem {
         }
         let mut statement = Statement::new(neuron, parameters.margin(), unit, trains);
         for (p, (pattern, targets)) in examples() {
-            statement.push(pattern, targets, ends[p], stop)?;
+            statement.push(pattern, targets, None, ends[p], stop)?;
         }
         let [l1, l2, b] = parameters.lambdas;
         let choice = Choice {
             lambdas: [l1, l2, b, 0.0, 0.0],
             kappa: parameters.kappa,
             norm: parameters.norm,
-            divisor: parameters.divide_b_by,
+            divisors: (parameters.divide_b_by, DivisorC::default(), DivisorD::default()),
+            sides: (Sides::Both, Sides::Both),
         };
         let objective = |targets: &_| Objective::new(choice, bounds, &[], targets, unit, |_| 0.0);
         let exact = Exact::new(statement, parameters.delta_t(), objective, parameters.tolerance, stop)?;

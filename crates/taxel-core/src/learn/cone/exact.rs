@@ -132,8 +132,8 @@ impl Exact {
     fn misfire(&self, weights: &[f64]) -> Result<Option<String>> {
         for (p, example) in self.statement.examples.iter().enumerate() {
             let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, example.start)?);
-            for &(t, train) in example.inputs.iter().take_while(|input| input.0 <= example.end) {
-                stream.push(t, train, &mut fired)?;
+            for &input in example.inputs.iter().take_while(|input| input.t <= example.end) {
+                stream.push(input, &mut fired)?;
             }
             stream.advance(example.end, &mut fired);
             let wanted = example.targets.iter().map(Some).chain(std::iter::repeat(None));

@@ -51,7 +51,7 @@ struct Lagrangian<'a> {
     weights: Vec<f64>,
     excess: Vec<f64>,
     behind: Vec<f64>,
-    /// The multipliers as shares: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
+    /// The multipliers as shares: of D's weight from 0 to 1, of the kink of C from its lower slope up to 1 more.
     shares: Vec<f64>,
     /// The multipliers of l1 and of the bounds, one per synapse.
     held: Vec<f64>,
@@ -207,14 +207,14 @@ impl<'a> Lagrangian<'a> {
     /// Computes the slope of each row, times its weight in 6.14.
     fn multipliers(&mut self) {
         let silent = self.problem.silent.len();
-        let (d, c) = (self.objective.d, 2.0 * self.objective.c);
+        let (d, (c, low)) = (self.objective.d, self.objective.kink_of_c());
         let [one, other] = self.delta.map(|delta| 1.0 / delta);
         let rows = self.factors.iter_mut().zip(&self.excess).zip(&self.shares);
         for (k, ((factor, &x), &share)) in rows.enumerate() {
             *factor = if k < silent {
                 d * (share + x * one).clamp(0.0, 1.0)
             } else {
-                c * (share + x * other).clamp(-0.5, 0.5)
+                c * (share + x * other).clamp(low, low + 1.0)
             };
         }
     }
@@ -225,9 +225,10 @@ impl<'a> Lagrangian<'a> {
         let silent = problem.silent.len();
         self.multipliers();
         self.inside.clear();
-        let (d, c) = (o.d, o.c);
+        let (d, (c, low)) = (o.d, o.kink_of_c());
         for (k, &factor) in self.factors.iter().enumerate() {
-            let on_kink = if k < silent { 0.0 < factor && factor < d } else { factor.abs() < c };
+            let on_kink =
+                if k < silent { 0.0 < factor && factor < d } else { low * c < factor && factor < (low + 1.0) * c };
             if on_kink {
                 self.inside.push(k);
             }
@@ -238,7 +239,7 @@ impl<'a> Lagrangian<'a> {
         }
         for ((target, &factor), &behind) in problem.targets.iter().zip(&self.factors[silent..]).zip(&self.behind) {
             add(&mut self.gradient, factor, target.at);
-            add(&mut self.gradient, 2.0 * o.b * behind, target.behind);
+            add(&mut self.gradient, 2.0 * o.b * o.counts_in_b(behind), target.behind);
         }
         match o.norm {
             Norm::Square => add(&mut self.gradient, 2.0 * o.l2, &self.weights),
@@ -310,7 +311,7 @@ impl<'a> Lagrangian<'a> {
     fn sharpen(&mut self, reached: bool) {
         let silent = self.problem.silent.len();
         self.multipliers();
-        let (d, c) = (self.objective.d, 2.0 * self.objective.c);
+        let (d, (c, _)) = (self.objective.d, self.objective.kink_of_c());
         for (k, (share, factor)) in self.shares.iter_mut().zip(&self.factors).enumerate() {
             let weight = if k < silent { d } else { c };
             *share = if weight > 0.0 { factor / weight } else { 0.0 };

@@ -1,7 +1,8 @@
 //! The convex program over a few rows, as a cone program for Clarabel.
 //!
 //! Minimise `linear.w + l1 |w|_1 + l2 |w|_2 (or |w|_2^2) + quadratic |B w|^2 + sum_i weight_i max(r_i.w - limit_i, 0)` over
-//! a box, equality rows and hard inequality rows. Each hinge gets one slack variable, so its dense row is stored once.
+//! a box, equality rows and hard inequality rows. With `kinks`, `|max(kinks - B w, 0)|^2` is in place of `|B w|^2`. Each
+//! hinge gets one slack variable, so its dense row is stored once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -44,6 +45,8 @@ pub(crate) struct ConeProgram<'a> {
     /// Half the curvature of `B`, and its rows, stored one after the other.
     pub(crate) quadratic: f64,
     pub(crate) behind: &'a [f64],
+    /// The value of each row of `B` from which on it contributes nothing; empty if none does.
+    pub(crate) kinks: Vec<f64>,
     /// `B'B`, by columns.
     pub(crate) gram: &'a [f64],
     /// Least and largest value of each weight.
@@ -105,26 +108,28 @@ impl ConeProgram<'_> {
         let quadratic = self.quadratic * scale;
         // B as a dense n x n block costs nothing extra if the hinges fill that block anyway; otherwise its few rows are
         // cheaper.
-        let factored = quadratic > 0.0 && m + k < n;
-        let dense = quadratic > 0.0 && !factored;
+        let short = if quadratic > 0.0 { self.kinks.len() } else { 0 };
+        let factored = quadratic > 0.0 && short == 0 && m + k < n;
+        let dense = quadratic > 0.0 && short == 0 && !factored;
         // The absolute value of a weight whose bounds have the same sign is linear.
         let astride = |[lower, upper]: [f64; 2]| self.l1 > 0.0 && lower < 0.0 && upper > 0.0;
         let absolute: Vec<usize> = (0..n).filter(|&j| astride(self.bounds[j])).collect();
         let normed = self.l2 > 0.0 && self.norm == Norm::Norm;
 
-        // Variables, in this order: w, the hinges' slacks, |w| by synapse, |w|_2, B w.
+        // Variables, in this order: w, the hinges' slacks, |w| by synapse, |w|_2, B w or what it lacks.
         let slack = n;
         let size = slack + m;
         let length = size + absolute.len();
         let image = length + usize::from(normed);
-        let variables = image + if factored { k } else { 0 };
-        // Rows, in this order: B w - y = 0; equalities; r w - slack <= limit; slack >= 0; hard r w <= limit; w <=
-        // upper; -w <= -lower; w - |w| <= 0; -w - |w| <= 0; the cone of |w|_2.
+        let variables = image + if factored { k } else { short };
+        // Rows, in this order: B w - y = 0; equalities; r w - slack <= limit; slack >= 0; hard r w <= limit; -B w - y <=
+        // -kinks; w <= upper; -w <= -lower; w - |w| <= 0; -w - |w| <= 0; the cone of |w|_2.
         let equal = if factored { k } else { 0 };
         let hinge = equal + self.hard.equal_to.len();
         let positive = hinge + m;
         let hard = positive + m;
-        let above = hard + self.hard.limit.len();
+        let lacking = hard + self.hard.limit.len();
+        let above = lacking + short;
         let below = above + n;
         let plus = below + n;
         let minus = plus + absolute.len();
@@ -181,6 +186,9 @@ impl ConeProgram<'_> {
             for i in 0..self.hard.limit.len() {
                 a.put(hard + i, self.hard.below[i * n + j]);
             }
+            for i in 0..short {
+                a.put(lacking + i, -self.behind[i * n + j]);
+            }
             a.put(above + j, 1.0);
             a.put(below + j, -1.0);
             if absolute.get(next) == Some(&j) {
@@ -207,17 +215,16 @@ impl ConeProgram<'_> {
             a.put(cone, -1.0);
             a.end();
         }
-        if factored {
-            for i in 0..k {
-                a.put(i, -1.0);
-                a.end();
-            }
+        for i in 0..variables - image {
+            a.put(if factored { i } else { lacking + i }, -1.0);
+            a.end();
         }
 
         let mut b = vec![0.0; rows];
         b[equal..hinge].copy_from_slice(self.hard.equal_to);
         b[hinge..positive].copy_from_slice(&self.hinges.limit);
-        b[hard..above].copy_from_slice(self.hard.limit);
+        b[hard..lacking].copy_from_slice(self.hard.limit);
+        b[lacking..above].iter_mut().zip(&self.kinks).for_each(|(b, kink)| *b = -kink);
         for (j, [lower, upper]) in self.bounds.iter().enumerate() {
             b[above + j] = *upper;
             b[below + j] = -lower;
@@ -256,7 +263,7 @@ impl ConeProgram<'_> {
             pull.iter_mut().zip(dual).for_each(|(p, z)| *p = -z * shrink);
         }
         let equality = z[equal..hinge].iter().map(|z| z / scale).collect();
-        let inequality = z[hard..above].iter().map(|z| (z / scale).max(0.0)).collect();
+        let inequality = z[hard..lacking].iter().map(|z| (z / scale).max(0.0)).collect();
         Ok(Answer { weights, multipliers, equality, inequality, pull })
     }
 }

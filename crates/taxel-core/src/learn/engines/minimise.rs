@@ -84,8 +84,7 @@ impl Relaxed {
 
     /// The lower bound that these shares of the multipliers' ranges prove, together with the weights they belong to.
     fn proven_by(&self, objective: &Objective, point: &Point, shares: &[f64]) -> f64 {
-        let silent = self.silent.len();
-        let times = |(row, share): (usize, &f64)| share * if row < silent { objective.d } else { 2.0 * objective.c };
+        let times = |(row, share): (usize, &f64)| share * self.hinge_weight(objective, row);
         let length = dot(&point.weights, &point.weights).sqrt();
         let pull = if length > 0.0 { objective.l2 / length } else { 0.0 };
         let at = Tangents {

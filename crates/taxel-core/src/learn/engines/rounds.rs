@@ -33,7 +33,8 @@ pub(crate) struct Rounds {
     pub(crate) bound: f64,
     pub(crate) rounds: usize,
     pub(crate) rows: usize,
-    /// The multiplier of each row as a share: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
+    /// The multiplier of each row as a share: of D's weight from 0 to 1, of the kink of C from its lower slope up to 1
+    /// more.
     pub(crate) shares: Vec<f64>,
     pub(crate) stopped: bool,
 }
@@ -94,7 +95,7 @@ impl Relaxed {
             for (&row, multiplier) in kept.rows.iter().zip(answer.multipliers) {
                 multipliers[row] = multiplier;
             }
-            // The program contained |x| of 6.12 as 2 max(x, 0) - x.
+            // The program contained |x| of 6.12 as 2 max(x, 0) - x, or max(-x, 0) as max(x, 0) - x.
             multipliers[self.silent.len()..].iter_mut().for_each(|m| *m -= objective.c);
             let at = Tangents {
                 weights: &trial.weights,
@@ -129,6 +130,7 @@ impl Relaxed {
     fn better(&self, objective: &Objective, from: Point, to: Vec<f64>) -> Point {
         let end = self.point(objective, to);
         let silent = self.silent.len();
+        let above = objective.kink_of_c().0 - objective.c;
         // The derivative of 6.14 at the share `s` of the line.
         let slope = |s: f64| {
             let mut sum = 0.0;
@@ -153,12 +155,12 @@ impl Relaxed {
                     Norm::Norm => 0.0,
                 };
             for (&a, &b) in from.behind.iter().zip(&end.behind) {
-                sum += 2.0 * objective.b * (a + s * (b - a)) * (b - a);
+                sum += 2.0 * objective.b * objective.counts_in_b(a + s * (b - a)) * (b - a);
             }
             let pairs = || from.excess.iter().zip(&end.excess);
             for (&a, &b) in pairs().skip(silent) {
                 let x = a + s * (b - a);
-                sum += objective.c * if x > 0.0 { b - a } else { a - b };
+                sum += if x > 0.0 { above * (b - a) } else { objective.c * (a - b) };
             }
             let rise = |(&a, &b): (&f64, &f64)| if a + s * (b - a) > 0.0 { b - a } else { 0.0 };
             sum + objective.d * pairs().take(silent).filter(|p| p.0.is_finite()).map(rise).sum::<f64>()
@@ -202,19 +204,20 @@ impl Relaxed {
         states.iter().enumerate().map(slope).collect()
     }
 
-    /// The weight of a hinge; the |x| of 6.12 is `2 max(x, 0) - x`.
-    fn hinge_weight(&self, objective: &Objective, row: usize) -> f64 {
-        if row < self.silent.len() { objective.d } else { 2.0 * objective.c }
+    /// The weight of a hinge; the |x| of 6.12 is `2 max(x, 0) - x`, and `max(-x, 0)` is `max(x, 0) - x`.
+    pub(super) fn hinge_weight(&self, objective: &Objective, row: usize) -> f64 {
+        if row < self.silent.len() { objective.d } else { objective.kink_of_c().0 }
     }
 
     fn kept(&self, objective: &Objective, states: &[HingeState]) -> Kept {
         let rows: Vec<usize> = (0..states.len()).filter(|&row| states[row] == HingeState::Kept).collect();
         let slopes = self.slopes(objective, states);
+        let mixed = objective.mixed_of_b();
         let mut linear = vec![0.0; self.trains];
         self.silent.add_sum(&slopes[..self.silent.len()], &mut linear);
         for (target, slope) in self.targets.iter().zip(&slopes[self.silent.len()..]) {
             add(&mut linear, slope - objective.c, target.at);
-            add(&mut linear, -2.0 * objective.b * objective.kappa * target.threshold, target.behind);
+            add(&mut linear, mixed * target.threshold, target.behind);
         }
         let weight = rows.iter().map(|&row| self.hinge_weight(objective, row)).collect();
         Kept { hinges: self.hinges(&rows, weight), rows, linear }
@@ -243,15 +246,16 @@ impl Relaxed {
         }
         rows.sort_unstable();
         rows.dedup();
+        let mixed = objective.mixed_of_b();
         let mut weight = vec![objective.d * (stride * every) as f64; rows.len()];
         let mut linear = vec![0.0; self.trains];
         for (k, target) in self.targets.iter().enumerate() {
             if k % every == 0 {
                 rows.push(self.silent.len() + k);
-                weight.push(2.0 * objective.c * every as f64);
+                weight.push(objective.kink_of_c().0 * every as f64);
                 add(&mut linear, -objective.c * every as f64, target.at);
             }
-            add(&mut linear, -2.0 * objective.b * objective.kappa * target.threshold, target.behind);
+            add(&mut linear, mixed * target.threshold, target.behind);
         }
         Kept { hinges: self.hinges(&rows, weight), rows, linear }
     }
@@ -264,6 +268,7 @@ impl Relaxed {
             norm: objective.norm,
             quadratic: objective.b,
             behind: &self.targets.behind,
+            kinks: objective.kinks_of_b(&self.targets),
             gram: &self.gram,
             bounds: objective.bounds.lower.iter().zip(&objective.bounds.upper).map(|(l, u)| [*l, *u]).collect(),
             hinges: &kept.hinges,

@@ -41,7 +41,8 @@ impl Relaxed {
             let share = found.shares[row] - low;
             excess[row].abs() <= NEARLY_MET * theta && share > WITHIN && share < 1.0 - WITHIN
         };
-        let targets: Vec<usize> = (0..self.targets.len()).filter(|k| within(silent + k, -0.5)).collect();
+        let (_, low) = objective.kink_of_c();
+        let targets: Vec<usize> = (0..self.targets.len()).filter(|k| within(silent + k, low)).collect();
         let touched = |row: &usize| within(*row, 0.0) || (-BELOW..WITHIN).contains(&(excess[*row] / theta));
         let rows: Vec<usize> = (0..silent).filter(touched).collect();
         let met = targets.iter().all(|k| excess[silent + k].abs() <= 0.1 * self.touch);

@@ -5,9 +5,9 @@
 //! scratch.
 
 use crate::allowed::{Parameter, Range};
-use crate::learn::cone::{ConeR, ConeRFit, ConeRProblem, Shares};
+use crate::learn::cone::{Asked, ConeR, ConeRFit, ConeRProblem, Shares};
 use crate::learn::fit::Round;
-use crate::learn::statement::check_example;
+use crate::learn::statement::{check_example, check_silence};
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -55,22 +55,31 @@ impl OnlineConeR {
         self.problem.as_ref().map_or(0, ConeRProblem::silent_rows)
     }
 
-    /// Adds a pattern with its targets (ms) to the window, and removes the oldest if the window is full.
+    /// Adds a pattern with its targets (ms) and the windows in which silence counts (ms; `None`: everywhere) to the
+    /// window, and removes the oldest if the window is full.
     ///
     /// # Errors
     ///
     /// `Problem` for a pattern or targets that are not valid (names them), `Interrupted`; the window then stays
     /// unchanged.
-    pub fn add(&mut self, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<()> {
+    pub fn add(
+        &mut self,
+        pattern: &SpikeTrains,
+        targets: &[f64],
+        silence: Option<&[[f64; 2]]>,
+        stop: Stop<'_>,
+    ) -> Result<()> {
         let parameters = &self.parameters;
         check_example(&parameters.neuron, self.seen, pattern, targets)?;
+        check_silence(self.seen, silence)?;
         let (end, points) = parameters.end_of(self.seen, pattern, targets)?;
+        let asked = Asked { targets, silence, end };
         let rows = self.problem.as_ref().map_or(0, ConeRProblem::silent_and_free_rows);
         parameters.neuron.check_rows(rows as f64 + points)?;
         if let Some(problem) = &mut self.problem {
             problem.check_trains(self.seen, pattern)?;
             let silent = problem.silent_and_free_rows();
-            problem.push(pattern, targets, end, stop)?;
+            problem.push(pattern, asked, stop)?;
             let rows = problem.silent_and_free_rows() - silent;
             if let Some((_, shares)) = &mut self.last {
                 shares.make_room(silent, rows);
@@ -82,7 +91,7 @@ impl OnlineConeR {
                 }
             }
         } else {
-            self.problem = Some(ConeRProblem::of_one(parameters, pattern, targets, end, stop)?);
+            self.problem = Some(ConeRProblem::of_one(parameters, pattern, asked, stop)?);
         }
         self.seen += 1;
         Ok(())

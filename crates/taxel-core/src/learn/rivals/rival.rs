@@ -136,6 +136,7 @@ impl Rival {
             targets,
         )?;
         crate::learn::statement::check_some_target(targets)?;
+        patterns.iter().try_for_each(|pattern| pattern.check_ungraded(self.law.name()))?;
         self.law.train(&self.neuron, &self.training, Examples { patterns, targets, start }, report, stop)
     }
 
@@ -152,18 +153,25 @@ impl Rival {
             let neuron = Neuron { refractory: self.neuron.refractory, ..Neuron::default() };
             crate::learn::statement::check_examples(&neuron, std::slice::from_ref(pattern), &[targets.to_vec()])?;
         }
+        pattern.check_ungraded(self.law.name())?;
         one_weight_a_train(weights, pattern.len())?;
         self.law.change(&self.neuron, weights, pattern, targets)
     }
-}
 
-impl SteppedNeuron {
-    /// The output spikes that weights make of a pattern, ms.
+    /// The output spikes of the rule's neuron with these weights, ms.
     ///
     /// # Errors
     ///
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn run(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
+        pattern.check_ungraded(self.law.name())?;
+        self.neuron.run(weights, pattern, stop)
+    }
+}
+
+impl SteppedNeuron {
+    /// The output spikes that weights make of a pattern, ms.
+    fn run(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
         crate::learn::statement::check_untargeted(pattern)?;
         one_weight_a_train(weights, pattern.len())?;

@@ -215,6 +215,7 @@ impl Skim {
 
     /// The branches of a pattern, each with its own inputs; weights and delays come from the seed alone.
     fn branches(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<Branch>> {
+        pattern.check_ungraded("skim")?;
         let branch = |inputs| Branch { inputs, next: 0, state: KernelSum::default() };
         let Some(layer) = self.layer() else {
             return Ok((0..pattern.len())
@@ -262,7 +263,7 @@ impl Skim {
                     }
                     while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| grid.has_come(i.0, point))
                     {
-                        shape.add(&mut branch.state, weight, (grid.time(point) - at).max(0.0));
+                        shape.add(&mut branch.state, weight, 1.0, (grid.time(point) - at).max(0.0));
                         branch.next += 1;
                     }
                     column.push(if compress { branch.state.b.tanh() } else { branch.state.b });

@@ -117,6 +117,7 @@ impl Tempotron {
     }
 
     fn lay_out(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Inputs> {
+        pattern.check_ungraded("tempotron")?;
         let shape = self.shape();
         let spikes = pattern.by_time(stop)?;
         let mut last = pattern.start;

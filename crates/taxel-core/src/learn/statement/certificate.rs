@@ -76,16 +76,17 @@ impl Certificate {
 /// for every margin.
 fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) -> Result<Option<f64>> {
     let trains = statement.trains;
-    let (mut sum, mut size, mut row) = (vec![0.0; trains], vec![0.0; trains], vec![0.0; trains]);
+    let [mut sum, mut size, mut row, mut terms] = std::array::from_fn(|_| vec![0.0; trains]);
     let (mut allowed, mut most) = (0.0, 0.0);
     for &(name, multiplier) in rows {
         if multiplier < 0.0 && !matches!(name, Row::Target { .. }) {
             return Ok(None);
         }
         let limit = statement.state_into(name, &mut row)? + if bare { statement.margin_of(name) } else { 0.0 };
-        for ((g, s), a) in sum.iter_mut().zip(&mut size).zip(&row) {
+        statement.sizes_into(name, &row, &mut terms)?;
+        for (((g, s), a), size) in sum.iter_mut().zip(&mut size).zip(&row).zip(&terms) {
             *g += multiplier * a;
-            *s += (multiplier * a).abs();
+            *s += (multiplier * size).abs();
         }
         allowed += multiplier * limit;
         most += (multiplier * limit).abs();

@@ -7,6 +7,7 @@
 
 use super::peak::{Peak, exceeds};
 use super::rows::{Example, Statement, lost, until};
+use crate::Spike;
 use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak, rounding_ms};
 
 /// A time at which the state or the limit changes.
@@ -42,8 +43,8 @@ struct Asked {
 struct Strip {
     nodes: Vec<Node>,
     asked: Vec<Asked>,
-    /// The trains of the inputs that have an effect, in order of time.
-    trains: Vec<u32>,
+    /// The inputs that have an effect, in order of time.
+    inputs: Vec<Spike>,
 }
 
 /// All silent times of a problem, prepared for sweeps.
@@ -70,10 +71,10 @@ impl SilentTimes {
             let mut worst: Option<Peak> = None;
             for (node, asked) in strip.nodes.iter().zip(&strip.asked) {
                 state = if node.reset { KernelSum::default() } else { node.step.apply(state) };
-                let inputs = &strip.trains[next..node.inputs as usize];
+                let inputs = &strip.inputs[next..node.inputs as usize];
                 next = node.inputs as usize;
                 if !inputs.is_empty() {
-                    let sum: f64 = inputs.iter().map(|&train| weights[train as usize]).sum();
+                    let sum: f64 = inputs.iter().map(|i| weights[i.train as usize] * f64::from(i.value)).sum();
                     state.a += sum * one.a;
                     state.b += sum * one.b;
                 }
@@ -125,11 +126,11 @@ fn positive(x: f64) -> f64 {
 fn strip(statement: &Statement, example: &Example) -> Strip {
     let Statement { neuron, shape, taper, .. } = statement;
     // An input that is lost just after its own time has no effect at all, because spikes occur only at targets.
-    let counts = |&(t, _): &(f64, u32)| t <= example.end && !lost(neuron, &example.targets, t, t.next_up());
-    let counted: Vec<(f64, u32)> = example.inputs.iter().copied().filter(counts).collect();
+    let counts = |i: &Spike| i.t <= example.end && !lost(neuron, &example.targets, i.t, i.t.next_up());
+    let counted: Vec<Spike> = example.inputs.iter().copied().filter(counts).collect();
 
     let mut times = vec![example.start, example.end];
-    times.extend(counted.iter().map(|i| i.0));
+    times.extend(counted.iter().map(|i| i.t));
     for &target in &example.targets {
         times.extend([target, target - taper.length, until(target), target + neuron.refractory]);
     }
@@ -150,7 +151,7 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
             length = t - times[k - 1];
             step = shape.step(length);
         }
-        next += counted[next..].iter().take_while(|i| i.0 <= t).count();
+        next += counted[next..].iter().take_while(|i| i.t <= t).count();
         let reset = neuron.after_spike == AfterSpike::Reset && example.next(t) == Some(t);
         let mut here = Asked { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
         let (mut reach, mut least) = (0.0, f64::INFINITY);
@@ -168,7 +169,7 @@ fn strip(statement: &Statement, example: &Example) -> Strip {
         nodes.push(Node { step, reach, least, inputs: next as u32, reset });
         asked.push(here);
     }
-    Strip { nodes, asked, trains: counted.iter().map(|i| i.1).collect() }
+    Strip { nodes, asked, inputs: counted }
 }
 
 /// Whether silence is required between the neighbouring nodes `t` and `to`.

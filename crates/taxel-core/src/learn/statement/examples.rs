@@ -1,7 +1,7 @@
 //! Checks of the arguments of learners.
 
 use crate::neuron::Neuron;
-use crate::{Result, SpikeTrains, problem};
+use crate::{Result, SpikeKind, SpikeTrains, problem};
 
 /// Checks the arguments of every learner: one list of targets (ms, ascending) per pattern, and the same trains in each
 /// pattern.
@@ -73,13 +73,33 @@ pub(crate) fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, ta
     Ok(())
 }
 
+/// Checks the windows of silence of pattern number `p`.
+pub(crate) fn check_silence(p: usize, windows: Option<&[[f64; 2]]>) -> Result<()> {
+    let mut before = f64::NEG_INFINITY;
+    for (k, &[start, stop]) in windows.unwrap_or_default().iter().enumerate() {
+        if !(start.is_finite() && stop.is_finite() && start <= stop) {
+            return Err(problem!(
+                "pattern {p}, window {k} of silence: {start} to {stop} ms, start must not lie behind stop, both finite"
+            ));
+        }
+        if start < before {
+            return Err(problem!(
+                "pattern {p}, window {k} of silence: begins at {start} ms, before the end of the window before, {before} \
+                 ms; windows must ascend"
+            ));
+        }
+        before = stop;
+    }
+    Ok(())
+}
+
 /// Checks pattern number `p`.
 pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
     pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
     if pattern.is_empty() {
         return Err(problem!("pattern {p}: has no train"));
     }
-    if pattern.values.is_some() {
+    if pattern.kind == SpikeKind::Signed {
         return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
     }
     Ok(())
@@ -88,7 +108,7 @@ pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
 /// Checks a pattern without targets.
 pub(crate) fn check_untargeted(pattern: &SpikeTrains) -> Result<()> {
     pattern.check()?;
-    if pattern.values.is_some() {
+    if pattern.kind == SpikeKind::Signed {
         return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
     }
     if pattern.is_empty() {

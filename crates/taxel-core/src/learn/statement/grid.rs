@@ -4,11 +4,13 @@
 //! numbers per pattern), and one backward sweep computes a weighted sum of all rows. CONE-X searches for points at
 //! which silence is violated, CONE-R sums the violations.
 
+use std::borrow::Cow;
+
 use super::peak::{Peak, exceeds};
 use super::rows::{Example, Statement, lost};
 use crate::neuron::{AfterSpike, Grid, KernelSum, Place, Shape, Step};
 use crate::vectors::{add, dot};
-use crate::{Result, Stop};
+use crate::{Result, Spike, Stop};
 
 /// The contribution of an input to the state at the first grid point at or after it.
 #[derive(Debug, Clone, Copy)]
@@ -118,14 +120,14 @@ impl SilentRows {
                 next += 1;
             }
             let fired = next.checked_sub(1).map(|k| targets[k]);
-            limit.push(if statement.is_silent_between(fired, t, targets.get(next).copied()) {
+            limit.push(if example.in_window(t) && statement.is_silent_between(fired, t, targets.get(next).copied()) {
                 neuron.theta_0 + statement.rise(example, fired, t) - statement.margin.height
             } else {
                 f64::INFINITY
             });
         }
         let mut inputs = Vec::with_capacity(example.inputs.len());
-        for (k, &(t, train)) in example.inputs.iter().enumerate() {
+        for (k, &Spike { t, train, value }) in example.inputs.iter().enumerate() {
             if k % 4096 == 0 {
                 stop.check()?;
             }
@@ -134,8 +136,9 @@ impl SilentRows {
             let acts_at = if self.shape.input().b == 0.0 { place.from() } else { place.behind() };
             if acts_at < points as f64 && !lost(neuron, targets, t, grid.time(acts_at)) {
                 let age = grid.between(place, Place::at(acts_at)).max(0.0);
-                let KernelSum { a, b } = self.shape.after(self.shape.input(), age);
-                inputs.push(GridInput { point: acts_at as u32, train, a, b });
+                let mut one = KernelSum::default();
+                self.shape.add(&mut one, 1.0, f64::from(value), age);
+                inputs.push(GridInput { point: acts_at as u32, train, a: one.a, b: one.b });
             }
         }
         inputs.sort_by_key(|i| i.point);
@@ -181,6 +184,19 @@ impl SilentRows {
             limit: rows.iter().map(|&row| self.limit[row]).collect(),
             ..*self
         }
+    }
+
+    /// These rows for inputs whose values have no sign.
+    pub(crate) fn without_signs(&self) -> Cow<'_, Self> {
+        let is_negative = |input: &GridInput| input.a < 0.0 || input.b < 0.0;
+        if !self.lanes.iter().any(|lane| lane.inputs.iter().any(is_negative)) {
+            return Cow::Borrowed(self);
+        }
+        let mut rows = self.clone();
+        for input in rows.lanes.iter_mut().flat_map(|lane| &mut lane.inputs) {
+            (input.a, input.b) = (input.a.abs(), input.b.abs());
+        }
+        Cow::Owned(rows)
     }
 
     /// The number of rows, including points without a requirement.

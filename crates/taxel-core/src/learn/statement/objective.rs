@@ -9,19 +9,46 @@ use crate::vectors::dot;
 /// The relative accuracy of an objective, as a share of its value at weights of 0; values below that share count as 0.
 pub(crate) const NOTHING: f64 = 1e-10;
 
-/// The normaliser of B(w).
-///
-/// Reading: 6.14 prints `B_max`, with which kappa has almost no effect; with the number of targets it has the effect
-/// described in 6.4.5 and figure 6.9.
+macro_rules! divisors {
+    ($($(#[$about:meta])* $name:ident $printed:literal;)*) => {$(
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+        pub enum $name {
+            /// Its largest value over the bounds, as printed.
+            #[default]
+            #[serde(rename = $printed)]
+            Largest,
+            /// The number of targets (for D, 1 if there is none).
+            #[serde(rename = "targets")]
+            Targets,
+        }
+    )*};
+}
+
+divisors! {
+    /// The normaliser of B(w).
+    ///
+    /// Reading: 6.14 prints `B_max`, with which kappa has almost no effect; with the number of targets it has the effect
+    /// described in 6.4.5 and figure 6.9.
+    Divisor "B_max";
+    /// The normaliser of C(w).
+    DivisorC "C_max";
+    /// The normaliser of D(w).
+    ///
+    /// Reading: with `D_max` a silent row weighs the less the more rows there are, so that the weight of a target
+    /// relative to one row depends on the length of the recording; with the number of targets it does not.
+    DivisorD "D_max";
+}
+
+/// The potentials that count as a miss, in B and in C.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Divisor {
-    /// The largest value of B over the bounds, as printed.
+#[serde(rename_all = "lowercase")]
+pub enum Sides {
+    /// Those above and those below what is required, as printed.
     #[default]
-    #[serde(rename = "B_max")]
-    Largest,
-    /// The number of targets.
-    #[serde(rename = "targets")]
-    Targets,
+    Both,
+    /// Only those below.
+    Below,
 }
 
 /// Whether the l2 term is the norm, as printed, or its square.
@@ -68,6 +95,8 @@ pub(crate) struct Objective {
     /// The potential that B aims at after a target, in thresholds.
     pub(crate) kappa: f64,
     pub(crate) norm: Norm,
+    pub(crate) sides_b: Sides,
+    pub(crate) sides_c: Sides,
     pub(crate) bounds: Bounds,
 }
 
@@ -78,7 +107,10 @@ pub(crate) struct Choice {
     pub(crate) lambdas: [f64; 5],
     pub(crate) kappa: f64,
     pub(crate) norm: Norm,
-    pub(crate) divisor: Divisor,
+    /// The divisors of B, C and D.
+    pub(crate) divisors: (Divisor, DivisorC, DivisorD),
+    /// The sides that count in B and in C.
+    pub(crate) sides: (Sides, Sides),
 }
 
 impl Objective {
@@ -88,7 +120,8 @@ impl Objective {
     /// weights are 0, but the normalisers of l1 and l2 include them like every train.
     ///
     /// Reading: 6.3.2 takes each term's largest value over bounds at -ub and ub; for other bounds, the largest value is
-    /// taken over -max(|lb|, |ub|) to max(|lb|, |ub|), synapse by synapse.
+    /// taken over -max(|lb|, |ub|) to max(|lb|, |ub|), synapse by synapse. Graded inputs can make a coefficient negative:
+    /// B and C are then the sums of each row's own largest value, and D is taken with all values made positive.
     pub(crate) fn new(
         choice: Choice,
         bounds: Bounds,
@@ -97,30 +130,41 @@ impl Objective {
         unit: f64,
         d_max: impl FnOnce(&[f64]) -> f64,
     ) -> Self {
-        let Choice { lambdas, kappa, norm, divisor } = choice;
+        let Choice { lambdas, kappa, norm, divisors: (of_b, of_c, of_d), sides: (sides_b, sides_c) } = choice;
         let sum: f64 = lambdas.iter().sum();
         let [l1, l2, b, c, d] = lambdas.map(|l| if sum > 0.0 { l / sum } else { 0.0 });
         let most: Vec<f64> = bounds.lower.iter().zip(&bounds.upper).map(|(l, u)| l.abs().max(u.abs())).collect();
         let over = |share: f64, most: f64| if most > 0.0 { share / most } else { 0.0 };
-        let lifted = |row: TargetRow<'_>| (dot(row.behind, &most) + kappa * row.threshold).powi(2);
-        let missed = |row: TargetRow<'_>| dot(row.at, &most) + row.threshold;
+        let reach = |row: &[f64]| dot(&row.iter().map(|a| a.abs()).collect::<Vec<f64>>(), &most);
+        let lifted = |row: TargetRow<'_>| (reach(row.behind) + kappa * row.threshold).powi(2);
+        let missed = |row: TargetRow<'_>| reach(row.at) + row.threshold;
         let square = dot(&most, &most) + dot(silent, silent);
+        // The number of targets has no unit, so these terms scale with the unit of potentials; B is a sum of squares.
+        let count = targets.len() as f64;
         Self {
             l1: over(l1, most.iter().chain(silent).sum()),
             l2: match norm {
                 Norm::Norm => over(l2, square.sqrt()),
                 Norm::Square => over(l2, square),
             },
-            b: match divisor {
+            b: match of_b {
                 Divisor::Largest => over(b, targets.iter().map(lifted).sum()),
-                // B is a sum of squares and the number of targets has no unit, so this term alone scales with the unit
-                // of potentials.
-                Divisor::Targets => over(b, targets.len() as f64) * unit.powi(2),
+                Divisor::Targets => over(b, count) * unit.powi(2),
             },
-            c: if c > 0.0 { over(c, targets.iter().map(missed).sum()) } else { 0.0 },
-            d: if d > 0.0 { over(d, d_max(&most)) } else { 0.0 },
+            c: match of_c {
+                DivisorC::Largest if c > 0.0 => over(c, targets.iter().map(missed).sum()),
+                DivisorC::Largest => 0.0,
+                DivisorC::Targets => over(c, count) * unit,
+            },
+            d: match of_d {
+                DivisorD::Largest if d > 0.0 => over(d, d_max(&most)),
+                DivisorD::Largest => 0.0,
+                DivisorD::Targets => over(d, count.max(1.0)) * unit,
+            },
             kappa,
             norm,
+            sides_b,
+            sides_c,
             bounds,
         }
     }
@@ -138,6 +182,32 @@ impl Objective {
     /// The distance of the potential after each target to `kappa` thresholds, mV.
     pub(crate) fn unlifted(&self, targets: &Targets, weights: &[f64]) -> Vec<f64> {
         targets.iter().map(|row| dot(row.behind, weights) - self.kappa * row.threshold).collect()
+    }
+
+    /// The distance that counts in B, given that of the potential to `kappa` thresholds, mV.
+    pub(crate) fn counts_in_b(&self, distance: f64) -> f64 {
+        if self.sides_b == Sides::Both { distance } else { distance.min(0.0) }
+    }
+
+    /// C at one target without its factor, given the distance of the potential to the threshold, mV.
+    pub(crate) fn missed(&self, distance: f64) -> f64 {
+        if self.sides_c == Sides::Both { distance.abs() } else { (-distance).max(0.0) }
+    }
+
+    /// How much the slope of C changes at its kink, and the slope below it as a share of that.
+    pub(crate) fn kink_of_c(&self) -> (f64, f64) {
+        if self.sides_c == Sides::Both { (2.0 * self.c, -0.5) } else { (self.c, -1.0) }
+    }
+
+    /// The potentials that B requires, mV; none if it counts both sides and so needs no kink.
+    pub(crate) fn kinks_of_b(&self, targets: &Targets) -> Vec<f64> {
+        let of = |threshold| self.kappa * threshold;
+        if self.sides_b == Sides::Both { vec![] } else { targets.thresholds.iter().map(of).collect() }
+    }
+
+    /// The factor of the thresholds in B's mixed term; 0 if B has kinks.
+    pub(crate) fn mixed_of_b(&self) -> f64 {
+        if self.sides_b == Sides::Both { -2.0 * self.b * self.kappa } else { 0.0 }
     }
 
     /// The terms of 6.11 at these weights.

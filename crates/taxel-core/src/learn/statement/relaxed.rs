@@ -93,10 +93,11 @@ impl Relaxed {
         if lengths > 0.0 { thresholds / lengths } else { f64::INFINITY }
     }
 
-    /// D at these weights, without its factor.
-    pub(crate) fn broken_silence(&self, weights: &[f64]) -> f64 {
+    /// D at these weights, without its factor, if the values of all inputs were positive: its largest value, unless
+    /// inputs of both signs are present; then D cannot exceed it.
+    pub(crate) fn most_broken_silence(&self, weights: &[f64]) -> f64 {
         let mut potential = Vec::new();
-        self.silent.potential(weights, &mut potential);
+        self.silent.without_signs().potential(weights, &mut potential);
         potential.iter().zip(&self.silent.limit).map(|(u, limit)| (u - limit).max(0.0)).sum()
     }
 }
@@ -122,11 +123,12 @@ impl Relaxed {
         let behind = objective.unlifted(&self.targets, &weights);
         let (silent, targets) = excess.split_at(self.silent.len());
         let (l1, l2) = objective.norms(&weights);
+        let counted: Vec<f64> = behind.iter().map(|&x| objective.counts_in_b(x)).collect();
         let parts = Parts {
             l1,
             l2,
-            B: objective.b * dot(&behind, &behind),
-            C: objective.c * targets.iter().map(|x| x.abs()).sum::<f64>(),
+            B: objective.b * dot(&counted, &counted),
+            C: objective.c * targets.iter().map(|&x| objective.missed(x)).sum::<f64>(),
             D: objective.d * silent.iter().map(|x| x.max(0.0)).sum::<f64>(),
         };
         Point { weights, excess, behind, parts }
@@ -135,7 +137,7 @@ impl Relaxed {
     /// A lower bound on 6.14 over all weights within the bounds, given that its least value is at most `most`.
     ///
     /// Every term is replaced by a tangent below it at some weights (which need not be within the bounds): silence by
-    /// multipliers between 0 and D's weight, targets by multipliers between minus and plus C's, the norm by a `pull` no
+    /// multipliers between 0 and D's weight, targets by multipliers between C's slopes, the norm by a `pull` no
     /// longer than its factor, a square by its slope. The remaining function, linear plus l1 over the box, is minimised
     /// synapse by synapse. The bound therefore holds for any multipliers, however they were found.
     pub(crate) fn bound(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> f64 {
@@ -145,6 +147,7 @@ impl Relaxed {
         self.silent.add_sum(&at.multipliers[..silent], &mut gradient);
         let mut bound = 0.0;
         for ((target, multiplier), behind) in self.targets.iter().zip(&at.multipliers[silent..]).zip(at.behind) {
+            let behind = objective.counts_in_b(*behind);
             add(&mut gradient, *multiplier, target.at);
             add(&mut gradient, 2.0 * objective.b * behind, target.behind);
             bound += objective.b * behind * behind;

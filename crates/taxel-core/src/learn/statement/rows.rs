@@ -13,7 +13,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Grid, KernelSum, Neuron, Shape, Time, rounding_ms};
-use crate::{Result, SpikeTrains, Stop, problem};
+use crate::{Result, Spike, SpikeTrains, Stop, problem};
 
 /// This close before a target, ms, the target's row and its slope row replace rows of silence, which would be parallel
 /// to the target's row to within rounding. A neuron that crosses its threshold there fires at the target.
@@ -122,8 +122,12 @@ pub(crate) struct Example {
     /// The end of the time in which silence is required, ms.
     pub(crate) end: f64,
     pub(crate) targets: Vec<f64>,
-    /// The inputs as time (ms) and train, in order of time.
-    pub(crate) inputs: Vec<(f64, u32)>,
+    /// The windows in which silence is required, ms, ascending, ends included; `None`: everywhere.
+    pub(crate) silence: Option<Vec<[f64; 2]>>,
+    /// The inputs, in order of time.
+    pub(crate) inputs: Vec<Spike>,
+    /// The age of an input, ms, from which on it is smaller than the rounding of the others.
+    pub(crate) forgotten: f64,
 }
 
 /// The end of silence in pattern `p`, ms: the horizon, or the later of the pattern's stop and its last target + `tau`.
@@ -151,8 +155,15 @@ pub(crate) fn end_of(
 
 impl Example {
     /// The inputs before `t`, in order of time.
-    fn before(&self, t: f64) -> &[(f64, u32)] {
-        &self.inputs[..self.inputs.partition_point(|i| i.0 < t)]
+    fn before(&self, t: f64) -> &[Spike] {
+        &self.inputs[..self.inputs.partition_point(|i| i.t < t)]
+    }
+
+    /// Whether `t` is in a window of silence.
+    pub(crate) fn in_window(&self, t: f64) -> bool {
+        let Some(windows) = &self.silence else { return true };
+        let k = windows.partition_point(|window| window[1] + rounding_ms(t) < t);
+        windows.get(k).is_some_and(|window| window[0] - rounding_ms(t) <= t)
     }
 
     /// The last target before `t`.
@@ -201,15 +212,24 @@ impl Statement {
         Self { neuron, shape, margin, unit, taper, trains, examples: vec![] }
     }
 
-    /// Adds a pattern, which the caller has checked, and the end of its silence, ms; if the caller stops it, nothing
-    /// changes.
-    pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64, stop: Stop<'_>) -> Result<()> {
-        let spikes = pattern.by_time(stop)?;
+    /// Adds a pattern, which the caller has checked, the windows of its silence, if any, and its end, ms; if the caller
+    /// stops it, nothing changes.
+    pub(crate) fn push(
+        &mut self,
+        pattern: &SpikeTrains,
+        targets: &[f64],
+        silence: Option<&[[f64; 2]]>,
+        end: f64,
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        let inputs = pattern.by_time(stop)?;
         self.examples.push(Example {
             start: pattern.start,
             end,
             targets: targets.to_vec(),
-            inputs: spikes.iter().map(|s| (s.t, s.train)).collect(),
+            silence: silence.map(<[_]>::to_vec),
+            forgotten: self.shape.forgotten() + self.shape.tau * spread(&inputs).ln(),
+            inputs,
         });
         Ok(())
     }
@@ -294,6 +314,28 @@ impl Statement {
         }
     }
 
+    /// The sizes of the terms that rounding of a row's `coefficients` depends on: of a graded pattern, whose inputs of
+    /// one train may cancel, their coefficients with all values made positive.
+    pub(crate) fn sizes_into(&self, row: Row, coefficients: &[f64], sizes: &mut [f64]) -> Result<()> {
+        let (Row::Target { pattern, .. } | Row::Slope { pattern, .. } | Row::Silence { pattern, .. }) = row;
+        if self.example(pattern)?.inputs.iter().all(|input| input.value == 1.0) {
+            sizes.copy_from_slice(coefficients);
+            return Ok(());
+        }
+        let mut example = self.examples[pattern].clone();
+        for input in &mut example.inputs {
+            input.value = input.value.abs();
+        }
+        let row = match row {
+            Row::Target { target, .. } => Row::Target { pattern: 0, target },
+            Row::Slope { target, .. } => Row::Slope { pattern: 0, target },
+            Row::Silence { t, .. } => Row::Silence { pattern: 0, t },
+        };
+        let mut positive = Self::new(&self.neuron, self.margin, self.unit, self.trains);
+        positive.examples.push(example);
+        positive.state_into(row, sizes).map(drop)
+    }
+
     /// The row of B(w) (6.10): the coefficients `delta_t` ms after a target, and the threshold at the target, mV.
     ///
     /// Inputs after the target count: B evaluates the potential as if the neuron had not fired there.
@@ -352,7 +394,8 @@ impl Statement {
         }
         if !self.is_silent(example, t) {
             return Err(problem!(
-                "pattern {pattern}: {t} ms lies at a target or in its refractory time, nothing is asked there"
+                "pattern {pattern}: {t} ms lies at a target, in its refractory time or in no window of silence, nothing is \
+                 asked there"
             ));
         }
         Ok(())
@@ -376,12 +419,12 @@ impl Statement {
         Grid::new(example.start, self.neuron.step_ms).place(t).is_point()
     }
 
-    /// Whether `t` is neither a target nor in the refractory time after one.
+    /// Whether `t` is in a window of silence, and neither a target nor in the refractory time after one.
     pub(crate) fn is_silent(&self, example: &Example, t: f64) -> bool {
-        self.is_silent_between(example.fired(t), t, example.next(t))
+        example.in_window(t) && self.is_silent_between(example.fired(t), t, example.next(t))
     }
 
-    /// Like `is_silent`, given the last target before `t` and the first one at or after `t`.
+    /// Like `is_silent` whatever the windows, given the last target before `t` and the first one at or after `t`.
     pub(crate) fn is_silent_between(&self, fired: Option<f64>, t: f64, next: Option<f64>) -> bool {
         let free = fired.is_some_and(|target| match self.neuron.time {
             Time::Grid => t <= target + self.neuron.refractory + rounding_ms(t),
@@ -415,9 +458,9 @@ impl Statement {
         out.fill(0.0);
         let inputs = example.before(t);
         let age = self.neuron.ages(example.start, t);
-        let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
+        let from = inputs.partition_point(|i| i.t < t - example.forgotten);
         let (mut at, mut one) = (f64::NAN, 0.0);
-        for &(s, train) in &inputs[from..] {
+        for &Spike { t: s, train, value } in &inputs[from..] {
             // With times in whole ms, many inputs share a time: the exponential is computed once per time.
             if s != at {
                 at = s;
@@ -427,7 +470,16 @@ impl Statement {
                     part(self.shape.after(self.shape.input(), age(s)))
                 };
             }
-            out[train as usize] += one;
+            out[train as usize] += f64::from(value) * one;
         }
     }
+}
+
+/// How many times the largest value of the inputs is the smallest, both without sign; 1 of unsigned inputs.
+fn spread(inputs: &[Spike]) -> f64 {
+    let ends = inputs.iter().fold((f64::INFINITY, 0.0_f64), |(least, most), input| {
+        let size = f64::from(input.value).abs();
+        (least.min(size), most.max(size))
+    });
+    if ends.1 > 0.0 { ends.1 / ends.0 } else { 1.0 }
 }

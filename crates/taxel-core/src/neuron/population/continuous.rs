@@ -1,12 +1,12 @@
 //! A block of neurons in continuous time: advances exactly from one input time to the next.
 
-use super::lanes::{FADED, LANES, LOOK, Lanes, SLACK, Weight};
+use super::lanes::{FADED, LANES, LOOK, Lanes, Weight, slack};
 use crate::neuron::continuous::ContinuousStream;
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AT_EDGE, AfterSpike, Neuron};
 use crate::neuron::threshold::OutputSpike;
 use crate::vectors::wide;
-use crate::{Result, SpikeTrains, Stop};
+use crate::{Result, SpikeKind, SpikeTrains, Stop};
 
 /// In intervals longer than this share of tau, the kernel's largest value is a tighter bound than the tangent.
 const LONG: f64 = 0.3;
@@ -15,9 +15,10 @@ const LONG: f64 = 0.3;
 pub(super) struct Script {
     begin: ContinuousStream,
     intervals: Vec<Interval>,
-    /// The train of each input, in order of time.
-    inputs: Vec<u32>,
-    loses_none: bool,
+    /// The train and the value of each input, in order of time.
+    inputs: Vec<(u32, f32)>,
+    /// Whether every input adds its whole weight: none is lost, and none has a value.
+    plain: bool,
     /// The contributions of `a` and of `b` to the slope of the potential, per mV, 1/ms.
     slope: KernelSum,
     /// The base of the threshold minus the rounding error of the bound, mV.
@@ -73,13 +74,13 @@ impl Script {
         push(from, trains.stop, spikes.len());
         Ok(Self {
             begin: ContinuousStream::new(neuron, threshold, trains.start),
-            inputs: spikes.iter().map(|s| s.train).collect(),
-            loses_none: neuron.after_spike == AfterSpike::Keep,
+            inputs: spikes.iter().map(|s| (s.train, s.value)).collect(),
+            plain: neuron.after_spike == AfterSpike::Keep && trains.kind != SpikeKind::Graded,
             slope: KernelSum {
                 a: shape.slope(KernelSum { a: 1.0, b: 0.0 }),
                 b: shape.slope(KernelSum { a: 0.0, b: 1.0 }),
             },
-            floor: neuron.theta_0 * threshold - SLACK * neuron.unit(),
+            floor: neuron.theta_0 * threshold - slack(neuron, &spikes),
             intervals,
         })
     }
@@ -197,13 +198,13 @@ wide! {
             let inputs = &script.inputs[next..interval.inputs_end];
             next = interval.inputs_end;
             let mut any = false;
-            if let &[train] = inputs {
+            if let &[(train, value)] = inputs {
                 // Most intervals begin with a single input: decay and input in one pass.
                 let weights = &block[train as usize];
-                any = if script.loses_none {
+                any = if script.plain {
                     one_input(lanes, script, interval, (step, fade), weights, None)
                 } else {
-                    let receives = lanes.receives(interval.from);
+                    let receives = lanes.receives(interval.from).map(|gain| gain * f64::from(value));
                     one_input(lanes, script, interval, (step, fade), weights, Some(&receives))
                 };
             } else {
@@ -213,11 +214,11 @@ wide! {
                     lanes.b[l] = b * step.bb + a * step.ba;
                     lanes.rise[l] *= fade;
                 }
-                let receives = if script.loses_none { [1.0; LANES] } else { lanes.receives(interval.from) };
-                for &train in inputs {
-                    let weights = &block[train as usize];
+                let receives = if script.plain { [1.0; LANES] } else { lanes.receives(interval.from) };
+                for &(train, value) in inputs {
+                    let (weights, value) = (&block[train as usize], f64::from(value));
                     for l in 0..LANES {
-                        lanes.a[l] += weights[l].into() * receives[l];
+                        lanes.a[l] += weights[l].into() * (receives[l] * value);
                     }
                 }
                 for l in 0..LANES {

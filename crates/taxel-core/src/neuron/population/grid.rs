@@ -1,6 +1,6 @@
 //! A block of neurons on a grid: advances from point to point.
 
-use super::lanes::{FADED, LANES, LOOK, Lanes, SLACK, Weight};
+use super::lanes::{FADED, LANES, LOOK, Lanes, Weight, slack};
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AfterSpike, Neuron};
 use crate::neuron::points::{Grid, Place};
@@ -34,7 +34,7 @@ struct Point {
 struct Input {
     train: u32,
     t: f64,
-    /// The state that an input of weight 1 has reached at the point.
+    /// The state that the input, with a weight of 1, has reached at the point.
     one: KernelSum,
 }
 
@@ -104,12 +104,10 @@ impl Script {
             let mut arriving = vec![];
             while let Some(spike) = rest.next_if(|s| grid.place(s.t).from() <= point) {
                 let age = grid.between(grid.place(spike.t), Place::at(point));
-                if age > 0.0 {
-                    let one = shape.after(shape.input(), age);
-                    inputs.push(Input { train: spike.train, t: spike.t, one });
-                } else {
-                    arriving.push(Input { train: spike.train, t: spike.t, one: shape.input() });
-                }
+                let mut one = KernelSum::default();
+                shape.add(&mut one, 1.0, f64::from(spike.value), age.max(0.0));
+                let to = if age > 0.0 { &mut inputs } else { &mut arriving };
+                to.push(Input { train: spike.train, t: spike.t, one });
             }
             let aged_end = inputs.len();
             inputs.append(&mut arriving);
@@ -119,7 +117,7 @@ impl Script {
         let far = grid.rounding_ms(trains.stop);
         let threshold = Threshold::new(neuron, threshold, start);
         Ok(Self {
-            floor: threshold.base - threshold.slack(far) - SLACK * neuron.unit(),
+            floor: threshold.base - threshold.slack(far) - slack(neuron, &spikes),
             threshold,
             grid,
             step: shape.step(step_ms),
@@ -153,7 +151,7 @@ pub(super) fn run<W: Weight>(
             let threshold = &mut thresholds[lane];
             lanes.recover(lane, threshold, t);
             let slope = shape.slope(KernelSum { a: lanes.a[lane], b: lanes.b[lane] });
-            if threshold.reached(t, lanes.b[lane], slope, script.grid.rounding_ms(t)) {
+            if threshold.compare(t, lanes.b[lane], slope, script.grid.rounding_ms(t)) {
                 fired[lane].push(t);
                 threshold.fire(t);
                 lanes.fire(lane, t, t + neuron.refractory, neuron.after_spike);
@@ -161,6 +159,14 @@ pub(super) fn run<W: Weight>(
                     (lanes.a[lane], lanes.b[lane]) = (0.0, 0.0);
                 }
                 lanes.recover(lane, threshold, t);
+            }
+            if neuron.rearm.is_some() {
+                // No rise can exclude a neuron that is unarmed: each point may arm it.
+                lanes.rise[lane] = match (threshold.is_unarmed(), lanes.edge[lane].is_finite()) {
+                    (true, _) => f64::NEG_INFINITY,
+                    (false, true) => f64::INFINITY,
+                    (false, false) => threshold.rise(t),
+                };
             }
         }
         from = Some(at);

@@ -1,6 +1,7 @@
 //! The states of a block of neurons, side by side.
 
-use crate::neuron::model::{AT_EDGE, AfterSpike};
+use crate::Spike;
+use crate::neuron::model::{AT_EDGE, AfterSpike, Neuron};
 
 /// The number of neurons in a block: with 1000 inputs their weights take 256 KiB.
 pub(super) const LANES: usize = 32;
@@ -8,7 +9,12 @@ pub(super) const LANES: usize = 32;
 /// Allowances for rounding in the bound: a factor for the decayed rise, and mV (in proportion to `theta_0`) for the
 /// rest.
 pub(super) const FADED: f64 = 1.0 - 1e-9;
-pub(super) const SLACK: f64 = 1e-11;
+const SLACK: f64 = 1e-11;
+
+/// The allowance for rounding in the bound, mV: potentials grow with the inputs' values, and their rounding errors too.
+pub(super) fn slack(neuron: &Neuron, inputs: &[Spike]) -> f64 {
+    SLACK * neuron.unit() * inputs.iter().fold(1.0_f64, |most, input| most.max(f64::from(input.value).abs()))
+}
 
 /// The number of intervals or points between two checks for Ctrl-C.
 pub(super) const LOOK: usize = 1 << 16;

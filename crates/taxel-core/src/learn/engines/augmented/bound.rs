@@ -36,6 +36,7 @@ impl Lagrangian<'_> {
                     0.0
                 }
             }
+            false if x > 0.0 => o.kink_of_c().0 - o.c,
             false => o.c * x.signum(),
         };
         let multipliers: Vec<f64> = zero.excess.iter().enumerate().map(slope).collect();
@@ -45,7 +46,7 @@ impl Lagrangian<'_> {
             for ((target, &multiplier), &behind) in problem.targets.iter().zip(&multipliers[silent..]).zip(&zero.behind)
             {
                 add(&mut pull, multiplier, target.at);
-                add(&mut pull, 2.0 * o.b * behind, target.behind);
+                add(&mut pull, 2.0 * o.b * o.counts_in_b(behind), target.behind);
             }
             for (n, p) in pull.iter_mut().enumerate() {
                 let soft = if *p > o.l1 {

@@ -1,7 +1,7 @@
 //! The exact line search along a Newton step, on which the Lagrangian is piecewise quadratic.
 
 use super::Lagrangian;
-use crate::learn::statement::Norm;
+use crate::learn::statement::{Norm, Sides};
 use crate::vectors::{add, dot};
 
 /// A full step is taken if the slope along it has fallen to `WHOLE` at its end; a search ends when it has fallen to
@@ -34,8 +34,10 @@ impl Lagrangian<'_> {
                 self.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
             let square = dot(direction, direction);
             let (mut from, mut bend) = (self.rho * against, self.rho * square);
-            from += 2.0 * o.b * dot(&self.behind, &lift);
-            bend += 2.0 * o.b * dot(&lift, &lift);
+            if o.sides_b == Sides::Both {
+                from += 2.0 * o.b * dot(&self.behind, &lift);
+                bend += 2.0 * o.b * dot(&lift, &lift);
+            }
             if o.norm == Norm::Square {
                 from += 2.0 * o.l2 * dot(&self.weights, direction);
                 bend += 2.0 * o.l2 * square;
@@ -46,7 +48,7 @@ impl Lagrangian<'_> {
         let mut end = 1.0;
         let t = loop {
             let (passing, steady) = self.passing(&rise, end);
-            let slope = |t: f64| self.slope_along(t, direction, smooth, steady, &passing);
+            let slope = |t: f64| self.slope_along(t, direction, smooth, steady, &passing, &lift);
             let (mut low, mut at_low, mut high, mut at_high) = (0.0, start, end, slope(end));
             if at_high <= WHOLE * start.abs() {
                 if end < 64.0 && at_high < -0.5 * start.abs() {
@@ -86,13 +88,13 @@ impl Lagrangian<'_> {
     /// The kinks that a step of length `end` crosses, and the slope of all rows that stay beyond their kinks.
     fn passing(&self, rise: &[f64], end: f64) -> (Vec<Passing>, f64) {
         let silent = self.problem.silent.len();
-        let (d, c) = (self.objective.d, 2.0 * self.objective.c);
+        let (d, (c, lower)) = (self.objective.d, self.objective.kink_of_c());
         let [one, other] = self.delta.map(|delta| 1.0 / delta);
         let mut passing = Vec::new();
         let mut steady = 0.0;
         let rows = self.excess.iter().zip(rise).zip(&self.shares);
         for (k, ((&x, &r), &share)) in rows.enumerate() {
-            let (weight, steep, low) = if k < silent { (d, one, 0.0) } else { (c, other, -0.5) };
+            let (weight, steep, low) = if k < silent { (d, one, 0.0) } else { (c, other, lower) };
             let (from, change) = (share + x * steep, r * steep);
             let to = from + end * change;
             if from.max(to) <= low {
@@ -106,8 +108,21 @@ impl Lagrangian<'_> {
         (passing, steady)
     }
 
-    fn slope_along(&self, t: f64, direction: &[f64], smooth: (f64, f64), steady: f64, passing: &[Passing]) -> f64 {
+    fn slope_along(
+        &self,
+        t: f64,
+        direction: &[f64],
+        smooth: (f64, f64),
+        steady: f64,
+        passing: &[Passing],
+        lift: &[f64],
+    ) -> f64 {
         let mut sum = smooth.0 + t * smooth.1 + steady;
+        if self.objective.sides_b == Sides::Below {
+            for (&x, &l) in self.behind.iter().zip(lift) {
+                sum += 2.0 * self.objective.b * (x + t * l).min(0.0) * l;
+            }
+        }
         for p in passing {
             sum += p.lean * (p.share + t * p.change).clamp(p.low, p.low + 1.0);
         }

@@ -7,7 +7,7 @@ use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::Lagrangian;
-use crate::learn::statement::Norm;
+use crate::learn::statement::{Norm, Sides};
 use crate::vectors::{add, dot};
 
 impl Lagrangian<'_> {
@@ -20,14 +20,22 @@ impl Lagrangian<'_> {
         let mut rows = problem.silent.coefficients(&self.inside[..kept]);
         let root = (o.d / self.delta[0]).sqrt();
         rows.iter_mut().for_each(|v| *v *= root);
-        let root = (2.0 * o.c / self.delta[1]).sqrt();
+        let root = (o.kink_of_c().0 / self.delta[1]).sqrt();
         for &k in &self.inside[kept..] {
             rows.extend(problem.targets.row(k - silent).at.iter().map(|v| root * v));
         }
-        let count = self.inside.len();
+        let mut count = self.inside.len();
+        if o.sides_b == Sides::Below {
+            let root = (2.0 * o.b).sqrt();
+            for (target, _) in problem.targets.iter().zip(&self.behind).filter(|(_, behind)| **behind < 0.0) {
+                rows.extend(target.behind.iter().map(|v| root * v));
+                count += 1;
+            }
+        }
+        let curved = if o.sides_b == Sides::Both { 2.0 * o.b } else { 0.0 };
         let length = dot(&self.weights, &self.weights).sqrt();
         loop {
-            self.hessian.iter_mut().zip(problem.gram.iter()).for_each(|(h, g)| *h = 2.0 * o.b * g);
+            self.hessian.iter_mut().zip(problem.gram.iter()).for_each(|(h, g)| *h = curved * g);
             let ridge = match o.norm {
                 Norm::Square => 2.0 * o.l2,
                 Norm::Norm if length > 0.0 => {

@@ -232,6 +232,7 @@ impl Program {
             add_sum(&self.behind, &factors, &mut linear);
         }
         let program = ConeProgram {
+            kinks: vec![],
             linear: &linear,
             l1: self.l1,
             l2: self.l2,

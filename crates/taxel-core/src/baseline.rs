@@ -1,0 +1,117 @@
+//! Baselines of the taxels' values: a rest that is tracked, a running mean, or a rest that stays.
+//!
+//! The tracked rest is the rule for all who need a rest that drifts: it begins at the tare and follows each taxel's
+//! value, fast near it and slowly far from it, so that drift is followed and a touch is not.
+//!
+//! Reading: between two samples the earlier value holds, and it decides whether the taxel is near its rest.
+
+use crate::rest::{Value, touched_from};
+use crate::vectors::wide;
+
+/// Time constant of the tracked rest of a taxel whose value is near it, s.
+pub const NEAR_S: f64 = 1.0;
+
+/// Time constant of the tracked rest of a taxel whose value is far from it, s.
+pub const FAR_S: f64 = 20.0;
+
+/// Number of standard deviations of a taxel's noise from which its value is far from the tracked rest.
+pub const FAR_NOISE: f64 = 5.0;
+
+/// The difference from its rest at which a taxel stands out by `times` its noise, which is at least that of a touch.
+#[must_use]
+pub fn stands_out_from(times: f64, noise: f64, noise_floor: f64) -> f64 {
+    touched_from(0.0, noise_floor).max(times * noise)
+}
+
+wide! {
+    /// Moves the baselines towards the values that held until now, and subtracts them from the new values.
+    fn follow(values: &[f32], baselines: &mut [f64], above: &mut [f32], far: &[f32], near_step: f32, far_step: f32) {
+        for (((&value, baseline), above), &far) in values.iter().zip(baselines).zip(above).zip(far) {
+            let step = if above.abs() < far { near_step } else { far_step };
+            *baseline += f64::from(step * *above);
+            *above = (f64::from(value) - *baseline) as f32;
+        }
+    }
+}
+
+/// The baseline of each taxel, and the taxels' latest values above it.
+#[derive(Debug, Clone)]
+pub struct Baseline {
+    /// Baselines by taxel; [`Value::NO_REST`] until the first value of a taxel whose baseline is not known.
+    baselines: Vec<f64>,
+    /// The latest values above the baselines; 0 before the first.
+    above: Vec<f32>,
+    /// The difference from the baseline from which a value is far.
+    far: Vec<f32>,
+    /// Time constants of near and far values, us.
+    tau_us: [f64; 2],
+    /// Time of the latest values, us.
+    t: Option<i64>,
+    /// The time between values for which the steps were computed last, us, and the steps: the part of the difference
+    /// by which the baseline of a near and of a far value moves.
+    steps: (i64, [f32; 2]),
+}
+
+impl Baseline {
+    /// The tracked rest: it begins at `rest` ([`Value::NO_REST`] if unknown) and follows values nearer than `far` with
+    /// [`NEAR_S`], others with [`FAR_S`]; all in the sensor's unit, one entry a taxel.
+    #[must_use]
+    pub fn tracked(rest: Vec<f64>, far: Vec<f32>) -> Self {
+        Self { far, ..Self::new(rest, [NEAR_S * 1e6, FAR_S * 1e6]) }
+    }
+
+    /// The rest as it was measured, which stays.
+    #[must_use]
+    pub fn measured(rest: Vec<f64>) -> Self {
+        Self::new(rest, [f64::INFINITY; 2])
+    }
+
+    /// The running mean of each value, with a time constant in us; it begins at the first value.
+    #[must_use]
+    pub fn running(taxels: usize, tau_us: f64) -> Self {
+        Self::new(vec![f64::NO_REST; taxels], [tau_us; 2])
+    }
+
+    fn new(baselines: Vec<f64>, tau_us: [f64; 2]) -> Self {
+        let n = baselines.len();
+        Self { baselines, above: vec![0.0; n], far: vec![f32::INFINITY; n], tau_us, t: None, steps: (0, [0.0; 2]) }
+    }
+
+    /// Reads the next values, at `t` us; returns them above their baselines.
+    pub fn take(&mut self, t: i64, values: &[f32]) -> &[f32] {
+        if self.t.is_none() {
+            for (baseline, &value) in self.baselines.iter_mut().zip(values) {
+                if *baseline == f64::NO_REST {
+                    *baseline = f64::from(value);
+                }
+            }
+        }
+        let time = t.saturating_sub(self.t.unwrap_or(t));
+        if time != self.steps.0 {
+            self.steps = (time, self.tau_us.map(|tau| -(-(time as f64) / tau).exp_m1() as f32));
+        }
+        self.t = Some(t);
+        let [near, far] = self.steps.1;
+        follow(values, &mut self.baselines, &mut self.above, &self.far, near, far);
+        &self.above
+    }
+
+    /// The baseline of each taxel; [`Value::NO_REST`] if it is not known yet.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.baselines
+    }
+
+    /// Sets the baseline of a taxel, which follows its value from there.
+    pub fn set(&mut self, taxel: usize, baseline: f64) {
+        let before = std::mem::replace(&mut self.baselines[taxel], baseline);
+        if self.t.is_some() {
+            self.above[taxel] = (before + f64::from(self.above[taxel]) - baseline) as f32;
+        }
+    }
+
+    /// Sets the difference from the baseline from which a taxel's value is far.
+    pub fn set_far(&mut self, taxel: usize, far: f32) {
+        self.far[taxel] = far;
+    }
+}

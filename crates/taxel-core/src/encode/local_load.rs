@@ -1,0 +1,273 @@
+//! Local load: how much of a touch there is, in units of each taxel's own noise.
+
+use serde::{Deserialize, Serialize};
+
+use super::blocks::{Block, Next};
+use super::law::Law;
+use super::loaded::given;
+use super::local_sums::{LocalSums, Sums, Values};
+use super::recent::{Recent, Window};
+use super::sampled::{Rule, Sampled};
+use super::stream::Stream;
+use super::tare::Tare;
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+use crate::spikes::{ms, us};
+use crate::{Array, EventsView, FramesView, Result, Spike, SpikeKind, Stop};
+
+/// The quantities of what is above the rest.
+const OF_REST: [&str; 4] = ["area", "largest", "places", "total"];
+
+/// The quantities of what is above or below a running mean.
+const OF_MEAN: [&str; 6] = ["area", "largest", "largest below", "area below", "total", "total below"];
+
+/// The windows over which each quantity's mean is a quantity too, ms.
+const MEANS: [[f64; 2]; 2] = [[0.0, 3.0], [2.0, 10.0]];
+
+/// The further windows for the quantities of what is above the rest, ms.
+const MEANS_OF_REST: [[f64; 2]; 2] = [[0.0, 10.0], [0.0, 50.0]];
+
+/// The rest from which a local load is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LocalRest {
+    /// Begins at the tare and follows each taxel's value: [`Baseline::tracked`](crate::baseline::Baseline::tracked).
+    #[default]
+    Tracked,
+    /// The tare.
+    Tare,
+}
+
+/// Quantities of a touch in units of each taxel's own noise, as graded spikes: one each `period_ms` and quantity, with
+/// the value log(1 + quantity); none where the quantity is 0.
+///
+/// With u a value less its rest, `sigma` the taxel's standard deviation in the tare (at least `least_noise`) and
+/// `s = sqrt(sigma^2 + noise_floor^2 / 4)`, the quantities are
+/// - area: the number of taxels with `u >= max(noise_floor + 0.5, 3 sigma)` and such a neighbour among the 8,
+/// - largest: the largest sum of u, clipped to +-3 s, over 3 x 3 taxels, divided by `sqrt(sum s^2)`; at least 0,
+/// - places: the number of taxels around which that sum is above 4,
+/// - total: the sum of all u of `5 sigma` or more.
+///
+/// For each running mean of `local_ms`, with u a value less its running mean: area (with `4 sigma`), largest, the two
+/// below instead of above (largest below, area below), total and total below. Then the means of all these over the last
+/// 3 ms and from 10 to 2 ms ago; of the first four over the last 10 and 50 ms; and 1 (clock). A taxel that is 0 from
+/// the first sample on has no value yet: it counts as at rest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LocalLoad {
+    /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
+    pub noise_floor: f64,
+    /// The smallest noise of a taxel, in the sensor's unit. Default 0.3, the deviation within a tick.
+    pub least_noise: f64,
+    /// The rest from which a load is measured.
+    pub rest: LocalRest,
+    /// Time constants of the running means, ms, each with six more quantities; none by default.
+    pub local_ms: Vec<f64>,
+    /// Sampling period of events, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+    pub period_ms: f64,
+    /// The taxels' rest and noise. It is valid for one board on one day: a saved readout has none and receives one when
+    /// it is used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tare: Option<Tare>,
+}
+
+impl Default for LocalLoad {
+    fn default() -> Self {
+        Self {
+            noise_floor: 3.0,
+            least_noise: 0.3,
+            rest: LocalRest::default(),
+            local_ms: vec![],
+            period_ms: super::periods::stamp_period(),
+            tare: None,
+        }
+    }
+}
+
+impl LocalLoad {
+    ranges! {
+        noise_floor: "", Range::FROM_0;
+        least_noise: "", Range::within(1e-9, 1e9);
+        local_ms: "ms", Range::ABOVE_0;
+        period_ms: "ms", Range::WHOLE_US;
+    }
+
+    /// The names of the quantities, a train each.
+    #[must_use]
+    pub fn quantities(&self) -> Vec<String> {
+        let mut names: Vec<String> = OF_REST.iter().map(|&name| name.to_owned()).collect();
+        for tau in &self.local_ms {
+            names.extend(OF_MEAN.iter().map(|name| format!("{name}, {tau} ms")));
+        }
+        let present = names.clone();
+        for ([from, to], of) in self.windows() {
+            names.extend(present[..of].iter().map(|name| format!("{name}, mean of {from} to {to} ms ago")));
+        }
+        names.push("clock".to_owned());
+        names
+    }
+
+    /// The windows, and the number of quantities whose means over it are wanted.
+    fn windows(&self) -> impl Iterator<Item = ([f64; 2], usize)> {
+        let all = OF_REST.len() + OF_MEAN.len() * self.local_ms.len();
+        MEANS.into_iter().map(move |window| (window, all)).chain(MEANS_OF_REST.map(|window| (window, OF_REST.len())))
+    }
+
+    /// The quantities of each sample of events, sample by sample, in the order of [`quantities`](Self::quantities).
+    ///
+    /// # Errors
+    ///
+    /// As [`Encoder::encode_events`](super::Encoder::encode_events).
+    pub fn values_of_events(&self, events: EventsView<'_>, stop: Stop<'_>) -> Result<Vec<f64>> {
+        self.check()?;
+        let mut stream = self.sampled(events.array, Emit::Values)?;
+        Ok(quantities(&super::spikes_of_events(&mut stream, events, stop)?.0))
+    }
+
+    /// The quantities of each picture, picture by picture, in the order of [`quantities`](Self::quantities).
+    ///
+    /// # Errors
+    ///
+    /// As [`Encoder::encode_frames`](super::Encoder::encode_frames).
+    pub fn values_of_frames(&self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<Vec<f64>> {
+        self.check()?;
+        let mut stream = self.sampled(frames.array, Emit::Values)?;
+        Ok(quantities(&super::spikes_of_frames(&mut stream, frames, stop)?.0))
+    }
+
+    /// The largest local sum alone, of an array's pictures.
+    ///
+    /// # Errors
+    ///
+    /// As [`Encoder::stream`](super::Encoder::stream).
+    pub fn largest(&self, array: &Array) -> Result<LargestSum> {
+        self.check()?;
+        self.sums(array, &[]).map(LargestSum)
+    }
+
+    fn sums(&self, array: &Array, running_us: &[f64]) -> Result<LocalSums> {
+        let tare = given("local load", self.tare.as_ref())?;
+        let least = (self.least_noise, self.noise_floor);
+        LocalSums::new(array, tare, least, self.rest == LocalRest::Tracked, running_us)
+    }
+
+    fn sampled(&self, array: &Array, emit: Emit) -> Result<Sampled<Load>> {
+        let running_us: Vec<f64> = self.local_ms.iter().map(|&tau| us(tau)).collect();
+        let whole = |ms: f64| us(ms).round() as i64;
+        let windows: Vec<Window> =
+            self.windows().map(|([from, to], of)| Window { from: whole(from), to: whole(to), of }).collect();
+        let recent = Recent::new(windows[0].of, &windows);
+        let rule = Load { sums: self.sums(array, &running_us)?, recent, quantities: vec![], emit };
+        Sampled::new(self, rule, array, self.period_ms)
+    }
+}
+
+/// The quantities that a stream emitted as spikes' values.
+fn quantities(spikes: &[Spike]) -> Vec<f64> {
+    spikes.iter().map(|spike| f64::from(spike.value)).collect()
+}
+
+impl Law for LocalLoad {
+    fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        self.tare.as_ref().map_or(Ok(()), Tare::check)
+    }
+
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        Ok(Box::new(self.sampled(array, Emit::Spikes)?))
+    }
+
+    fn trains(&self, _array: &Array) -> usize {
+        self.quantities().len()
+    }
+
+    fn kind(&self) -> SpikeKind {
+        SpikeKind::Graded
+    }
+
+    fn set_tare(&mut self, tare: &Tare) {
+        self.tare = Some(tare.clone());
+    }
+}
+
+/// The largest local sum of each picture: [`LocalLoad`]'s quantity "largest".
+#[derive(Clone)]
+pub struct LargestSum(LocalSums);
+
+impl LargestSum {
+    /// Reads the next picture, row by row, at `t` us, which must not be earlier than the last; returns its largest sum.
+    pub fn take(&mut self, t: i64, picture: &[f32]) -> f64 {
+        let mut largest = 0.0;
+        self.0.take(t, Values::Picture(picture), |sums| largest = sums.largest[0]);
+        largest
+    }
+}
+
+/// What a sample gives: spikes of the quantities that are not 0, or the quantities themselves, each as the value of one
+/// spike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Emit {
+    Spikes,
+    Values,
+}
+
+#[derive(Clone)]
+struct Load {
+    sums: LocalSums,
+    recent: Recent,
+    quantities: Vec<f64>,
+    emit: Emit,
+}
+
+impl Load {
+    fn take(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+        let quantities = &mut self.quantities;
+        quantities.clear();
+        self.sums.take(t, Values::Taxels(held.as_flattened()), |sums| {
+            let Sums { largest: [up, down], places, area: [area, area_below], total: [total, total_below] } = sums;
+            if quantities.is_empty() {
+                quantities.extend([area, up, places, total]);
+            } else {
+                quantities.extend([area, up, down, area_below, total, total_below]);
+            }
+        });
+        self.recent.take(t, quantities);
+        quantities.push(1.0);
+        for (train, &quantity) in quantities.iter().enumerate() {
+            let value = match self.emit {
+                Emit::Spikes => quantity.ln_1p() as f32,
+                Emit::Values => quantity as f32,
+            };
+            if value != 0.0 || self.emit == Emit::Values {
+                out.push(Spike { t: ms(t), train: train as u32, value });
+            }
+        }
+    }
+}
+
+impl Rule for Load {
+    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+        self.take(t, held, out);
+    }
+
+    #[inline(always)]
+    fn sample(&mut self, t: i64, held: &[Block], _changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
+        self.take(t, held, out);
+    }
+
+    fn set_rest(&mut self, channel: usize, rest: f64) {
+        self.sums.set_rest(channel, rest);
+    }
+
+    fn rest(&self, channel: usize) -> Option<f64> {
+        self.sums.rest(channel)
+    }
+
+    fn idle(&self) -> bool {
+        false
+    }
+}

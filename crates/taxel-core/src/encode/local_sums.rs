@@ -1,0 +1,372 @@
+//! Sums over 3 x 3 places of values above a baseline, in units of each taxel's own noise.
+
+use super::blocks::{BLOCK, Block, in_blocks};
+use super::loaded::Paired;
+use super::tare::Tare;
+use crate::baseline::{Baseline, FAR_NOISE, stands_out_from};
+use crate::rest::Value;
+use crate::vectors::wide;
+use crate::{Array, Result};
+
+/// Values are clipped at this many units of noise before they are summed, so that no stuck taxel, and no pair of them,
+/// has a sum above [`OUTSTANDING`].
+const CLIP: f64 = 3.0;
+
+/// A place stands out if its sum is above this.
+const OUTSTANDING: f32 = 4.0;
+
+/// Number of places that are compared at once; divides a block.
+const LANES: usize = 16;
+
+/// The cells of a grid: the places of an array with a border of one empty cell around each row, in which the neighbours
+/// of any place lie at the same distances.
+#[derive(Debug, Clone)]
+struct Grid {
+    rows: usize,
+    /// Distance from a cell to the one below it.
+    stride: usize,
+    /// Number of cells, whole blocks.
+    cells: usize,
+    /// Neighbouring taxels that exist, in a row.
+    runs: Vec<Run>,
+}
+
+/// Existing taxels next to each other in a row.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    /// The first one's number among the existing taxels.
+    channel: usize,
+    /// The first one's index in the array.
+    place: usize,
+    cell: usize,
+    len: usize,
+}
+
+/// Values by the number of the existing taxel, or by index in the array.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Values<'a> {
+    Taxels(&'a [f32]),
+    Picture(&'a [f32]),
+}
+
+impl Grid {
+    fn new(array: &Array) -> Self {
+        let (rows, columns) = (usize::from(array.rows), usize::from(array.columns));
+        let stride = columns + 1;
+        let mut runs: Vec<Run> = vec![];
+        let mut channel = 0;
+        for place in 0..array.len() {
+            if array.exists.as_ref().is_some_and(|exists| !exists[place]) {
+                continue;
+            }
+            let cell = (place / columns + 1) * stride + place % columns + 1;
+            match runs.last_mut() {
+                Some(run) if run.cell + run.len == cell && run.place + run.len == place => run.len += 1,
+                _ => runs.push(Run { channel, place, cell, len: 1 }),
+            }
+            channel += 1;
+        }
+        // The last row's sums are computed in whole lanes, beyond the border below it.
+        let cells = ((rows + 2) * stride + 2 + LANES).next_multiple_of(BLOCK);
+        Self { rows, stride, cells, runs }
+    }
+
+    /// The cell of each existing taxel with its index in the array.
+    fn taxels(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.runs.iter().flat_map(|run| (0..run.len).map(|k| (run.cell + k, run.place + k)))
+    }
+
+    /// The cell of the existing taxel with this number.
+    fn cell(&self, channel: usize) -> usize {
+        let run = self.runs[self.runs.partition_point(|run| run.channel <= channel) - 1];
+        run.cell + channel - run.channel
+    }
+
+    /// Copies values into the cells of the existing taxels.
+    fn spread(&self, values: Values<'_>, cells: &mut [f32]) {
+        for run in &self.runs {
+            let new = match values {
+                Values::Taxels(values) => &values[run.channel..],
+                Values::Picture(values) => &values[run.place..],
+            };
+            cells[run.cell..][..run.len].copy_from_slice(&new[..run.len]);
+        }
+    }
+}
+
+/// The noise of each cell; a cell without a taxel, or with one whose rest is not known, is left out of all sums.
+#[derive(Clone)]
+struct Noise {
+    floor: f64,
+    /// Standard deviation of each taxel's values at rest, at least the smallest allowed; `None` of cells left out.
+    sd: Vec<Option<f64>>,
+    least: f64,
+    /// The largest size of a value in a sum: [`CLIP`] units of noise; 0 in cells left out.
+    clip: Vec<f32>,
+    /// From where a value belongs to the total; infinite in cells left out.
+    large: Vec<f32>,
+    /// 1 over the noise of the sum around each cell; 0 in cells left out.
+    per_noise: Vec<f32>,
+}
+
+impl Noise {
+    fn new(grid: &Grid, sd: Vec<Option<f64>>, least: f64, floor: f64) -> Self {
+        let n = grid.cells;
+        let mut new = Self { floor, sd, least, clip: vec![0.0; n], large: vec![f32::INFINITY; n], per_noise: vec![] };
+        for cell in 0..n {
+            new.changed(cell);
+        }
+        new.per_noise = new.of_sums(grid.stride);
+        new
+    }
+
+    /// The unit of a cell's values: the taxel's noise and that of the board's floor, within which a value can hide.
+    fn unit(&self, cell: usize) -> f64 {
+        self.sd[cell].map_or(0.0, |sd| (sd * sd + self.floor * self.floor / 4.0).sqrt())
+    }
+
+    fn changed(&mut self, cell: usize) {
+        self.clip[cell] = (CLIP * self.unit(cell)) as f32;
+        self.large[cell] = self.sd[cell].map_or(f32::INFINITY, |sd| (FAR_NOISE * sd) as f32);
+    }
+
+    /// 1 over the noise of the sum around each cell.
+    fn of_sums(&self, stride: usize) -> Vec<f32> {
+        let around = |cell: usize| {
+            let row = |cell: usize| {
+                let [left, here, right] = [cell - 1, cell, cell + 1].map(|cell| self.unit(cell).powi(2));
+                (left + right) + here
+            };
+            (row(cell - stride) + row(cell + stride)) + row(cell)
+        };
+        let per_noise = |(cell, sd): (usize, &Option<f64>)| sd.map_or(0.0, |_| around(cell).sqrt().recip() as f32);
+        self.sd.iter().enumerate().map(per_noise).collect()
+    }
+
+    /// From where a cell stands out by `times` its noise; infinite in cells left out.
+    fn stands_out_from(&self, cell: usize, times: f64) -> f64 {
+        self.sd[cell].map_or(f64::INFINITY, |sd| stands_out_from(times, sd, self.floor))
+    }
+
+    /// Counts a cell from now on whose rest was not known.
+    fn know(&mut self, cell: usize, stride: usize) {
+        if self.sd[cell].is_none() {
+            self.sd[cell] = Some(self.least);
+            self.changed(cell);
+            self.per_noise = self.of_sums(stride);
+        }
+    }
+}
+
+/// Sums of values above a baseline, and of those below it.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Sums {
+    /// The largest sum over 3 x 3 clipped values, in units of its noise, at least 0; above and below.
+    pub(super) largest: [f64; 2],
+    /// The number of places whose sum is above 4 units of its noise.
+    pub(super) places: f64,
+    /// The number of taxels that stand out and have a neighbour that does; above and below.
+    pub(super) area: [f64; 2],
+    /// The sum of the values of 5 or more times their taxel's noise; above and below.
+    pub(super) total: [f64; 2],
+}
+
+wide! {
+    /// Clips the values; returns the sums of those that are large, above and below.
+    fn clip(above: &[Block], limits: &[Block], large: &[Block], clipped: &mut [Block]) -> [f64; 2] {
+        // Added in f64, in which sums of f32 hardly ever round: they do not depend on the order of the taxels.
+        let (mut over, mut under) = ([0.0; LANES], [0.0; LANES]);
+        for (((above, limits), large), clipped) in above.iter().zip(limits).zip(large).zip(clipped) {
+            let mut any = 0;
+            for lane in 0..BLOCK {
+                let (value, limit) = (above[lane], limits[lane]);
+                any |= u32::from(value.abs() >= large[lane]);
+                let least = if value > -limit { value } else { -limit };
+                clipped[lane] = if least < limit { least } else { limit };
+            }
+            if any == 0 {
+                continue;
+            }
+            for (above, large) in above.as_chunks::<LANES>().0.iter().zip(large.as_chunks::<LANES>().0) {
+                for lane in 0..LANES {
+                    let value = above[lane];
+                    over[lane] += f64::from(if value >= large[lane] { value } else { 0.0 });
+                    under[lane] += f64::from(if -value >= large[lane] { -value } else { 0.0 });
+                }
+            }
+        }
+        [over, under].map(|lanes| lanes.iter().sum())
+    }
+}
+
+wide! {
+    /// The sum of each cell, the one above it and the one below it; the outer ones first, so that a turned array has the
+    /// same sums.
+    fn vertically(up: &[f32], here: &[f32], down: &[f32], sums: &mut [f32]) {
+        for (((sum, up), here), down) in sums.iter_mut().zip(up).zip(here).zip(down) {
+            *sum = (up + down) + here;
+        }
+    }
+}
+
+/// The largest and the smallest of numbers, and how many are outstanding.
+type Extremes = (f32, f32, u32);
+
+wide! {
+    /// Extremes of the sums of three neighbours, in units of their noise, and 0.
+    fn horizontally(left: &[f32], here: &[f32], right: &[f32], per_noise: &[f32]) -> Extremes {
+        let (mut largest, mut smallest, mut outstanding) = ([0.0_f32; LANES], [0.0_f32; LANES], [0_u32; LANES]);
+        let groups = left.as_chunks::<LANES>().0.iter().zip(here.as_chunks::<LANES>().0);
+        let groups = groups.zip(right.as_chunks::<LANES>().0).zip(per_noise.as_chunks::<LANES>().0);
+        for (((left, here), right), per_noise) in groups {
+            for lane in 0..LANES {
+                let sum = ((left[lane] + right[lane]) + here[lane]) * per_noise[lane];
+                largest[lane] = if sum > largest[lane] { sum } else { largest[lane] };
+                smallest[lane] = if sum < smallest[lane] { sum } else { smallest[lane] };
+                outstanding[lane] += u32::from(sum > OUTSTANDING);
+            }
+        }
+        (
+            largest.into_iter().fold(0.0, f32::max),
+            smallest.into_iter().fold(0.0, f32::min),
+            outstanding.into_iter().sum(),
+        )
+    }
+}
+
+/// A baseline, and what is above and below it.
+#[derive(Clone)]
+struct Side {
+    baseline: Baseline,
+    /// Taxels that stand out above, and, where they are wanted, below.
+    above: Paired,
+    below: Option<Paired>,
+    /// Number of times its noise from which a taxel stands out.
+    times: f64,
+    clipped: Vec<f32>,
+    vertical: Vec<f32>,
+}
+
+impl Side {
+    fn new(grid: &Grid, noise: &Noise, baseline: Baseline, times: f64, below: bool) -> Self {
+        let paired = || Paired::new(grid.rows + 2, grid.stride);
+        let zeros = vec![0.0; grid.cells];
+        let (above, below) = (paired(), below.then(paired));
+        let mut new = Self { baseline, above, below, times, clipped: zeros.clone(), vertical: zeros };
+        for (cell, _) in grid.taxels() {
+            new.changed(noise, cell);
+        }
+        new
+    }
+
+    /// Reads a cell's noise.
+    fn changed(&mut self, noise: &Noise, cell: usize) {
+        let from = noise.stands_out_from(cell, self.times);
+        for paired in [Some(&mut self.above), self.below.as_mut()].into_iter().flatten() {
+            paired.set_from(cell, from);
+        }
+    }
+
+    fn take(&mut self, t: i64, values: &[f32], grid: &Grid, noise: &Noise) -> Sums {
+        let above = self.baseline.take(t, values);
+        let total =
+            clip(in_blocks(above), in_blocks(&noise.clip), in_blocks(&noise.large), self.clipped.as_chunks_mut().0);
+        for (block, above) in in_blocks(above)[..self.above.blocks()].iter().enumerate() {
+            self.above.take_block(block, above);
+            if let Some(below) = &mut self.below {
+                below.take_block(block, &above.map(|value| -value));
+            }
+        }
+        // From the cell before the first taxel to the one after the last.
+        let (stride, first) = (grid.stride, grid.stride);
+        let n = (grid.rows * stride).next_multiple_of(LANES);
+        let from = |cell: usize, n: usize| &self.clipped[cell..cell + n];
+        let sums = &mut self.vertical[first..first + n + 2];
+        vertically(from(first - stride, n + 2), from(first, n + 2), from(first + stride, n + 2), sums);
+        let per_noise = &noise.per_noise[first + 1..first + 1 + n];
+        let (largest, smallest, places) = horizontally(&sums[..n], &sums[1..=n], &sums[2..], per_noise);
+        Sums {
+            largest: [f64::from(largest), f64::from(-smallest)],
+            places: f64::from(places),
+            area: [self.above.area(), self.below.as_ref().map_or(0, Paired::area)].map(f64::from),
+            total,
+        }
+    }
+}
+
+/// Sums above a rest, tracked or measured, and above any running means.
+#[derive(Clone)]
+pub(super) struct LocalSums {
+    grid: Grid,
+    noise: Noise,
+    sides: Vec<Side>,
+    values: Vec<f32>,
+    /// Cells that have been 0 since the first value: they have no value yet, and count as at rest.
+    waiting: Vec<usize>,
+    begun: bool,
+}
+
+impl LocalSums {
+    /// Starts from a tare; `running_us` are the time constants of running means.
+    pub(super) fn new(
+        array: &Array,
+        tare: &Tare,
+        (least, floor): (f64, f64),
+        tracked: bool,
+        running_us: &[f64],
+    ) -> Result<Self> {
+        let (rest, measured, grid) = (tare.rest_of(array)?, tare.noise_of_places()?, Grid::new(array));
+        let (mut begins, mut sd) = (vec![f64::NO_REST; grid.cells], vec![None; grid.cells]);
+        for (cell, place) in grid.taxels() {
+            begins[cell] = rest.values()[place];
+            sd[cell] = (begins[cell] != f64::NO_REST).then(|| measured[place].max(least));
+        }
+        let noise = Noise::new(&grid, sd, least, floor);
+        let baseline = if tracked {
+            let far = (0..grid.cells).map(|cell| noise.stands_out_from(cell, FAR_NOISE) as f32).collect();
+            Baseline::tracked(begins, far)
+        } else {
+            Baseline::measured(begins)
+        };
+        let mut sides = vec![Side::new(&grid, &noise, baseline, 3.0, false)];
+        for &tau in running_us {
+            sides.push(Side::new(&grid, &noise, Baseline::running(grid.cells, tau), 4.0, true));
+        }
+        Ok(Self { values: vec![0.0; grid.cells], grid, noise, sides, waiting: vec![], begun: false })
+    }
+
+    /// Reads the next values, at `t` us; gives `each` the sums above the rest, then those above each running mean.
+    pub(super) fn take(&mut self, t: i64, values: Values<'_>, mut each: impl FnMut(Sums)) {
+        self.grid.spread(values, &mut self.values);
+        let (values, rest) = (&mut self.values, self.sides[0].baseline.values());
+        if !self.begun {
+            self.waiting = self.grid.taxels().map(|(cell, _)| cell).filter(|&cell| values[cell] == 0.0).collect();
+            self.begun = true;
+        }
+        self.waiting.retain(|&cell| values[cell] == 0.0);
+        for &cell in &self.waiting {
+            values[cell] = if rest[cell] == f64::NO_REST { 0.0 } else { rest[cell] as f32 };
+        }
+        for side in &mut self.sides {
+            each(side.take(t, &self.values, &self.grid, &self.noise));
+        }
+    }
+
+    /// Sets the rest of the existing taxel with this number.
+    pub(super) fn set_rest(&mut self, channel: usize, rest: f64) {
+        let cell = self.grid.cell(channel);
+        self.noise.know(cell, self.grid.stride);
+        for side in &mut self.sides {
+            side.changed(&self.noise, cell);
+        }
+        let baseline = &mut self.sides[0].baseline;
+        baseline.set(cell, rest);
+        baseline.set_far(cell, self.noise.stands_out_from(cell, FAR_NOISE) as f32);
+    }
+
+    /// The rest of the existing taxel with this number; `None` if it is not known.
+    pub(super) fn rest(&self, channel: usize) -> Option<f64> {
+        let cell = self.grid.cell(channel);
+        self.noise.sd[cell].map(|_| self.sides[0].baseline.values()[cell])
+    }
+}

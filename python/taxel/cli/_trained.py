@@ -1,0 +1,127 @@
+"""The result of ``taxel train``, as lines for people and as plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from taxel._base.messages import counted
+from taxel.detect import Judged, Score, Trained
+from taxel.detect.advice import Advice
+from taxel.recording import Recording
+
+__all__ = ["Result"]
+
+#: How many labels without a pair a line names.
+_NAMED = 5
+
+
+@dataclass(frozen=True)
+class Result:
+    """Hold what a training made, how it scored, and what may help it.
+
+    `why` says why the scores are those on the training data; it is empty where they are held out.
+    """
+
+    opened: Sequence[Recording]
+    made: Trained
+    scored: Judged
+    why: str
+    advice: Mapping[str, Advice]
+    window_ms: float
+    searched: bool
+
+    @property
+    def how(self) -> str:
+        """On which data the readout was scored, for the report, which shows its detections in the training data."""
+        if self.why:
+            return "on its own training data"
+        one = self.scored.together
+        counts = f"{one.found} of {one.events} found, {one.missed} missed, {one.false} false"
+        return f"on its own training data; held out ({self.scored.how}): {counts}"
+
+    def to_dict(self, out: Path, recipe: str | None, report: Path | None) -> dict[str, Any]:
+        """Return the result as plain values for JSON."""
+        result: dict[str, Any] = {
+            "readout": str(out),
+            "labels": list(self.made.readout.labels),
+            "recipe": recipe,
+            "judged_on": self.scored.how,
+            "held_out": not self.why,
+            "window_ms": self.window_ms,
+            "recordings": [
+                {"recording": str(one.path), "score": each.to_dict()}
+                for one, each in zip(self.opened, self.scored.scores, strict=True)
+            ],
+            "score": self.scored.together.to_dict(),
+            "helps": {label: one.helps for label, one in self.advice.items()},
+        }
+        if self.made.alignments:
+            result["alignment"] = {label: one.to_dict() for label, one in self.made.alignments.items()}
+            for one in result["alignment"].values():
+                one["unpaired"] = [{"recording": str(self.opened[k].path), "t_us": t} for k, t in one["unpaired"]]
+        if report is not None:
+            result["report"] = str(report / "report.html")
+        if self.searched:
+            result["neurons"] = {label: dict(self.made.recipe.neurons[label]) for label in self.made.readout.labels}
+        return result
+
+    def page(self, out: Path, recipe: str | None, report: Path | None) -> str:
+        """Return the result as lines for people; the first says whether the scores are held out."""
+        window = f"(window {self.window_ms:g} ms)"
+        lines = [f"not held out, on its own training data {window}: {self.why}"]
+        if not self.why:
+            lines = [f"held out: {self.scored.how} {window}"]
+        for label in self.made.readout.labels:
+            lines += [_line(label, by, one) for by, one in self._scores(label)]
+        lines += [*self._advised(), *self._aligned()]
+        if recipe is not None:
+            about = self.made.recipe.about
+            lines.append(f"\nrecipe {recipe}" + (f": {about}" if about else ""))
+        lines.append(repr(self.made.readout))
+        for label in self.made.readout.labels if self.searched else ():
+            point = self.made.recipe.neurons[label]
+            chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key != "search")
+            lines.append(f"{label}, chosen: {chosen}")
+        lines += [f"\n{one.path}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
+        if len(self.scored.scores) > 1:
+            lines.append(f"\nall recordings:\n{self.scored.together!r}")
+        lines.append(f"\nwritten to {out}")
+        if report is not None:
+            lines.append(f"report: {report / 'report.html'}")
+        return "\n".join(lines)
+
+    def _scores(self, label: str) -> list[tuple[str, Score]]:
+        """Return who detected the events of a label, and how that scored on the same labels: the neuron."""
+        return [("neuron", self.scored.together[label])]
+
+    def _advised(self) -> Iterator[str]:
+        """Yield what may help each label of which many are missed or false."""
+        for label, (helps, because) in self.advice.items():
+            one = self.scored.together[label]
+            many = f"{one.missed / one.events:.0%} missed, {one.false / one.events:.0%} false"
+            yield f"{label}: {many}; what may help is {helps}: {because}"
+
+    def _aligned(self) -> Iterator[str]:
+        """Yield by how much labels were moved to what the sensor felt, and which found no pair."""
+        for label, one in self.made.alignments.items():
+            if one.train is None:
+                yield f"{label}: no input follows the labels, so they were learnt as given"
+                continue
+            yield (
+                f"{label}: labels moved to what the sensor felt: median {one.median_ms:+.3g} ms, largest "
+                f"{one.largest_ms:+.3g} ms"
+            )
+            places = [f"{self.opened[k].path} at {t / 1e6:.3f} s" for k, t in one.to_dict()["unpaired"]]
+            if places:
+                more = f" and {len(places) - _NAMED} more" if len(places) > _NAMED else ""
+                of = counted(len(places), "label")
+                named = ", ".join(places[:_NAMED]) + more
+                yield f"{label}: nothing was felt within 50 ms of {of}, not learnt: {named}"
+
+
+def _line(label: str, by: str, one: Score) -> str:
+    known = "never known" if not one.found else f"known {one.delay.median:+.3g} ms after the label (median)"
+    return f"{label}, {by}: {one.found} of {one.events} found, {one.missed} missed, {one.false} false, {known}"

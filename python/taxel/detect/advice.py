@@ -1,0 +1,107 @@
+"""What helps a training of which many events are missed or false: more labels, another tare, or a search."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from taxel._base.messages import counted
+from taxel.detect.examples import Example
+from taxel.detect.scoring import Score
+from taxel.detect.training import Trained
+from taxel.encode import Encoder
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recorded import recorded
+from taxel.spikes import SpikeTrains
+
+__all__ = ["Advice", "advised", "loaded_at_rest"]
+
+#: From which share of the events on missed or false ones are many.
+_MANY = 0.05
+#: So long before a label the sensor is looked at, us: as long as a tare ends before the first label.
+_BEFORE_US = 20_000
+#: How many labels at either end of a recording are looked at.
+_LABELS = 4
+#: So many taxels above the rest are a touch.
+_TOUCH = 2
+
+
+class Advice(NamedTuple):
+    """What may help a label, and how that is known."""
+
+    helps: Literal["more labels", "another tare", "--search"]
+    because: str
+
+
+def advised(
+    made: Trained, examples: Sequence[Example], scored: Score, own: Score, search_s: float | None
+) -> dict[str, Advice]:
+    """Return what may help each label of which more than 5 % are missed or false.
+
+    Another tare where taxels read above their rest before touches begin, or nothing was felt of most labels that are
+    missed. Else more labels, where on its own training data the readout makes at most half the mistakes, as it learnt
+    by heart what these data have. Else a search of other parameters, if the recipe lists any.
+
+    Parameters
+    ----------
+    made : Trained
+    examples : sequence of Example
+        The training data.
+    scored, own : Score
+        Held out, and on the training data.
+    search_s : float, s, optional
+        How long a search tries one set of parameters of every label; None after a search.
+    """
+    many = [
+        label
+        for label, one in scored.by_label.items()
+        if label in made.readout.labels and max(one.missed, one.false) > _MANY * one.events
+    ]
+    loaded = loaded_at_rest(examples, made.recipe.encoder) if many else 0
+    return {label: _advice(made, label, scored[label], own[label], loaded, search_s) for label in many}
+
+
+def _advice(made: Trained, label: str, scored: Score, own: Score, loaded: int, search_s: float | None) -> Advice:
+    points = len(made.recipe.points_of(label))
+    wrong, learnt = scored.missed + scored.false, own.missed + own.false
+    unfelt = int(made.alignments[label].unpaired.sum()) if label in made.alignments else 0
+    if loaded >= _TOUCH:
+        return Advice("another tare", f"{loaded} taxels read above theirs while nothing touches them")
+    if 2 * unfelt > wrong:
+        return Advice("another tare", f"nothing was felt of {counted(unfelt, 'label')}, unless they are wrong")
+    if search_s is not None and 2 * learnt > wrong and points > 1:
+        return Advice("--search", f"it tries {points} sets of parameters, in about {points * search_s:.0f} s")
+    return Advice("more labels", f"of those that it learnt {own.missed} are missed, and {own.false} are false")
+
+
+def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:
+    """Return how many taxels read above the tare of their example while nothing touches it; 0 without a tare.
+
+    A taxel counts that does so 20 ms before each of the first four labels, or of the last four: at one of four such
+    moments at least a touch is yet to begin, and noise is elsewhere each time. So it is a tare that does not fit from
+    the beginning, or one that the readings drifted away from. Of several examples it is the largest number.
+    """
+    return max((_loaded(one, encoder) for one in examples), default=0)
+
+
+def _loaded(example: Example, encoder: Encoder) -> int:
+    floor, source = getattr(encoder, "noise_floor", None), recorded(example.source)
+    times = np.sort(np.concatenate([*example.labels.values(), np.empty(0, np.int64)])).astype(np.int64) - _BEFORE_US
+    if example.tare is None or floor is None or isinstance(source, SpikeTrains) or not len(times):
+        return 0
+    least = [
+        np.min([example.tare.off(_at(source, int(t))).values for t in ends], axis=0)
+        for ends in (times[:_LABELS], times[-_LABELS:])
+    ]
+    return max(int(np.count_nonzero(values > floor + 0.5)) for values in least)
+
+
+def _at(source: Events | Frames, t_us: int) -> Frames:
+    """Return the picture at a time."""
+    if isinstance(source, Events):
+        return Frames.from_events(source, 1, t_us, t_us + 1)
+    place = max(0, int(np.searchsorted(source.t, t_us, side="right")) - 1)
+    return source[place : place + 1]

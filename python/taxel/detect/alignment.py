@@ -1,0 +1,166 @@
+"""Labels aligned to what the sensor felt: each moved to the input spike that its event caused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import whole
+from taxel._base.messages import counted
+from taxel._core import ProblemError
+from taxel.detect.scoring import APART_US, Score, score
+from taxel.detections import Detections
+from taxel.spikes import SpikeTrains, to_us
+
+__all__ = ["Alignment", "align"]
+
+#: How far from its label an input spike may lie, either way, ms.
+_WINDOW_MS = 50.0
+#: Trains with more spikes a label than that are not compared with the labels: they fire throughout.
+_MOST_A_LABEL = 4
+#: Trains are alike that have so many missed and false more than the best one, or that share of the labels.
+_ALIKE, _ALIKE_SHARE = 2, 0.1
+#: Of those alike, trains whose median distance from the labels is within this of the least, ms.
+_ALIKE_MS = 2.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Alignment:
+    """Hold by how much the labels of one name were moved to what the sensor felt.
+
+    Attributes
+    ----------
+    label : str
+    train : int, from 0 on, optional
+        The input that the labels were moved to, by its place among the encoder's trains (signed ones split into ON
+        and OFF). None: no input has a spike near any label, and the labels stay as they were given.
+    example : int64, shape (labels,)
+        In which example each label is, by its place among those that were learnt from.
+    given : int64, shape (labels,), us
+        The labels as they were given, ascending in each example.
+    moved_ms : float64, shape (labels,), ms
+        By how much each was moved, later is positive; NaN where no spike of the train belongs to it. Such a label is
+        no target.
+    """
+
+    label: str
+    train: int | None
+    example: NDArray[np.int64]
+    given: NDArray[np.int64]
+    moved_ms: NDArray[np.float64]
+
+    @property
+    def unpaired(self) -> NDArray[np.bool_]:
+        """Which labels have no spike that belongs to them, shape (labels,)."""
+        return np.isnan(self.moved_ms)
+
+    @property
+    def median_ms(self) -> float:
+        """The median of `moved_ms`."""
+        return float(np.nanmedian(self.moved_ms))
+
+    @property
+    def largest_ms(self) -> float:
+        """The `moved_ms` that is farthest from 0."""
+        return float(self.moved_ms[np.nanargmax(np.abs(self.moved_ms))])
+
+    def felt(self, example: int) -> NDArray[np.int64]:
+        """Return when the sensor felt the events of an example, us, ascending; those without a pair are left out.
+
+        Parameters
+        ----------
+        example : int, from 0 on
+
+        Returns
+        -------
+        int64, shape (events,), us
+
+        Raises
+        ------
+        ProblemError : a number that is no whole one, or below 0
+        """
+        mine = (self.example == whole("example", example, 0)) & ~self.unpaired
+        felt: NDArray[np.int64] = self.given[mine] + np.rint(to_us(self.moved_ms[mine])).astype(np.int64)
+        return felt
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return train, median and largest move (ms), and the labels without a pair (example, us) as plain values."""
+        without = np.column_stack([self.example, self.given])[self.unpaired].tolist()
+        return {"train": self.train, "median_ms": self.median_ms, "largest_ms": self.largest_ms, "unpaired": without}
+
+    def __repr__(self) -> str:
+        if self.train is None:
+            return f"Alignment({self.label}: {counted(len(self.given), 'label')} as given)"
+        moved = f"median {self.median_ms:+.3g} ms, largest {self.largest_ms:+.3g} ms"
+        return f"Alignment({self.label}: {moved}, {self.unpaired.sum()} of {len(self.given)} without a pair)"
+
+
+def align(
+    patterns: Sequence[SpikeTrains], label: str, given: Sequence[NDArray[np.int64]], latency_ms: float
+) -> Alignment:
+    """Return by how much the labels of one name move to what the sensor felt, which is chosen over all patterns.
+
+    The spikes of each input train, less the latency of the encoder, are scored as if they were detections. Of the
+    trains with nearly the fewest missed and false, those with the most found, of these the ones nearest to the labels
+    at the median, and of these the first gives each label the spike that is paired with it.
+
+    Parameters
+    ----------
+    patterns : sequence of SpikeTrains, unsigned
+    label : str
+    given : sequence of int64, shape (events,), us
+        The labels of each pattern, ascending; one or more in all.
+    latency_ms : float, ms
+
+    Returns
+    -------
+    Alignment
+
+    Raises
+    ------
+    ProblemError : patterns of different numbers of trains
+    """
+    for k, pattern in enumerate(patterns):
+        if len(pattern) != len(patterns[0]):
+            raise ProblemError(f"example {k} has {len(pattern)} trains, example 0 has {len(patterns[0])}")
+    example = np.repeat(np.arange(len(given)), [len(times) for times in given])
+    # One after the other, so far apart that nothing of one pairs with another, wherever the clock of each began.
+    shift = [k * APART_US - round(to_us(pattern.start)) for k, pattern in enumerate(patterns)]
+    times = [
+        np.rint(to_us(one.times - latency_ms)).astype(np.int64) + by for one, by in zip(patterns, shift, strict=True)
+    ]
+    truth = np.concatenate([t + by for t, by in zip(given, shift, strict=True)])
+    counts = np.sum([pattern.counts for pattern in patterns], axis=0)
+    scores = {}
+    for train in np.flatnonzero((counts > 0) & (counts <= _MOST_A_LABEL * len(truth))).tolist():
+        spikes = [t[one.offsets[train] : one.offsets[train + 1]] for t, one in zip(times, patterns, strict=True)]
+        fired = np.concatenate(spikes)
+        scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, _WINDOW_MS)
+    best = _best(scores, len(truth))
+    moved = np.zeros(len(truth)) if best is None else np.full(len(truth), np.nan)
+    if best is not None:
+        moved[scores[best].pairs[:, 1]] = scores[best].errors_ms
+    return Alignment(label, best, example, np.concatenate([*given]), moved)
+
+
+def _best(scores: Mapping[int, Score], labels: int) -> int | None:
+    """Return the train that tells best when the events were felt; None where that one has no spike near any label."""
+
+    def off(one: Score) -> float:
+        return float(np.median(np.abs(one.errors_ms))) if one.found else np.inf
+
+    left = dict(scores)
+    criteria: list[tuple[Callable[[Score], float], float]] = [
+        (lambda one: one.missed + one.false, max(_ALIKE, _ALIKE_SHARE * labels)),
+        (lambda one: -one.found, 0),
+        (off, _ALIKE_MS),
+    ]
+    for worth, more in criteria:
+        least = min(map(worth, left.values()), default=0.0) + more
+        left = {train: one for train, one in left.items() if worth(one) <= least}
+    best = min(left, default=None)
+    return None if best is None or not scores[best].found else best

@@ -1,0 +1,15 @@
+"""How many threads NumPy and SciPy use: on small matrices several are slower than one."""
+
+from __future__ import annotations
+
+from threadpoolctl import threadpool_limits
+
+__all__ = ["threads"]
+
+
+def threads(*, several: bool) -> threadpool_limits:
+    """Limit NumPy and SciPy to one thread until the context ends, unless several are worth their cost."""
+    # SciPy has a pool of threads of its own, which can be limited only once it is loaded.
+    import scipy.linalg  # noqa: F401, PLC0415
+
+    return threadpool_limits(None if several else 1)

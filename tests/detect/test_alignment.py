@@ -1,0 +1,177 @@
+"""Labels come back to what the sensor felt, on the training part alone, and only where a recipe asks for it."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from test_readout import recipe, tare, touches
+
+import taxel
+from taxel.detect import Alignment, Example, Fold, Part, Recipe, judge, recipes, run, score, train
+from taxel.detect.alignment import align
+from taxel.detect.training import trained
+
+#: Each touch has a stretch of its own, ms: it is felt in the middle, unrelated inputs fire at both ends.
+STRETCH = 400.0
+Labels = list[NDArray[np.int64]]
+
+
+@st.composite
+def felt(draw: Callable[..., list[list[float]]]) -> tuple[list[taxel.SpikeTrains], Labels, Labels, int, float]:
+    """Draw patterns with one train that follows each touch, when it was felt, and labels up to 40 ms off."""
+    latency_ms = draw(st.sampled_from([0.0, 2.5]))
+    unrelated, place = draw(st.integers(0, 4)), draw(st.integers(0, 4))
+    patterns, onsets, labels = [], [], []
+    for _ in range(draw(st.integers(1, 3))):
+        start = begin = draw(st.sampled_from([0.0, -5e3, 1e9]))
+        times: list[list[float]] = [[] for _ in range(unrelated + 1)]
+        true, given_ = [], []
+        for _ in range(draw(st.integers(1, 8))):
+            begin += draw(st.sampled_from([0.0, 100.0, 3.6e6]))
+            true.append(begin + draw(st.integers(1900, 2100)) / 10.0)
+            given_.append(true[-1] + draw(st.integers(-40_000, 40_000)) / 1000.0)
+            times[place % (unrelated + 1)].append(true[-1] + latency_ms)
+            for other in set(range(unrelated + 1)) - {place % (unrelated + 1)}:
+                ends = st.floats(0.0, 60.0) | st.floats(340.0, 400.0)
+                times[other] += sorted(begin + t for t in draw(st.lists(ends, max_size=6, unique=True)))
+            begin += STRETCH
+        patterns.append(taxel.SpikeTrains.from_lists(times, start=start, stop=begin))
+        onsets.append(np.rint(np.array(true) * 1000).astype(np.int64))
+        labels.append(np.rint(np.array(given_) * 1000).astype(np.int64))
+    return patterns, onsets, labels, place % (unrelated + 1), latency_ms
+
+
+@given(felt())
+def test_labels_that_are_off_come_back_to_what_was_felt(drawn) -> None:
+    patterns, onsets, labels, place, latency_ms = drawn
+    found = align(patterns, "contact", labels, latency_ms)
+    assert found.train == place
+    assert not found.unpaired.any()
+    for k, true in enumerate(onsets):
+        assert np.abs(found.felt(k) - true).max() <= 1, "to the microsecond of a clock at 1e9 ms"
+    moved = (np.concatenate(onsets) - np.concatenate(labels)) / 1000.0
+    assert found.moved_ms == pytest.approx(moved, abs=0.0011)
+    assert found.median_ms == pytest.approx(np.median(moved), abs=0.0011)
+    assert abs(found.largest_ms) == pytest.approx(np.abs(moved).max(), abs=0.0011)
+
+
+@given(felt(), st.data())
+def test_a_label_for_which_nothing_was_felt_has_no_pair(drawn, data) -> None:
+    patterns, onsets, labels, place, latency_ms = drawn
+    k = data.draw(st.integers(0, len(patterns) - 1))
+    alone = round(1000 * patterns[k].stop) + 100_000
+    longer = taxel.SpikeTrains(
+        patterns[k].times, patterns[k].offsets, patterns[k].start, patterns[k].stop + 200.0, patterns[k].values
+    )
+    more = [np.append(t, alone) if n == k else t for n, t in enumerate(labels)]
+    found = align([longer if n == k else one for n, one in enumerate(patterns)], "contact", more, latency_ms)
+    assert found.train == place
+    assert (found.example[found.unpaired].tolist(), found.given[found.unpaired].tolist()) == ([k], [alone])
+    assert np.abs(found.felt(k) - onsets[k]).max() <= 1
+    assert found.to_dict()["unpaired"] == [[k, alone]]
+
+
+def test_of_trains_that_are_alike_the_nearest_is_taken_and_of_these_the_first() -> None:
+    onsets = np.arange(10) * 1000.0 + 500.0
+    labels = [np.rint(1000 * onsets).astype(np.int64)]
+    trains = [onsets + 9.0, onsets[:8], onsets + 1.5, onsets, np.arange(0.0, 10_000.0, 10.0), []]
+    patterns = [taxel.SpikeTrains.from_lists(trains, stop=10_000.0)]
+    assert align(patterns, "a", labels, 0.0).train == 2
+    without = [taxel.SpikeTrains.from_lists([*trains[:2], *trains[4:]], stop=10_000.0)]
+    assert align(without, "a", labels, 0.0).train == 0, "which finds most"
+    assert align([taxel.SpikeTrains.from_lists(trains[4:], stop=10_000.0)], "a", labels, 0.0).train is None
+
+
+@pytest.mark.parametrize("spikes", [[[], []], [[3000.0], []], [[], np.arange(0.0, 4000.0, 3.0)]])
+def test_where_no_input_follows_the_labels_they_stay_as_given(spikes: list[list[float]]) -> None:
+    labels = [np.array([1_000_000, 1_400_000])]
+    found = align([taxel.SpikeTrains.from_lists(spikes, stop=4000.0)], "a", labels, 0.0)
+    assert (found.train, found.moved_ms.tolist()) == (None, [0.0, 0.0])
+    assert found.felt(0).tolist() == labels[0].tolist()
+    assert repr(found) == "Alignment(a: 2 labels as given)"
+
+
+def test_examples_of_different_numbers_of_trains_are_refused() -> None:
+    plan = dataclasses.replace(recipe(), align=True)
+    spikes = [taxel.SpikeTrains.from_lists([[10.0]] * n, stop=50.0) for n in (2, 3)]
+    with pytest.raises(taxel.ProblemError, match="example 1 has 3 trains, example 0 has 2"):
+        train([Example(one, {"contact": [10_000], "lift": [20_000]}) for one in spikes], plan)
+
+
+def examples(*seeds: int, jitter_ms: float = 0.0) -> list[Example]:
+    random = np.random.default_rng(seeds)
+    made = []
+    for seed in seeds:
+        events, truth = touches(seed)
+        off = {
+            label: np.asarray(t) + np.rint(random.uniform(-jitter_ms, jitter_ms, len(t)) * 1000).astype(np.int64)
+            for label, t in truth.items()
+        }
+        made.append(Example(events, off, tare()))
+    return made
+
+
+@pytest.mark.filterwarnings("ignore:.* out of reach")
+def test_labels_that_are_off_teach_what_exact_ones_do() -> None:
+    plan = dataclasses.replace(recipe(), align=True)
+    exact, off = examples(1, 2, 3), examples(1, 2, 3, jitter_ms=20.0)
+    assert train(off, plan) == train(exact, plan)
+    assert train(off, recipe()) != train(exact, recipe())
+    events, truth = touches(9)
+    readout = train(off, plan)
+    own = score(run(readout, events, tare=tare()), truth, 10.0)
+    assert (own.missed, own.false) == (0, 0)
+    # `t` is when the sensor felt it: what the aligned labels are, not what was given.
+    spread = [one for label in readout.labels for one in own[label].errors_ms - np.median(own[label].errors_ms)]
+    assert np.abs(spread).max() < 1.0
+
+
+def test_the_part_that_is_tested_moves_no_label() -> None:
+    data = examples(1, 2, 9, jitter_ms=20.0)
+    plan = dataclasses.replace(recipe(), align=True)
+    fold = Fold([Part(0), Part(1)], [Part(2)])
+    one = judge(data, plan, [fold]).trained[0]
+    other = judge([*data[:2], *examples(7, jitter_ms=40.0)], plan, [fold]).trained[0]
+    assert one.readout == other.readout == train(data[:2], plan)
+    assert {label: a.to_dict() for label, a in one.alignments.items()} == {
+        label: a.to_dict() for label, a in trained(data[:2], plan, None).alignments.items()
+    }
+    assert set(one.alignments["contact"].example) == {0, 1}
+
+
+def test_scores_are_against_the_labels_as_they_were_given() -> None:
+    data = examples(1, 2, 9, jitter_ms=20.0)
+    judged = judge(data, dataclasses.replace(recipe(), align=True), 3, window_ms=50.0)
+    assert judged.together.missed == 0
+    assert judged.together["contact"].error.sd > 5.0
+
+
+@pytest.mark.filterwarnings("ignore:.* out of reach")
+def test_without_align_labels_are_learnt_as_they_are_given() -> None:
+    """And with it, exactly so where each lies where it was felt."""
+    spikes = [taxel.SpikeTrains.from_lists([[20.0, 120.0], [60.0]], stop=200.0)]
+    plain = Recipe(taxel.encode.LevelCrossing([1.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
+    aligned = dataclasses.replace(plain, align=True)
+    assert plain.align is False
+    assert trained([Example(spikes[0], {"a": [20_000]})], plain, None).alignments == {}
+    exact, off = ([Example(spikes[0], {"a": times})] for times in ([20_000, 120_000], [25_000, 118_000]))
+    assert train(exact, plain) == train(exact, aligned) == train(off, aligned)
+    assert train(off, plain) != train(off, aligned)
+
+
+def test_it_is_on_for_touch_and_off_for_all_other_recipes() -> None:
+    assert {name: Recipe.load(name).align for name in recipes.names()} == {
+        name: name == "touch" for name in recipes.names()
+    }
+    assert Recipe.load("touch", {"align": False}).align is False
+    with pytest.raises(taxel.ProblemError, match="align is 'yes'"):
+        Recipe.load("touch", {"align": "yes"})
+
+
+def test_an_alignment_says_how_far_labels_moved() -> None:
+    found = Alignment("contact", 3, np.zeros(3, int), np.array([0, 10, 20]), np.array([1.0, -40.0, np.nan]))
+    assert repr(found) == "Alignment(contact: median -19.5 ms, largest -40 ms, 1 of 3 without a pair)"

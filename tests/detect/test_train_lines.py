@@ -1,0 +1,230 @@
+"""``taxel train`` judges itself: the first line says on what, the next ones how well, what may help, what was felt."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shell import call
+from test_readout import ARRAY, recipe, tare, touches
+
+import taxel
+from taxel.detect import Example, score
+from taxel.detect.advice import advised, loaded_at_rest
+from taxel.detect.training import Trained, trained
+from taxel.encode import ContactArea, LevelCrossing
+
+
+def recorded(folder: Path, seed: int, count: int = 6, late_us: int = 0, more: str = "") -> tuple[Path, Path]:
+    """Write a recording and its labels, each so much too late."""
+    events, truth = touches(seed, count)
+    taxel.convert(events, folder / f"{seed}.npz")
+    rows = [f"{label},{t + late_us}" for label, times in truth.items() for t in times]
+    (folder / f"{seed}.csv").write_text("\n".join(["label,t_us", *rows]) + "\n" + more)
+    return folder / f"{seed}.npz", folder / f"{seed}.csv"
+
+
+def test_the_first_line_says_held_out_and_the_next_ones_how_each_label_scored(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1, 12, late_us=7_000)
+    code, out, _ = call(capsys, "train", recording, "--labels", labels, "-o", tmp_path / "r.json")
+    lines = out.splitlines()
+    assert (code, lines[0]) == (0, "held out: 5 blocks of time (window 50 ms)")
+    counts = r"12 of 12 found, 0 missed, 0 false, known -[\d.]+ ms after the label \(median\)"
+    assert re.fullmatch(f"contact, neuron: {counts}", lines[1]), lines[1]
+    assert re.fullmatch(f"lift, neuron: {counts}", lines[2]), lines[2]
+    for line, label in zip(lines[3:5], ("contact", "lift"), strict=True):
+        said = re.fullmatch(
+            rf"{label}: labels moved to what the sensor felt: median (-\d\S*) ms, largest (-\d\S*) ms", line
+        )
+        assert said, line
+        assert -9.0 < float(said[1]) < -4.0
+    assert "recipe touch: contact and lift" in out
+
+
+def test_a_label_of_which_nothing_was_felt_is_named_by_recording_and_time(tmp_path: Path, capsys) -> None:
+    first, labels = recorded(tmp_path, 1)
+    second, _ = recorded(tmp_path, 2)
+    lines = ["recording,label,t_us"]
+    for seed in (1, 2):
+        lines += [f"{seed},{label},{t}" for label, times in touches(seed)[1].items() for t in times]
+    alone = touches(2)[1]["contact"][1] + 60_000
+    labels.write_text("\n".join([*lines, f"2,contact,{alone}"]) + "\n")
+    arguments = ("train", first, second, "--labels", labels, "--tare", 0.03, "--overwrite", "-o", tmp_path / "r.json")
+    code, out, _ = call(capsys, *arguments)
+    assert (code, out.splitlines()[0]) == (0, "held out: whole recordings, 2 folds (window 50 ms)")
+    assert f"contact: nothing was felt within 50 ms of 1 label, not learnt: {second} at {alone / 1e6:.3f} s" in out
+    assert "contact, neuron: 12 of 13 found, 1 missed, 0 false" in out, "it counts as missed"
+    result = json.loads(call(capsys, *arguments, "--json")[1])
+    assert result["alignment"]["contact"]["unpaired"] == [{"recording": str(second), "t_us": alone}]
+    assert result["alignment"]["lift"]["unpaired"] == []
+    assert (result["held_out"], result["score"]["missed"]) == (True, 1)
+    assert "contact: 8% missed, 0% false; what may help is another tare: nothing was felt of 1 label, unless" in out
+
+
+def test_labels_are_learnt_as_given_where_that_is_asked_for(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1)
+    arguments = ("train", recording, "--labels", labels, "--no-align", "--overwrite", "-o", tmp_path / "r.json")
+    code, out, _ = call(capsys, *arguments)
+    assert (code, "labels moved" in out) == (0, False)
+    assert "alignment" not in json.loads(call(capsys, *arguments, "--json")[1])
+
+
+def test_labels_within_the_refractory_time_are_named_and_leave_no_readout(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1)
+    labels.write_text(labels.read_text() + "contact,90000\ncontact,95000\n")
+    out = tmp_path / "r.json"
+    code, _, error = call(capsys, "train", recording, "--labels", labels, "--no-align", "--tare", 0.03, "-o", out)
+    assert (code, error.count("\n"), out.exists()) == (2, 1, False)
+    assert re.search(
+        r"contact: pattern 0, target \d \(95.1\d* ms\): 5\S* ms after target \d, inside the refractory", error
+    )
+
+
+@pytest.mark.parametrize(
+    ("count", "options", "why"),
+    [
+        (1, (), "of contact there is 1, and two folds need 4"),
+        (3, (), "of contact there are 3, and two folds need 4"),
+        (6, ("--folds", 0), "--folds 0"),
+    ],
+)
+def test_what_cannot_be_held_out_or_is_not_to_be_says_why(
+    tmp_path: Path, capsys, count: int, options: tuple[object, ...], why: str
+) -> None:
+    recording, labels = recorded(tmp_path, 1, count)
+    arguments = ("train", recording, "--labels", labels, "--overwrite", "-o", tmp_path / "r.json", *options)
+    code, out, error = call(capsys, *arguments)
+    assert (code, error) == (0, "")
+    assert out.splitlines()[0] == f"not held out, on its own training data (window 50 ms): {why}"
+    result = json.loads(call(capsys, *arguments, "--json")[1])
+    assert (result["held_out"], result["judged_on"]) == (False, "its own training data")
+    assert result["score"]["events"] == 2 * count == result["score"]["found"]
+
+
+def test_one_fold_is_refused(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1)
+    code, _, error = call(capsys, "train", recording, "--labels", labels, "--folds", 1, "-o", tmp_path / "r.json")
+    assert (code, error) == (2, "taxel: --folds 1: must be 2 or more, or 0 for none\n")
+
+
+def test_a_recording_without_a_spike_is_refused_in_one_line(tmp_path: Path, capsys) -> None:
+    frames = taxel.Frames(np.full((500, 4, 4), 60.0), np.arange(500) * 10_000, unit="ticks")
+    taxel.convert(frames, tmp_path / "still.npz")
+    (tmp_path / "labels.csv").write_text(
+        "label,t_us\n" + "".join(f"contact,{t}\n" for t in range(10**6, 4 * 10**6, 10**6))
+    )
+    arguments = ("train", tmp_path / "still.npz", "--labels", tmp_path / "labels.csv", "--recipe", "touch")
+    code, _, error = call(capsys, *arguments, "-o", tmp_path / "r.json")
+    assert (code, error) == (2, "taxel: contact: pattern 0: has no spike, so no weight can matter at its target\n")
+
+
+def test_a_fold_that_cannot_be_learnt_leaves_the_training_as_it_is(tmp_path: Path, capsys) -> None:
+    """Of a second recording nothing was felt: it teaches silence, but not alone."""
+    first, labels = recorded(tmp_path, 1)
+    events = taxel.Events(
+        [0] * 64, np.arange(64) % 8, np.arange(64) // 8, [True] * 64, array=ARRAY, intensity=[60] * 64
+    )
+    taxel.convert(events, tmp_path / "still.npz")
+    lines = [f"1,{line}" for line in labels.read_text().splitlines()[1:]]
+    labels.write_text("\n".join(["recording,label,t_us", *lines, "still,contact,50000", "still,lift,90000"]) + "\n")
+    tared = ("--tare", tmp_path / "tare.json")
+    tare().save(tmp_path / "tare.json")
+    arguments = ("train", first, tmp_path / "still.npz", "--labels", labels, *tared, "--overwrite")
+    code, out, _ = call(capsys, *arguments, "-o", tmp_path / "r.json")
+    assert code == 0
+    assert out.startswith("not held out, on its own training data (window 50 ms): a part of the training data cannot")
+    assert "contact, neuron: 6 of 7 found, 1 missed, 0 false" in out
+    code, _, error = call(capsys, *arguments, "--folds", 2, "-o", tmp_path / "r.json")
+    assert (code, "has no spike" in error) == (2, True), "folds that were asked for are not left out"
+
+
+def test_a_page_draws_labels_as_given_and_as_felt(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1, late_us=7_000)
+    options = ("--labels", labels, "-o", tmp_path / "r.json", "--overwrite", "--report")
+    assert call(capsys, "train", recording, *options, tmp_path / "with")[0] == 0
+    page = (tmp_path / "with" / "report.html").read_text()
+    assert page.count('<div class="charts">') == 2 * 4
+    assert page.count("labels were moved to what the sensor felt: median -") == 2
+    assert '"felt"' in page
+    recording, _ = recorded(tmp_path, 2)
+    options = ("--labels", tmp_path / "2.csv", *options[2:])
+    assert call(capsys, "train", recording, *options, tmp_path / "without", "--no-align")[0] == 0
+    page = (tmp_path / "without" / "report.html").read_text()
+    assert "felt" not in page
+
+
+def test_a_recording_without_one_of_the_labels_has_a_row_on_the_page(tmp_path: Path, capsys) -> None:
+    recording, labels = recorded(tmp_path, 1)
+    tare().save(tmp_path / "tare.json")
+    taxel.convert(touches(2)[0].between(0, 70_000), tmp_path / "2.npz")
+    rows = [f"1,{line}" for line in labels.read_text().splitlines()[1:]]
+    labels.write_text("\n".join(["recording,label,t_us", *rows, "2,contact,9000"]) + "\n")
+    arguments = (
+        "train",
+        recording,
+        tmp_path / "2.npz",
+        "--labels",
+        labels,
+        "--tare",
+        tmp_path / "tare.json",
+        "-o",
+        tmp_path / "r.json",
+    )
+    code, out, error = call(capsys, *arguments, "--report", tmp_path / "page")
+    assert code == 0, error
+    assert (code, out.splitlines()[0].rpartition(": ")[2]) == (0, "every lift is in one recording")
+    assert '2.npz</td><td class="left">lift</td><td>0</td>' in (tmp_path / "page" / "report.html").read_text()
+
+
+def scored(found: int, missed: int, false: int) -> taxel.detect.Score:
+    times = np.arange(found + false) * 1_000_000
+    there = np.concatenate([times[:found], 500_000 + np.arange(missed) * 1_000_000])
+    return score(taxel.Detections(["contact"] * len(times), times, times), {"contact": there})
+
+
+@pytest.fixture(scope="module")
+def made() -> tuple[Trained, Example]:
+    events, truth = touches(1)
+    plan = taxel.detect.Recipe.load("touch")
+    return trained([Example(events, truth, tare())], plan, None), Example(events, truth, tare())
+
+
+@pytest.mark.parametrize(
+    ("held", "own", "search_s", "helps"),
+    [
+        ((95, 5, 5), (100, 0, 0), 2.0, None),
+        ((94, 6, 0), (100, 0, 0), 2.0, "more labels"),
+        ((94, 6, 0), (97, 3, 0), 2.0, "more labels"),
+        ((94, 6, 0), (96, 4, 0), 2.0, "--search"),
+        ((100, 0, 6), (100, 0, 6), 2.0, "--search"),
+        ((94, 6, 0), (94, 6, 0), None, "more labels"),
+        ((0, 1, 0), (0, 1, 0), 2.0, "--search"),
+    ],
+)
+def test_what_may_help_is_named_where_many_are_missed_or_false(made, held, own, search_s, helps) -> None:
+    advice = advised(made[0], [made[1]], scored(*held), scored(*own), search_s)
+    assert ({} if helps is None else {"contact": helps}) == {label: one.helps for label, one in advice.items()}
+    if helps == "--search":
+        assert advice["contact"].because == "it tries 5 sets of parameters, in about 10 s"
+
+
+def test_another_tare_may_help_where_taxels_are_loaded_at_rest(made) -> None:
+    readout, example = made
+    assert loaded_at_rest([example], ContactArea()) == 0
+    low = taxel.Tare.take(taxel.Frames(np.full((2, 8, 8), 50.0), [0, 1000], array=ARRAY))
+    stale = example._replace(tare=low)
+    assert loaded_at_rest([example, stale], ContactArea()) == 64
+    assert loaded_at_rest([example, stale._replace(tare=None)], ContactArea()) == 0
+    assert loaded_at_rest([stale], LevelCrossing([10.0])) == 0
+    advice = advised(readout, [stale], scored(9, 1, 0), scored(9, 1, 0), 2.0)
+    assert advice["contact"].helps == "another tare"
+    assert advice["contact"].because == "64 taxels read above theirs while nothing touches them"
+
+
+def test_a_tare_that_drifts_away_is_noticed_at_the_end() -> None:
+    values = np.full((1000, 8, 8), 60.0) + np.linspace(0, 8, 1000)[:, None, None]
+    frames = taxel.Frames(values, np.arange(1000) * 10_000, unit="ticks", array=ARRAY)
+    truth = {"contact": np.arange(1, 10) * 1_000_000}
+    assert loaded_at_rest([Example(frames, truth, tare())], recipe().encoder) == 64
+    assert loaded_at_rest([Example(frames, {"contact": truth["contact"][:4]}, tare())], recipe().encoder) == 0

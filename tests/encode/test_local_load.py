@@ -1,0 +1,278 @@
+"""Local load against NumPy, written from the definition: quantities in units of each taxel's own noise."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refusal import refused
+
+import taxel
+from taxel import Array, Frames, Tare
+from taxel.encode import LocalLoad
+
+from . import scenes
+from .scenes import rest, touch
+
+REPAIRED = "read"
+#: Examples for the laws of all encoders (test_laws.py).
+EXAMPLES = {
+    "local load": LocalLoad(tare=rest(scenes.ARRAY)),
+    "local load, of running means": LocalLoad(
+        rest="tare", local_ms=(50, 300.5), noise_floor=1.0, least_noise=2.0, period_ms=0.3, tare=rest(scenes.ARRAY)
+    ),
+}
+
+
+def turned(encoder):
+    """The trains as they stand on an array that is turned by half a turn: no quantity depends on the position."""
+    return np.arange(len(encoder.quantities))
+
+
+def around(values):
+    """The sums over 3 x 3 places; outside the array is nothing."""
+    wide = np.pad(values, 1)
+    rows, columns = values.shape
+    return sum(wide[y : y + rows, x : x + columns] for y in range(3) for x in range(3))
+
+
+def area(u, least):
+    """The number of taxels from `least` with such a neighbour."""
+    there = u >= least
+    return np.count_nonzero(there & (around(there.astype(int)) > 1))
+
+
+def mean(times, rows, k, start_ms, stop_ms):
+    """The mean of the samples of an age from `start_ms` to `stop_ms`; or the latest before; or the first."""
+    age = times[k] - times[: k + 1]
+    inside = (age >= 1000 * start_ms) & (age < 1000 * stop_ms)
+    before = np.flatnonzero(age >= 1000 * start_ms)
+    return rows[: k + 1][inside].mean(0) if inside.any() else rows[before[-1] if len(before) else 0]
+
+
+class Oracle:
+    """The quantities of pictures, with the number of places whose sum is above `bound`, nearly 4."""
+
+    def __init__(self, encoder, t, pictures, exists, bound):
+        self.encoder, self.t, self.tare, self.bound = encoder, t, encoder.tare, bound
+        self.known = exists & ~np.isnan(self.tare.rest)
+        self.sigma = np.maximum(np.nan_to_num(self.tare.noise), encoder.least_noise)
+        self.s = np.where(self.known, np.sqrt(self.sigma**2 + encoder.noise_floor**2 / 4), 0.0)
+        self.pictures = np.where(exists, pictures, 0).astype(np.float64)
+        # A taxel that has been 0 since the first picture has no value yet: it is at its rest.
+        self.waiting = np.logical_and.accumulate(self.pictures == 0, axis=0)
+
+    def of(self, value, times):
+        """Area, largest, places and total of values above their baselines."""
+        known, s = self.known, self.s
+        value = np.where(known, value, 0.0)
+        sums = around(np.clip(value, -3 * s, 3 * s)) / np.sqrt(np.where(known, around(s**2), np.inf))
+        least = np.maximum(self.encoder.noise_floor + 0.5, times * self.sigma)
+        large = known & (value >= (5 * self.sigma).astype(np.float32))
+        return [
+            area(value, np.where(known, least, np.inf)),
+            max(0.0, sums.max()),
+            np.count_nonzero(sums > self.bound),
+            value[large].sum(),
+        ]
+
+    def above_rest(self):
+        """The values above the rest, and the pictures in which a taxel without a value is at its rest."""
+        far = np.maximum(self.encoder.noise_floor + 0.5, 5 * self.sigma).astype(np.float32)
+        baseline, found = np.where(self.known, self.tare.rest, 0.0), []
+        for k, picture in enumerate(self.pictures):
+            if k > 0 and self.encoder.rest == "tracked":
+                tau_us = np.where(np.abs(found[-1]) < far, 1e6, 20e6)
+                baseline = baseline - np.expm1(-(self.t[k] - self.t[k - 1]) / tau_us) * found[-1]
+            picture[self.waiting[k]] = baseline[self.waiting[k]]
+            found.append(np.float32(picture - baseline).astype(float))
+        return found
+
+    def above_mean(self, tau_ms):
+        """The values above running means, after `above_rest`."""
+        baseline, found = self.pictures[0], []
+        for k, picture in enumerate(self.pictures):
+            if k > 0:
+                baseline = baseline - np.expm1(-(self.t[k] - self.t[k - 1]) / (1e3 * tau_ms)) * found[-1]
+            found.append(picture - baseline)
+        return found
+
+    def values(self):
+        """The quantities of each picture."""
+        now = [self.of(u, 3) for u in self.above_rest()]
+        for tau in self.encoder.local_ms:
+            for k, u in enumerate(self.above_mean(tau)):
+                up, down = self.of(u, 4), self.of(-u, 4)
+                now[k] = [*now[k], up[0], up[1], down[1], down[0], up[3], down[3]]
+        now = np.array(now)
+        of_rest = now[:, :4]
+        windows = [(now, 0, 3), (now, 2, 10), (of_rest, 0, 10), (of_rest, 0, 50)]
+        past = [[mean(self.t, rows, k, *ages) for k in range(len(now))] for rows, *ages in windows]
+        return np.concatenate([now, *past, np.ones((len(now), 1))], axis=1)
+
+
+def some_tare(rng, array, noise, holes):
+    """A tare with noise of its own for each taxel, 0 for some; of some taxels nothing is known."""
+    of_each = noise * rng.random(array.shape) * (rng.random(array.shape) < 0.8)
+    pictures = rng.normal(rng.uniform(40, 60, array.shape), of_each, (20, *array.shape))
+    pictures = np.where(array.exists, pictures, 0)
+    tare = json.loads(Tare.take(Frames(pictures, 192 * np.arange(20), unit="ticks", array=array)).to_json())
+    unknown = rng.random(array.exists.size) < holes
+    for name in ("rest", "noise"):
+        tare[name] = [None if hole else value for hole, value in zip(unknown, tare[name], strict=True)]
+    return Tare.from_json(json.dumps(tare))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.sampled_from([(1, 1), (1, 7), (9, 1), (2, 2), (5, 7), (3, 66)]),
+    noise=st.sampled_from([0.0, 0.3, 2.4, 30.0]),
+    floor=st.sampled_from([0.0, 3.0]),
+    least=st.sampled_from([0.3, 5.0]),
+    rest_is=st.sampled_from(["tracked", "tare"]),
+    local_ms=st.sampled_from([(), (50.0,), (50, 300), (0.4, 1e6, 7)]),
+    missing=st.sampled_from([0.0, 0.3]),
+    pause=st.sampled_from([192, 60_000, 3_600_000_000]),
+)
+def test_quantities_are_those_of_numpy(seed, shape, noise, floor, least, rest_is, local_ms, missing, pause):
+    rng = np.random.default_rng(seed)
+    array = Array(*shape, exists=rng.random(shape) >= missing)
+    n = 80
+    tare = some_tare(rng, array, noise, rng.choice([0.0, 0.2]))
+    t = 5 + np.cumsum(rng.choice([100, 192, 2500, pause], n, p=[0.2, 0.7, 0.05, 0.05]))
+    still = np.where(np.isnan(tare.rest), 50, tare.rest) + rng.choice([0.0, 8.0, -6.0], shape)
+    pictures = np.rint(rng.normal(still, noise, (n, *shape)))
+    for _ in range(3):  # presses and releases, quick and slow, and changes that stay
+        first, last = sorted(rng.integers(0, n + 1, 2))
+        y, x = (rng.integers(0, size) for size in shape)
+        pictures[first:last, max(0, y - 1) : y + 2, max(0, x - 1) : x + 2] += rng.choice([-40, 3, 15, 100])
+    stuck = rng.random(shape) < 0.1
+    pictures[n // 2 :, stuck] = rng.choice([0, 150])
+    pictures[: rng.integers(0, n), rng.random(shape) < 0.2] = 0  # no value yet
+    pictures = np.where(array.exists, np.clip(pictures, 0, None), np.nan if missing else 0)
+    encoder = LocalLoad(noise_floor=floor, least_noise=least, rest=rest_is, local_ms=local_ms, tare=tare)
+    found = encoder.values(Frames(pictures, t, unit="ticks", array=array))
+    assert found.shape == (n, len(encoder.quantities)) == (n, 21 + 18 * len(local_ms))
+    pictures = np.nan_to_num(pictures)
+    fewest, most = (Oracle(encoder, t, pictures, array.exists, bound).values() for bound in (4.0001, 3.9999))
+    assert (found >= fewest - 1e-4 * (1 + np.abs(fewest))).all()
+    assert (found <= most + 1e-4 * (1 + np.abs(most))).all()
+
+
+def test_names_and_their_order():
+    names = LocalLoad(local_ms=(50, 300)).quantities
+    assert len(names) == len(set(names)) == 57
+    assert names[:4] == ("area", "largest", "places", "total")
+    assert names[4:10] == tuple(
+        f"{name}, 50 ms" for name in ("area", "largest", "largest below", "area below", "total", "total below")
+    )
+    assert names[16] == "area, mean of 0 to 3 ms ago"
+    assert names[32] == "area, mean of 2 to 10 ms ago"
+    assert names[48:] == (
+        *(f"{name}, mean of 0 to 10 ms ago" for name in names[:4]),
+        *(f"{name}, mean of 0 to 50 ms ago" for name in names[:4]),
+        "clock",
+    )
+
+
+def test_spikes_are_the_logarithm_of_the_quantities():
+    events = touch(np.random.default_rng(3), scenes.ARRAY, repaired=0.1)
+    for encoder in EXAMPLES.values():
+        values, spikes = encoder.values(events), encoder.encode(events)
+        times, trains = spikes.to_numpy()
+        samples = np.rint((times - spikes.start) / encoder.period_ms).astype(int)
+        graded = np.zeros_like(values)
+        graded[samples, trains] = spikes.values
+        assert np.allclose(graded, np.log1p(values), rtol=1e-6)
+        assert len(times) == np.count_nonzero(values)
+        assert (values[:, -1] == 1).all()
+        assert np.isfinite(values).all()
+
+
+def test_values_of_a_tare_in_seconds_are_those_of_one_measured_there():
+    events = touch(np.random.default_rng(4), scenes.ARRAY, n=100)
+    first = int(events.t[0])
+    tare = Tare.take(events, stop_us=first + 2000)
+    assert np.array_equal(LocalLoad(tare=0.002).values(events), LocalLoad(tare=tare).values(events))
+
+
+STILL = np.full((8, 9), 50.0)
+
+
+def largest(pictures, period_us=192, **parameters):
+    frames = Frames(np.array(pictures), np.arange(len(pictures)) * period_us, unit="ticks", array=Array(8, 9))
+    encoder = LocalLoad(tare=rest(Array(8, 9), 50), **parameters)
+    return encoder.values(frames)[:, 1]
+
+
+@pytest.mark.parametrize("at", [((0, 0), (0, 1)), ((3, 4), (4, 5)), ((7, 8), (6, 8)), ((2, 0), (2, 1))])
+def test_a_stuck_taxel_or_a_pair_of_them_does_not_reach_4(at):
+    one, two = STILL.copy(), STILL.copy()
+    one[at[0]] = two[at[0]] = two[at[1]] = 60_000
+    found = largest([STILL, one, two, one])
+    assert found[0] == 0
+    assert (found[1:] > 0).all()
+    assert (found < 4).all()
+
+
+@pytest.mark.parametrize("touched", range(10))
+def test_each_of_nine_neighbours_that_are_touched_adds_1(touched):
+    """Each is clipped to 3 s, and nine of them have a noise of 3 s."""
+    pictures = np.array([STILL, STILL])
+    for k in range(touched):
+        pictures[1, 3 + k // 3, 4 + k % 3] += 10 + k
+    assert largest(pictures).tolist() == [0, pytest.approx(touched)]
+
+
+def test_a_drift_of_a_tick_a_minute_is_followed_and_a_touch_is_not():
+    seconds = 600
+    drift = STILL + np.arange(seconds * 10)[:, None, None] / 600  # 10 pictures a second, 1 tick a minute
+    assert largest(drift, 100_000)[-1] < 0.2
+    assert largest(drift, 100_000, rest="tare")[-1] > 8
+    touched = drift.copy()
+    touched[-20:, 2:5, 3:6] += 40
+    felt = largest(touched, 100_000)
+    assert felt[-21] < 0.2
+    assert (felt[-20:] > 8).all()
+
+
+def test_a_taxel_without_a_value_yet_does_not_hide_a_touch_beside_it():
+    """A board with a noise floor reports no taxel that stays at rest: its value reads 0."""
+    pictures = np.zeros((3, 8, 9))
+    pictures[2, 3, 4] = pictures[2, 3, 5] = 90
+    assert largest(pictures).tolist() == [0, 0, pytest.approx(2.0)]
+
+
+def test_an_older_tare_without_noise_is_refused():
+    older = json.loads(rest(scenes.ARRAY).to_json())
+    del older["noise"]
+    tare = Tare.from_json(json.dumps(older))
+    assert np.isnan(tare.noise).all()
+    with pytest.raises(taxel.ProblemError, match=r"no noise of the taxels .*: take it anew"):
+        LocalLoad(tare=tare).encode(Frames(np.zeros((1, 3, 4)), [0]))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"noise_floor": -1}, "noise_floor is -1"),
+        ({"least_noise": 0}, "least_noise is 0"),
+        ({"rest": "lowest"}, "rest is"),
+        ({"local_ms": (50, 0)}, r"local_ms\[1\] is 0 ms"),
+        ({"local_ms": 50}, "local_ms"),
+        ({"period_ms": 0}, "period_ms is 0"),
+        ({"tare": "soon"}, "tare"),
+    ],
+)
+def test_nonsense_gets_one_clear_line(wrong, said):
+    with refused(said):
+        LocalLoad(**wrong)
+
+
+def test_without_a_tare_nothing_is_encoded():
+    frames = Frames(np.zeros((1, 3, 4)), [0])
+    for call in (lambda x: LocalLoad().stream(x.array), LocalLoad().encode, LocalLoad().values):
+        with pytest.raises(taxel.ProblemError, match="local load without a tare"):
+            call(frames)

@@ -1,0 +1,145 @@
+"""ConeR, OnlineConeR and ConeX on graded trains: against 6.9 to 6.14 stated plainly, and against unsigned trains."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import stated
+import test_cone_r
+from making import made
+from simulator import misfire
+
+from taxel import Neuron, SpikeTrains
+from taxel.learn import ConeR, ConeX, OnlineConeR, check_certificate
+
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+
+def wide(random, n):
+    """Values of either sign over twelve decades."""
+    return random.choice([-1, 1], n) * 10 ** random.uniform(-6, 6, n)
+
+
+def positive(patterns):
+    """The patterns with every value made positive."""
+    return [SpikeTrains(p.times, p.offsets, p.start, p.stop, abs(p.values), kind="graded") for p in patterns]
+
+
+def ones(patterns):
+    return [SpikeTrains(p.times, p.offsets, p.start, p.stop, np.ones(len(p.times)), kind="graded") for p in patterns]
+
+
+OPTIONS = [
+    {},
+    {"after_spike": "reset"},
+    {"after_spike": "ignore", "refractory": 6.0, "norm": "square", "divide_b_by": "targets"},
+    {"lambdas": (4, 0, 100, 100, 80), "step_ms": 0.5},
+    {"kernel": "double_exponential", "lb": -1.0, "ub": 0.2},
+    {"kernel": "exponential", "lambdas": (0, 0, 1, 1, 1), "margin": 0.05},
+    {"engine": "cone solver"},
+]
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_objective_of_graded_trains_is_that_of_every_row_handed_whole_to_a_solver(options, seed, monkeypatch):
+    patterns, targets = test_cone_r.examples(seed, whole_ms=seed == 2)
+    patterns = stated.graded(patterns, seed)
+    cone = made(ConeR, tau=12.0, **options).fit(patterns, targets)
+    rows = tuple(test_cone_r.statement(cone, patterns, targets))
+    silent = tuple(test_cone_r.statement(cone, positive(patterns), targets))[3]
+    sizes = (*map(np.abs, rows[:3]), silent, rows[4])
+    normalised = test_cone_r.shares
+    monkeypatch.setattr(test_cone_r, "shares", lambda cone, _: normalised(cone, sizes))
+    value = test_cone_r.shares(cone, rows) * test_cone_r.terms(cone, rows, cone.weights_)
+    assert list(cone.parts_.values()) == pytest.approx(list(value), rel=1e-9, abs=1e-12)
+    assert cone.status_ == "solved"
+    assert cone.objective_ == pytest.approx(test_cone_r.least(cone, rows), rel=1e-6)
+    assert (cone.weights_ < 0).any()
+    assert (cone.weights_ > 0).any()
+
+
+def test_a_target_that_only_negative_weights_reach_is_reachable():
+    one = SpikeTrains.from_lists([[10.0]], stop=60.0, values=[[-1.0]], kind="graded")
+    for lb, ub, unreachable in ((-2.0, 0.0, []), (0.0, 2.0, [(0, 0)])):
+        assert made(ConeR, lb=lb, ub=ub, tau=10.0).fit([one], [[18.0]]).unreachable_ == unreachable
+
+
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
+@pytest.mark.parametrize("decades", [1, 6])
+def test_what_is_solved_fires_at_its_targets_and_what_is_not_is_proven(time, after_spike, decades):
+    solved = refuted = 0
+    for seed in (0, 3, 5):
+        patterns, targets = stated.examples(seed, trains=5 + 8 * seed, patterns=3, targets=1, whole_ms=time == "grid")
+        values = wide if decades == 6 else lambda random, n: random.choice([-1, 1], n) * 10 ** random.uniform(-1, 1, n)
+        patterns = stated.graded(patterns, seed, values)
+        # On a grid a margin keeps the points beside targets below the threshold.
+        margin = {"margin": 1e-3} if time == "grid" else {}
+        cone = made(ConeX, time=time, after_spike=after_spike, lb=-2, ub=2, **margin).fit(patterns, targets)
+        if cone.status_ == "solved":
+            solved += 1
+            for pattern, wanted in zip(patterns, targets, strict=True):
+                if time == "continuous":
+                    assert misfire(cone.neuron_, cone.weights_, pattern, wanted, pattern.stop) is None
+                else:
+                    assert np.allclose(cone.neuron_.run(cone.weights_, pattern), wanted, rtol=0, atol=1e-6)
+        else:
+            refuted += 1
+            assert cone.status_ == "infeasible", (seed, cone.status_)
+            proof, problem = cone.certificate_, cone.problem_
+            assert check_certificate(problem, proof)
+            for row in proof.rows:
+                coefficients, _ = problem.row(row)
+                own = patterns[row.pattern]
+                at = row.at if row.kind == "silence" else targets[row.pattern][int(row.at)]
+                if row.kind != "slope":
+                    fired = [t for t in targets[row.pattern] if t < at]
+                    plain = stated.row(cone, own, at, fired)
+                    assert np.allclose(coefficients, plain, rtol=1e-9, atol=1e-12 * abs(own.values).max())
+    assert solved
+    assert refuted
+
+
+def test_inputs_with_other_values_are_other_inputs():
+    """Two patterns with the same times and other values: one fires and one is silent, which unsigned ones cannot."""
+    times = [[10.0], [12.0]]
+    a, b = (SpikeTrains.from_lists(times, stop=80.0, values=[[v], [1.0]], kind="graded") for v in (1.0, 0.2))
+    cone = ConeX(neuron=Neuron(tau=10.0), lb=-5, ub=5)
+    assert cone.fit([a, b], [[18.0], []]).status_ == "solved"
+    same = [SpikeTrains(one.times, one.offsets, one.start, one.stop) for one in (a, b)]
+    assert cone.fit(same, [[18.0], []]).status_ == "infeasible"
+
+
+@pytest.mark.parametrize("kind", [ConeR, ConeX])
+@pytest.mark.parametrize("options", [{}, {"after_spike": "reset", "time": "grid"}, {"kernel": "double_exponential"}])
+def test_values_of_1_give_the_bits_of_unsigned_trains(kind, options):
+    for seed in range(3):
+        patterns, targets = stated.examples(seed, trains=30, patterns=3, targets=1)
+        plain, graded = (made(kind, lb=-2, ub=2, **options).fit(p, targets) for p in (patterns, ones(patterns)))
+        assert np.array_equal(plain.weights_, graded.weights_, equal_nan=True)
+        assert plain.objective_ == graded.objective_
+        if kind is ConeX and plain.certificate_ is not None:
+            assert plain.certificate_.text == graded.certificate_.text
+
+
+@pytest.mark.parametrize("window", [1, 3])
+def test_a_window_of_graded_patterns_is_a_fit_to_it_from_nothing(window):
+    patterns, targets = stated.examples(7, trains=20, patterns=7, targets=1)
+    patterns = stated.graded(patterns, 7)
+    online = made(OnlineConeR, window=window, tau=12.0, tolerance=3e-7)
+    for k, (pattern, wanted) in enumerate(zip(patterns, targets, strict=True)):
+        online.partial_fit(pattern, wanted)
+        own = slice(max(0, k + 1 - window), k + 1)
+        cold = made(ConeR, tau=12.0, tolerance=3e-7).fit(patterns[own], targets[own])
+        assert online.status_ == "solved"
+        assert online.objective_ == pytest.approx(cold.objective_, rel=1e-6, abs=1e-12)
+
+
+def test_scaling_the_values_scales_the_weights_that_are_needed():
+    patterns, targets = stated.examples(3, trains=40, patterns=2, targets=1)
+    for factor in (0.125, 8.0):
+        scaled = stated.graded(patterns, 0, lambda _, n, factor=factor: np.full(n, factor))
+        plain = ConeX(lb=-2, ub=2, neuron=Neuron(tau=10.0)).fit(patterns, targets)
+        other = ConeX(lb=-2 / factor, ub=2 / factor, neuron=Neuron(tau=10.0)).fit(scaled, targets)
+        assert np.allclose(other.weights_ * factor, plain.weights_, rtol=1e-5, atol=1e-9)

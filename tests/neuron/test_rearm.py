@@ -1,0 +1,195 @@
+"""`Neuron(rearm=)` against a simulator that sums kernels point by point; cut into pieces, in files, live; refusals."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refusal import refused
+
+import taxel
+from taxel import Neuron, SpikeTrains
+from taxel.detect import Readout, run
+from taxel.encode import LevelCrossing
+from taxel.learn import ConeR, ConeX, OnlineConeR
+
+#: A potential this far below a level counts as at it, in thresholds.
+AT = 1e-11
+
+
+def simulated(neuron: Neuron, weights: np.ndarray, trains: SpikeTrains, threshold: float) -> list[float]:
+    """Each grid point in turn: the potential as a sum over all inputs, whether it arms the neuron, whether it fires."""
+    pairs = sorted((s, n) for n, train in enumerate(trains) for s in train)
+    at, size = np.array([s for s, _ in pairs]), np.array([weights[n] for _, n in pairs])
+    start, armed, fired = trains.start, True, []
+    tau_rec = 2 * neuron.tau if neuron.tau_rec is None else neuron.tau_rec
+    for k in range(int((trains.stop - start) / neuron.step_ms + 1e-9) + 1):
+        t = start + k * neuron.step_ms
+        counts = at < t
+        for spike in fired:
+            end = spike + neuron.refractory + 1e-6
+            if neuron.after_spike == "reset":
+                counts &= at > end
+            if neuron.after_spike == "ignore":
+                counts &= (at <= spike + 1e-6) | (at > end)
+        d = (t - at[counts]) / neuron.tau
+        potential = (size[counts] * (np.exp(-d) if neuron.kernel == "exponential" else d * np.exp(-d))).sum()
+        last = fired[-1] if fired else (start if neuron.first_threshold == "printed" else None)
+        level = neuron.theta_0
+        if last is not None and t - last - neuron.refractory >= -1e-9:
+            level += neuron.theta_plus * np.exp(-(t - last - neuron.refractory) / tau_rec)
+        level *= threshold
+        if not armed:
+            armed = potential < neuron.rearm * level - AT * neuron.theta_0
+        elif potential >= level - AT * neuron.theta_0 and not (fired and t <= fired[-1] + neuron.refractory + 1e-9):
+            fired.append(t)
+            armed = neuron.rearm is None
+    return fired
+
+
+@st.composite
+def problems(draw: st.DrawFn) -> tuple[Neuron, np.ndarray, SpikeTrains, float]:
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    inputs, length = draw(st.integers(1, 12)), draw(st.sampled_from([40.0, 400.0]))
+    exact = draw(st.booleans())
+    if exact:
+        # An input has the same effect on the next point and none on later ones, and weights are quarters of it: many
+        # potentials are exactly at a threshold, or at a share of it.
+        shape = {"kernel": "exponential", "tau": 1.0 / (50.0 * np.log(2.0)), "theta_0": 2.0**-50}
+        shape |= {"theta_plus": 0.0, "step_ms": 1.0}
+        weights = rng.integers(-1, 5, inputs) * 0.25
+    else:
+        shape = {
+            "kernel": draw(st.sampled_from(["alpha", "exponential"])),
+            "tau": draw(st.sampled_from([2.0, 15.0, 60.0])),
+            "theta_plus": draw(st.sampled_from([0.0, 0.2])),
+            "step_ms": draw(st.sampled_from([1.0, 0.3])),
+        }
+        weights = rng.normal(0.2, 0.5, inputs)
+    neuron = Neuron(
+        time="grid",
+        rearm=draw(st.sampled_from([None, 1.0, 0.5, 0.25, 0.9, 0.01])),
+        after_spike=draw(st.sampled_from(["keep", "keep", "ignore", "reset"])),
+        first_threshold=draw(st.sampled_from(["theta_0", "printed"])),
+        refractory=draw(st.sampled_from([3.0, 0.7, 12.0])),
+        **shape,
+    )
+    lists = [np.sort(rng.uniform(-5.0, length, rng.poisson(length / (4 if exact else 12)))) for _ in range(inputs)]
+    if exact or draw(st.booleans()):
+        lists = [np.floor(times) for times in lists]
+    return neuron, weights, SpikeTrains.from_lists(lists, -5.0, length), draw(st.sampled_from([1.0, 0.5]))
+
+
+@settings(max_examples=200, deadline=None)
+@given(problems())
+def test_a_neuron_fires_as_the_simulator_does(problem: tuple[Neuron, np.ndarray, SpikeTrains, float]) -> None:
+    neuron, weights, trains, threshold = problem
+    assert neuron.run(weights, trains, threshold=threshold) == pytest.approx(
+        simulated(neuron, weights, trains, threshold), abs=1e-9
+    )
+
+
+def test_a_potential_that_just_reaches_the_share_is_not_below_it() -> None:
+    """An input of 1 halves with every ms: .5 at 2 ms, where it fires, .25 at 3 ms; the next is felt at 4 ms."""
+    trains = SpikeTrains.from_lists([[1.0, 3.0]], 0.0, 30.0)
+    neuron = Neuron(
+        time="grid", kernel="exponential", tau=1.0 / np.log(2.0), theta_0=0.5, theta_plus=0.0, refractory=0.5
+    )
+    for rearm, fired in ((None, [2.0, 4.0]), (0.5, [2.0]), (0.500001, [2.0, 4.0]), (1.0, [2.0, 4.0])):
+        assert neuron.set_params(rearm=rearm).run([1.0], trains).tolist() == fired
+
+
+def test_an_object_that_rests_is_one_spike_and_a_factor_on_the_threshold_moves_the_share() -> None:
+    rest = SpikeTrains.from_lists([np.arange(0.0, 400.0, 2.0)], 0.0, 900.0)
+    neuron = Neuron(time="grid", tau=10.0, rearm=0.5)
+    assert len(Neuron(time="grid", tau=10.0).run([0.1], rest)) > 20
+    assert len(neuron.run([0.1], rest)) == len(neuron.run([0.1], rest, threshold=0.5)) == 1
+    # Two rates: between them the potential rests at about .26 mV, which is below half of .6 but not of .3 mV.
+    two = SpikeTrains.from_lists(
+        [np.concatenate([np.arange(0, 200, 1.0), np.arange(200, 400, 4.0), np.arange(400, 600)])]
+    )
+    assert len(neuron.run([0.1], two, threshold=2.0)) == 2
+    assert len(neuron.run([0.1], two)) == 1
+
+
+def readout() -> Readout:
+    weights = np.random.default_rng(2).normal(0.1, 0.4, 32)
+    one = Neuron(tau=3.0, refractory=5.0, time="grid", step_ms=0.2, rearm=0.4)
+    other = Neuron(tau=9.0, refractory=5.0, time="grid", step_ms=0.2)
+    neurons = {"a": (one, weights), "b": (other, weights)}
+    return Readout(LevelCrossing([0.3, 0.6]), neurons, array=taxel.Array(2, 4), run_threshold=0.9)
+
+
+def pictures() -> taxel.Frames:
+    random = np.random.default_rng(8)
+    times = np.arange(0, 4_000_000, 2000)
+    phase = random.uniform(0, 6, (1, 2, 4))
+    values = np.abs(np.sin(times[:, None, None] / 2e5 + phase)) + random.normal(0, 0.02, (len(times), 2, 4))
+    return taxel.Frames(values, times, array=taxel.Array(2, 4))
+
+
+def test_files_hold_it_and_readouts_stream_it(tmp_path) -> None:
+    one = readout()
+    again = Readout.load(one.save(tmp_path / "one.json"))
+    assert again == one
+    assert again.neurons["a"].neuron.rearm == 0.4
+    kept = json.loads(one.to_json())["neurons"]
+    assert kept["a"]["neuron"]["rearm"] == 0.4
+    assert "rearm" not in kept["b"]["neuron"], "a file without it is as it was"
+    frames = pictures()
+    found = run(again, frames)
+    trains = one.encoder.encode(frames).split_by_sign()
+    for label, trained in one.neurons.items():
+        offset = one.encoder.latency_ms + trained.delay_ms
+        fired = trained.neuron.run(trained.weights, trains, threshold=0.9) - offset
+        here = found.t[np.array([name == label for name in found.label])] / 1000.0
+        assert len(here) > 5
+        assert here[: len(fired)] == pytest.approx(fired, abs=1e-3)
+    free = Readout.from_json(
+        json.dumps(
+            json.loads(one.to_json())
+            | {"neurons": kept | {"a": {**kept["a"], "neuron": {**kept["a"]["neuron"], "rearm": None}}}}
+        )
+    )
+    assert len(run(free, frames).t) > len(found.t)
+    pieces, stream = [], again.stream(frames.array)
+    for k in range(0, len(frames.t), 37):
+        pieces += list(stream.push(frames[k : k + 37]).t)
+    pieces += list(stream.advance(int(frames.t[-1]) + 1_100_000).t)
+    assert pieces == found.t.tolist()
+
+
+def test_training_keeps_its_rows_and_the_trained_neuron_runs_with_it() -> None:
+    trains = SpikeTrains.from_lists([[20.0 + n] for n in range(20)], stop=150.0)
+    options = {"tau": 30.0, "theta_plus": 0.0, "time": "grid"}
+    learner = {"lambdas": (0, 1, 0, 1000, 0)}
+    with pytest.warns(UserWarning, match="fires again"):
+        free = ConeR(neuron=Neuron(**options), **learner).fit([trains], [[45.0]])
+    bound = ConeR(neuron=Neuron(**options, rearm=0.5), **learner).fit([trains], [[45.0]])
+    online = OnlineConeR(window=2, neuron=Neuron(**options, rearm=0.5), **learner).fit([trains], [[45.0]])
+    for cone in (bound, online):
+        assert cone.weights_ == pytest.approx(free.weights_, abs=1e-9)
+        assert cone.silent_rows_ == free.silent_rows_
+        assert cone.refires_ == 0
+        assert cone.predict([trains])[0].tolist() == free.predict([trains])[0][:1].tolist()
+    assert free.refires_ > 0
+
+
+@pytest.mark.parametrize("rearm", [0.0, -0.5, 1.0001, float("nan"), float("inf"), "half", [0.5]])
+def test_a_share_outside_its_range_is_refused(rearm: object) -> None:
+    with refused("rearm"):
+        Neuron(time="grid", rearm=rearm)
+
+
+def test_who_cannot_have_it_refuses_it_by_name(tmp_path) -> None:
+    with refused('rearm is 0.5 and time "continuous"'):
+        Neuron(rearm=0.5)
+    with refused("rearm is 0.5: CONE-X"):
+        ConeX(neuron=Neuron(time="grid", rearm=0.5))
+    pytest.importorskip("nir")
+    with refused("NIR: rearm of 'a' is 0.4"):
+        readout().to_nir(tmp_path / "one.nir")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,133 @@
+"""Graded spike trains: values that are refused, files, and trains of several kinds joined."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from taxel import SpikeTrains
+from taxel._core import FormatError, ProblemError
+
+from .test_spikes import some
+
+
+def graded(*values: float) -> SpikeTrains:
+    return SpikeTrains(np.arange(len(values), dtype=float), [0, len(values)], 0.0, 10.0, values, kind="graded")
+
+
+def values_of(trains: SpikeTrains, n: int) -> list[float]:
+    values = np.ones(len(trains.times), np.float32) if trains.values is None else trains.values
+    return values[trains.offsets[n] : trains.offsets[n + 1]].tolist()
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(some())
+def test_a_file_keeps_the_kind(tmp_path: Path, trains: SpikeTrains) -> None:
+    back = SpikeTrains.load(trains.save(tmp_path / "a.npz", overwrite=True))
+    assert back == trains
+    assert back.kind == trains.kind
+    with np.load(tmp_path / "a.npz") as file:
+        assert ("kind" in file, "values" in file) == (trains.kind == "graded", trains.kind != "unsigned")
+
+
+def test_files_without_a_kind_are_signed_if_they_have_values(tmp_path: Path) -> None:
+    columns = {"times": [1.0, 2.0], "offsets": [0, 2], "start": 0.0, "stop": 3.0}
+    np.savez(tmp_path / "a.npz", **columns)
+    np.savez(tmp_path / "b.npz", **columns, values=np.float32([-1, 0]))
+    np.savez(tmp_path / "c.npz", **columns, values=np.float32([-1, 2]), kind="wavy")
+    np.savez(tmp_path / "d.npz", **columns, values=np.float32([-1, 0]), kind="graded")
+    np.savez(tmp_path / "e.npz", **columns, kind="graded")
+    assert SpikeTrains.load(tmp_path / "a.npz").kind == "unsigned"
+    assert SpikeTrains.load(tmp_path / "b.npz").kind == "signed"
+    for name, text in (("c", "kind is 'wavy'"), ("d", r"values\[1\] is 0"), ("e", "graded trains need values")):
+        with pytest.raises(FormatError, match=text):
+            SpikeTrains.load(tmp_path / f"{name}.npz")
+
+
+def test_nwb_files_and_neo_trains_without_a_kind_are_signed(tmp_path: Path) -> None:
+    signed = SpikeTrains.from_lists([[1.0], [2.0]], stop=5.0, values=[[0.5], [-3.0]])
+    pytest.importorskip("neo")
+    assert SpikeTrains.from_neo(signed.to_neo()).kind == "signed"
+    pynwb = pytest.importorskip("pynwb")
+    assert SpikeTrains.from_nwb(signed.to_nwb(tmp_path / "a.nwb")).kind == "signed"
+    two = SpikeTrains.from_lists([[1.0], [2.0]], stop=5.0, values=[[0.5], [-3.0]], kind="graded")
+    with pynwb.NWBHDF5IO(two.to_nwb(tmp_path / "b.nwb"), "r+") as io:
+        assert list(io.read().units["value_kind"][:]) == ["graded", "graded"]
+        io.read().units["value_kind"].data[1] = "signed"
+    with pytest.raises(FormatError, match="different value_kind"):
+        SpikeTrains.from_nwb(tmp_path / "b.nwb")
+
+
+@pytest.mark.parametrize(
+    ("values", "kind", "text"),
+    [
+        ([1.0, float("nan")], "graded", r"values\[1\] is nan: must be finite"),
+        ([1.0, float("-inf")], "graded", r"values\[1\] is -inf: must be finite"),
+        ([1e39, 1.0], "graded", r"values\[0\]"),
+        ([1.0, 0.0], "graded", r"values\[1\] is 0: a graded value of 0 is no spike"),
+        ([1.0, -0.0], "graded", r"values\[1\] is 0"),
+        ([1.0, 1e-60], "graded", r"values\[1\]"),
+        ([1.0], "graded", "values: must be one a spike, 2"),
+        (None, "graded", "graded trains need values"),
+        (None, "signed", "signed trains need values"),
+        ([1.0, 1.0], "unsigned", "unsigned trains have no values"),
+        ([1.0, 1.0], "loud", "kind is 'loud': must be one of unsigned, signed, graded"),
+        ([1.0, 1.0], 3, "kind is 3"),
+    ],
+)
+def test_values_must_be_those_of_the_kind(values: object, kind: object, text: str) -> None:
+    with pytest.raises(ProblemError, match=text):
+        SpikeTrains([1.0, 2.0], [0, 2], 0.0, 5.0, values, kind=kind)
+
+
+@given(some(), some())
+def test_trains_side_by_side_are_the_inputs_of_one_neuron(a: SpikeTrains, b: SpikeTrains) -> None:
+    both = SpikeTrains.side_by_side([a, b])
+    parts = [one.split_by_sign() if one.signed else one for one in (a, b)]
+    assert both.kind == ("graded" if "graded" in (a.kind, b.kind) else "unsigned")
+    assert [t.tolist() for t in both] == [t.tolist() for one in parts for t in one]
+    assert [values_of(both, n) for n in range(len(both))] == [
+        values_of(one, n) for one in parts for n in range(len(one))
+    ]
+
+
+def test_trains_side_by_side_have_a_window_that_holds_all() -> None:
+    both = SpikeTrains.side_by_side([SpikeTrains.from_lists([[1.0]], -2.0, 3.0), SpikeTrains.from_lists([], 0.0, 9.0)])
+    assert (both.start, both.stop) == (-2.0, 9.0)
+    for wrong in ([], [3], 3):
+        with pytest.raises(ProblemError, match="parts"):
+            SpikeTrains.side_by_side(wrong)
+
+
+@given(some(), st.integers(0, 9))
+def test_unsigned_spikes_merged_with_graded_ones_have_the_value_1(trains: SpikeTrains, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    lists = [np.sort(rng.uniform(0, 50, rng.integers(0, 4))) for _ in range(len(trains))]
+    other = SpikeTrains.from_lists(lists, 0.0, 50.0)
+    if trains.signed:
+        with pytest.raises(ProblemError, match="signed and unsigned"):
+            trains + other
+        with pytest.raises(ProblemError, match="graded and signed"):
+            trains + SpikeTrains.from_lists(lists, 0.0, 50.0, [np.ones(len(t)) for t in lists], kind="graded")
+        return
+    both = trains + other
+    assert both.kind == trains.kind
+    for n in range(len(trains)):
+        pairs = [*zip(trains[n], values_of(trains, n), strict=True), *((t, 1.0) for t in other[n])]
+        assert list(zip(both[n], values_of(both, n), strict=True)) == sorted(pairs, key=lambda pair: pair[0])
+
+
+def test_a_graded_train_says_its_kind() -> None:
+    trains = graded(0.5, -2.0)
+    assert repr(trains) == "SpikeTrains(1 train, 2 spikes, graded, 0 to 10 ms)"
+    assert not trains.signed
+    assert trains != SpikeTrains(trains.times, trains.offsets, 0.0, 10.0, trains.values)
+    assert trains.between(0.5, 2.0).kind == trains.select([0, 0]).kind == trains.lasting(99.0).kind == "graded"
+    assert trains.to_pandas()["value"].tolist() == [0.5, -2.0]
+    assert [text.get_text() for text in trains.plot().get_legend().get_texts()] == ["above 0", "below 0"]
+    with pytest.raises(ProblemError, match="outside the window"):
+        trains.lasting(0.5)
