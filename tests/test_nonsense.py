@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from sound import LEFT_OUT, RESULTS, SOUND
 from sound.calibration import CALIBRATION
-from sound.detect import READOUT
+from sound.detect import READOUT, RULE
 from sound.things import EVENTS, FOUND, TARE, TICKS, TRAINS
 
 import taxel
@@ -151,6 +151,7 @@ def somewhere(tmp_path, monkeypatch):
     CALIBRATION.save("here_calibration.json")
     TICKS.save("here_events.calibration.json")
     READOUT.save("here_readout.json")
+    RULE.save("here_rule.json")
     READOUT.to_nir("here.nir")
     TRAINS.to_nwb("here.nwb")
     taxel.convert(EVENTS, "here_events.npz")

@@ -1,10 +1,9 @@
 """Detections against touches, by class."""
 
-import numpy as np
 import pytest
 
-from taxel import Detections, SpikeTrains
-from taxel.demo.judging import CLASSES, LABELS, judge, plain_rule
+from taxel import Detections
+from taxel.demo.judging import CLASSES, LABELS, judge
 from taxel.simulate import Contact
 
 
@@ -62,13 +61,3 @@ def test_a_judgement_without_touches_is_plain_values():
     values = judge(Detections([], [], []), []).to_dict()
     assert values["classes"] == {}
     assert values["false"] == dict.fromkeys(LABELS, 0)
-
-
-def test_the_plain_rule_knows_at_the_end_of_the_frame():
-    """A stamp is floor(1.92 k) units of 100 us: its frame k ends at 192 (k + 1) us."""
-    frames = np.array([3, 260, 1_000, 5_207])
-    stamps = np.floor(1.92 * frames) * 0.1
-    lists = [stamps.tolist()] + [[]] * 4 + [(stamps + 50).round(1).tolist()] + [[]] * 4
-    found = plain_rule(SpikeTrains.from_lists(lists, stop=5_000.0), 192.0)
-    assert found["contact"].known.tolist() == (192 * (frames + 1)).tolist()
-    assert len(found["lift"]) == 4

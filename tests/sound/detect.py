@@ -9,6 +9,7 @@ import taxel
 from sound.things import ARRAY, FOUND, FRAMES, LEVELS, TARE, Sound, fresh, method, plain
 
 READOUT = taxel.Readout(LEVELS, {"a": (taxel.Neuron(tau=2.0), [0.5] * 32)}, array=ARRAY)
+RULE = taxel.detect.PlainRule("area", 2)
 RECIPE = taxel.detect.Recipe(LEVELS, {"tau": 5.0}, {"a": {"ub": 1.0}})
 EXAMPLE = taxel.detect.Example(taxel.Frames(np.eye(4)[:, :, None] * np.ones(4), [0, 9000, 18000, 27000]), {"a": [9000]})
 
@@ -49,6 +50,30 @@ SOUND: dict[str, Sound] = {
     ),
     "taxel.detect.ReadoutStream.push": fresh(read_out, "push", x=FRAMES),
     "taxel.detect.ReadoutStream.advance": fresh(read_out, "advance", t_us=5),
+    "taxel.detect.PlainRule": plain(
+        taxel.detect.PlainRule,
+        quantity="area",
+        threshold=2,
+        release=1.0,
+        frames=1,
+        age_ms=5.0,
+        labels=("small", "large"),
+        noise_floor=3.0,
+        tare=TARE,
+    ),
+    "taxel.detect.PlainRule.from_json": plain(taxel.detect.PlainRule.from_json, text=RULE.to_json()),
+    "taxel.detect.PlainRule.save": method(RULE, "save", path="rule.json", overwrite=True),
+    "taxel.detect.PlainRule.load": plain(taxel.detect.PlainRule.load, path="here_rule.json"),
+    "taxel.detect.PlainRule.stream": method(RULE, "stream", array=ARRAY, frame_us=192.0, tare=TARE, wire_version=2),
+    "taxel.detect.load": plain(taxel.detect.load, path="here_rule.json"),
+    "taxel.detect.tune": plain(
+        taxel.detect.tune,
+        examples=[taxel.detect.Example(FRAMES, {"a": [1000]}, TARE)],
+        labels=["a"],
+        window_ms=50.0,
+        noise_floor=3.0,
+        progress=lambda _: None,
+    ),
     "taxel.detect.run": plain(
         taxel.detect.run, readout=READOUT, source=FRAMES, frame_us=192.0, tare=TARE, wire_version=2
     ),

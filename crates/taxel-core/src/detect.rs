@@ -1,29 +1,41 @@
 //! Detections from spikes, and their scores.
 
+mod detector;
+mod file;
 mod frame_clock;
+mod load_curve;
+mod plain_rule;
 mod readout;
+mod running_rule;
 mod score;
 mod stream;
 mod trained;
 
+pub use detector::Detector;
 pub use frame_clock::{FrameClock, FrameTime};
+pub use load_curve::LoadCurve;
+pub use plain_rule::PlainRule;
 pub use readout::Readout;
+pub use running_rule::Decision;
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
 pub use trained::TrainedNeuron;
 
 use serde::{Deserialize, Serialize};
 
-/// A detection of a readout.
+/// A detection of a readout or a plain rule.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Detection {
-    /// The label of the neuron that fired.
+    /// The label of the neuron that fired, or of what the rule found.
     pub label: String,
-    /// The time of the event by the board's clock, us: the crossing minus the encoder's latency and the trained delay.
+    /// The time of the event by the board's clock, us: the crossing minus the encoder's latency and the trained delay;
+    /// of a rule, the begin or end of the load.
     pub t: i64,
-    /// The earliest time by the board's clock at which the host can know, us: the end of the frame of the crossing.
+    /// The earliest time by the board's clock at which the host can know, us: the end of the frame of the crossing, or
+    /// of the last frame on which the rule rests.
     pub known: i64,
-    /// The slope of potential minus threshold at the crossing, mV/ms: a measure of confidence.
+    /// The slope of potential minus threshold at the crossing, mV/ms: a measure of confidence; not a number
+    /// for a rule.
     pub slope: f64,
     /// Whether the detection may rest on values that states of version 2 repaired: the event may then have happened
     /// before `t`.

@@ -2,6 +2,7 @@
 
 mod blocks;
 mod bracket;
+mod by_stamp;
 mod channels;
 mod fields;
 mod law;
@@ -10,6 +11,7 @@ mod local_sums;
 mod periods;
 mod pieces;
 mod power;
+mod quantity;
 mod recent;
 mod receptor;
 mod running_range;
@@ -23,6 +25,7 @@ use serde_json::{Map, Value};
 
 pub use local_load::LargestSum;
 pub use pieces::Pieces;
+pub use quantity::Quantity;
 pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
 pub use tare::{Tare, TareBuilder, Zeroing};

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use taxel_core::board::Board;
-use taxel_core::detect::{Detection, Readout, TrainedNeuron};
+use taxel_core::detect::{Detection, Detector, Readout, TrainedNeuron};
 use taxel_core::encode::Encoder;
 use taxel_core::neuron::{Neuron, Time};
 use taxel_core::wire::{Command, Decoder, Registers};
@@ -202,7 +202,9 @@ fn detections_live_are_those_of_the_recording() {
     let output: Vec<Detection> = delivered.iter().map(|s| s.detection.clone()).collect();
     let (events, detections) = recorded(&path);
     assert_eq!(detections, output, "the recording has the detections that were output");
-    let mut again = readout(2.0).run_events(events.view(), 192.0, None, &[], Stop::never()).expect("a sound readout");
+    let mut again = Detector::from(readout(2.0))
+        .run_events(events.view(), 192.0, None, &[], Stop::never())
+        .expect("a sound readout");
     // Nothing moved the time on after the last event, and what it would have led to was not output.
     again.retain(|d| Some(&d.t) < events.t.last());
     assert_eq!(again, output);
@@ -343,7 +345,9 @@ fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
     drop(free);
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
-    let mut again = readout(2.0).run_events(expected.view(), 192.0, None, &[], Stop::never()).expect("a sound readout");
+    let mut again = Detector::from(readout(2.0))
+        .run_events(expected.view(), 192.0, None, &[], Stop::never())
+        .expect("a sound readout");
     again.retain(|d| Some(&d.t) < expected.t.last());
     assert!(again.len() > 3, "the presses are detected: {}", again.len());
     assert_eq!(*delivered.lock().expect("not poisoned"), again, "each once, in their order");
@@ -395,7 +399,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     let neuron = Neuron { tau: 0.5, refractory: 15.0, ..Neuron::default() };
     let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, weights });
     let path = Scratch::new("tare.mcap");
-    let setup = ReadoutSetup::Taring(1_000_000, Box::new(readout.clone()));
+    let setup = ReadoutSetup::Taring(1_000_000, Box::new(readout.clone().into()));
     let live = Live::start(ANY, options(Some(&path)), setup, vec![]).expect("a port");
     wait_for(&live, |live| live.counters().taring);
     let array = Array::thesis();
@@ -422,8 +426,9 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     assert_eq!((tare.start_us, tare.stop_us), (0, start));
     assert!(tare.rest.iter().all(|&rest| rest == Some(20.0)));
     assert_eq!(detections.len(), 5, "a press each 208 frames of 1000");
-    let again =
-        readout.run_events(recorded(&path).0.view(), 192.0, Some(&tare), &[], Stop::never()).expect("a sound readout");
+    let again = Detector::from(readout)
+        .run_events(recorded(&path).0.view(), 192.0, Some(&tare), &[], Stop::never())
+        .expect("a sound readout");
     assert_eq!(again, detections);
 }
 

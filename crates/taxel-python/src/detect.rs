@@ -3,9 +3,10 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::detect::{
-    Detection, FrameTime, Readout, ReadoutStream as CoreStream, Reference, Spread, score as score_core,
+    Decision, Detection, Detector, FrameTime, LoadCurve as CoreCurve, PlainRule, Readout, ReadoutStream as CoreStream,
+    Reference, Spread, score as score_core,
 };
-use taxel_core::encode::{Tare, Zeroing};
+use taxel_core::encode::{Quantity, Tare, Zeroing};
 
 use crate::convert::{ArrayParts, EventsIn, FramesIn, array, slice, to_array, to_events, to_frames};
 use crate::enter::{Shared, enter};
@@ -133,12 +134,35 @@ fn check_readout(text: &str) -> PyResult<String> {
     Ok(Readout::from_json(text).map_err(core)?.to_json())
 }
 
-fn parse(readout: &str, tare: Option<&str>) -> PyResult<(Readout, Option<Tare>)> {
-    let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
-    Ok((Readout::from_json(readout).map_err(core)?, tare))
+/// Checks a plain rule's parts; gives the text of its file.
+#[pyfunction]
+fn make_plain_rule(parts: &str) -> PyResult<String> {
+    let rule: PlainRule = parsed("plain rule", parts)?;
+    rule.check().map_err(core)?;
+    Ok(rule.to_json())
 }
 
-/// The detections of a readout in a whole recording of events, with its zeroings: t in us, column, row, rest.
+/// Checks the text of a plain rule's file; gives it with every default filled in.
+#[pyfunction]
+fn check_plain_rule(text: &str) -> PyResult<String> {
+    Ok(PlainRule::from_json(text).map_err(core)?.to_json())
+}
+
+/// Whether the text of a file, of a readout or a plain rule, is a plain rule's; checks it.
+#[pyfunction]
+fn is_plain_rule(text: &str) -> PyResult<bool> {
+    Ok(matches!(Detector::from_json(text).map_err(core)?, Detector::PlainRule(_)))
+}
+
+fn parse(readout: &str, tare: Option<&str>) -> PyResult<(Detector, Option<Tare>)> {
+    Ok((Detector::from_json(readout).map_err(core)?, parse_tare(tare)?))
+}
+
+fn parse_tare(tare: Option<&str>) -> PyResult<Option<Tare>> {
+    tare.map(Tare::from_json).transpose().map_err(core)
+}
+
+/// The detections of a readout or a plain rule in a whole recording of events, with its zeroings: t in us, column, row, rest.
 #[pyfunction]
 fn readout_run_events<'py>(
     py: Python<'py>,
@@ -158,7 +182,7 @@ fn readout_run_events<'py>(
     Ok(from_detections(py, found))
 }
 
-/// The detections of a readout in a whole recording of pictures.
+/// The detections of a readout or a plain rule in a whole recording of pictures.
 #[pyfunction]
 fn readout_run_frames<'py>(
     py: Python<'py>,
@@ -173,7 +197,7 @@ fn readout_run_frames<'py>(
     Ok(from_detections(py, found))
 }
 
-/// A readout at work.
+/// A readout or a plain rule at work.
 #[pyclass(frozen)]
 struct ReadoutStream(Shared<CoreStream>);
 
@@ -225,13 +249,89 @@ impl ReadoutStream {
     }
 }
 
+/// Times (us), times when they were known (us), and quantities.
+type DecisionsOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
+
+fn from_decisions<'py>(py: Python<'py>, found: &[Decision]) -> DecisionsOut<'py> {
+    let column = |of: fn(&Decision) -> i64| array(py, found.iter().map(of).collect());
+    (column(|d| d.t), column(|d| d.known), array(py, found.iter().map(|d| d.value).collect()))
+}
+
+/// A quantity over a recording, on which plain rules are tried.
+#[pyclass(frozen)]
+struct LoadCurve(CoreCurve);
+
+#[pymethods]
+impl LoadCurve {
+    #[staticmethod]
+    fn of_events(
+        py: Python<'_>,
+        quantity: &str,
+        noise_floor: f64,
+        events: EventsIn<'_>,
+        frame_us: f64,
+        wire_version: u8,
+        tare: Option<&str>,
+    ) -> PyResult<Self> {
+        let (quantity, tare, events) = (to_quantity(quantity)?, parse_tare(tare)?, to_events(events)?);
+        let events = events.view()?;
+        let frames = FrameTime::on_wire(frame_us, wire_version);
+        enter(py, |stop| CoreCurve::of_events(quantity, noise_floor, events, frames, tare.as_ref(), stop)).map(Self)
+    }
+
+    #[staticmethod]
+    fn of_frames(
+        py: Python<'_>,
+        quantity: &str,
+        noise_floor: f64,
+        frames: FramesIn<'_>,
+        frame_us: Option<f64>,
+        tare: Option<&str>,
+    ) -> PyResult<Self> {
+        let (quantity, tare, frames) = (to_quantity(quantity)?, parse_tare(tare)?, to_frames(frames)?);
+        let frames = frames.view()?;
+        enter(py, |stop| CoreCurve::of_frames(quantity, noise_floor, frames, frame_us, tare.as_ref(), stop)).map(Self)
+    }
+
+    /// The quantity after each of its changes.
+    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.0.values().collect())
+    }
+
+    /// The begins of loads, then their ends.
+    fn edges<'py>(
+        &self,
+        py: Python<'py>,
+        threshold: f64,
+        release: f64,
+        frames: u32,
+    ) -> PyResult<(DecisionsOut<'py>, DecisionsOut<'py>)> {
+        let found = enter(py, |_| Ok::<_, taxel_core::Error>(self.0.edges(threshold, release, frames)))?;
+        let (begins, ends): (Vec<_>, Vec<_>) = found.into_iter().partition(|one| one.which == 0);
+        Ok((from_decisions(py, &begins), from_decisions(py, &ends)))
+    }
+
+    /// The area at an age of every touch.
+    fn at_age<'py>(&self, py: Python<'py>, age_ms: f64) -> PyResult<DecisionsOut<'py>> {
+        Ok(from_decisions(py, &enter(py, |_| self.0.at_age(age_ms))?))
+    }
+}
+
+fn to_quantity(name: &str) -> PyResult<Quantity> {
+    parsed("quantity", &serde_json::Value::from(name).to_string())
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_detections, module)?)?;
     module.add_function(wrap_pyfunction!(score, module)?)?;
     module.add_function(wrap_pyfunction!(spread, module)?)?;
     module.add_function(wrap_pyfunction!(make_readout, module)?)?;
     module.add_function(wrap_pyfunction!(check_readout, module)?)?;
+    module.add_function(wrap_pyfunction!(make_plain_rule, module)?)?;
+    module.add_function(wrap_pyfunction!(check_plain_rule, module)?)?;
+    module.add_function(wrap_pyfunction!(is_plain_rule, module)?)?;
     module.add_function(wrap_pyfunction!(readout_run_events, module)?)?;
     module.add_function(wrap_pyfunction!(readout_run_frames, module)?)?;
+    module.add_class::<LoadCurve>()?;
     module.add_class::<ReadoutStream>()
 }

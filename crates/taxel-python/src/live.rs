@@ -9,7 +9,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use taxel_core::detect::Readout;
+use taxel_core::detect::Detector;
 use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
@@ -185,7 +185,7 @@ impl Live {
                 .map_err(std::io::Error::other)
             }));
         }
-        let readout = readout.map(Readout::from_json).transpose().map_err(core)?;
+        let readout = readout.map(Detector::from_json).transpose().map_err(core)?;
         let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
         let readout = ReadoutSetup::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;

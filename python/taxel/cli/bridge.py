@@ -30,7 +30,7 @@ from taxel.cli._board import (
     exit_code,
     rest_of,
 )
-from taxel.detect import Readout
+from taxel.detect import load
 from taxel.live import Bridge, Live
 from taxel.live.bridge import PLACE
 from taxel.live.options import LiveOptions
@@ -53,7 +53,7 @@ def bridge(
         list[str] | None, typer.Option(help="HOST:PORT of a Zenoh router to connect to; may be repeated.")
     ] = None,
     readout: Annotated[
-        Path | None, typer.Option(help="A trained readout (JSON), whose detections are published too.")
+        Path | None, typer.Option(help="A trained readout or a plain rule (JSON), whose detections are published too.")
     ] = None,
     tare: TareOption = None,
     record: Annotated[Path | None, typer.Option(help="Record here too, in a new file (.mcap or .lsa).")] = None,
@@ -79,7 +79,7 @@ def bridge(
     """
     if readout is None and tare is not None:
         raise ProblemError("--tare belongs to a readout: give --readout FILE")
-    trained = None if readout is None else Readout.load(readout)
+    trained = None if readout is None else load(readout)
     console = Console(stderr=True, quiet=as_json)
     with (
         Live(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,7 +34,7 @@ def detect(
     recording: Annotated[
         Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5, or a folder of them.")
     ],
-    readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote.")],
+    readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
     frame_us: Annotated[
         float | None,
@@ -53,18 +54,18 @@ def detect(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Detect events in a recording, or in each of a folder, by a trained readout.
+    """Detect events in a recording, or in each of a folder, by a trained readout or a plain rule.
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
     from taxel._base.files import try_whole, write_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import Example, Outcome, Readout, run, score  # noqa: PLC0415
+    from taxel.detect import Example, Outcome, load, run, score  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
 
     for place in (csv, None if report is None else new_report(report)):
         if place is not None:
             try_whole(place, overwrite=overwrite and place == csv)
-    loaded = Readout.load(readout)
+    loaded = load(readout)
     opened = open_all([recording])
     outcomes = []
     with progress(as_json) as update:
@@ -110,7 +111,13 @@ def _result(
         {
             "recording": one.name,
             "detections": [
-                {"label": d.label, "t_us": d.t, "known_us": d.known, "slope_mv_per_ms": d.slope, "repaired": d.repaired}
+                {
+                    "label": d.label,
+                    "t_us": d.t,
+                    "known_us": d.known,
+                    "slope_mv_per_ms": None if isnan(d.slope) else d.slope,
+                    "repaired": d.repaired,
+                }
                 for d in one.found
             ],
         }

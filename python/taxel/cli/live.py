@@ -43,7 +43,7 @@ from taxel.cli._board import (
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.cli._recordings import new_report
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_viewers, spikes_of, state_of, viewers
-from taxel.detect import Readout
+from taxel.detect import PlainRule, Readout, load
 from taxel.detections import Detection
 from taxel.device import Cable
 from taxel.encode import Encoder
@@ -127,7 +127,7 @@ def live(typed: _Typed) -> None:
     """
     spikes = spikes_of(typed.to, typed.encoder, typed.values)
     _together(typed)
-    trained = None if typed.readout is None else Readout.load(typed.readout)
+    trained = None if typed.readout is None else load(typed.readout)
     rest = rest_of(typed.tare)
     _fresh(typed, rest)
     if typed.report is not None:
@@ -210,7 +210,7 @@ def _shown(
     return pipeline if shows is None or shows.live is None else shows.live, external
 
 
-def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | None) -> None:
+def _report(folder: Path, readout: Readout | PlainRule, path: Path, tare: Tare | float | None) -> None:
     """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
     from taxel.detect import Example, Outcome  # noqa: PLC0415

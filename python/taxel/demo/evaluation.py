@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.demo.judging import Judged, judge, plain_rule
-from taxel.detect import Readout, run
+from taxel.demo.judging import Judged, judge
+from taxel.detect import PlainRule, Readout, run
 from taxel.detections import Detections
 from taxel.encode import ContactArea
 from taxel.events import Events
@@ -92,7 +92,8 @@ def evaluate_events(
     area = ContactArea(tare=tare).encode(events)
     area = area.between(to_ms(start), area.stop)
     contacts, force = truth(acts)
-    plain = plain_rule(area, FRAME_US)
+    plain = run(PlainRule("area", 2), events, frame_us=FRAME_US, tare=tare)
+    plain = plain[plain.t >= start]
     return Evaluation(
         readout=readout,
         tare=tare,

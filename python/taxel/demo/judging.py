@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from taxel.detect import Spread, score
 from taxel.detections import Detections
 from taxel.simulate import Contact
-from taxel.spikes import SpikeTrains, to_ms, to_us
+from taxel.spikes import to_ms
 
-__all__ = ["CLASSES", "GOALS", "LABELS", "Judged", "Row", "judge", "plain_rule"]
+__all__ = ["CLASSES", "GOALS", "LABELS", "Judged", "Row", "judge"]
 
 LABELS = ("contact", "lift")
 
@@ -133,25 +133,6 @@ def judge(detections: Detections, contacts: Sequence[Contact]) -> Judged:
         false[label] = mine.t[result.false_detections]
         within[label] = sum(any(c.start_us <= t <= c.stop_us for c in contacts) for t in false[label])
     return Judged(rows, false, within)
-
-
-def plain_rule(area: SpikeTrains, frame_us: float) -> Detections:
-    """Detect contact where two taxels are loaded, and lift where fewer are: the plain rule, without a neuron.
-
-    Parameters
-    ----------
-    area : SpikeTrains
-        Of `ContactArea` with its usual levels: train 0 rises to 2, train 5 falls below.
-    frame_us : float
-        The board's frame, at whose end it is known.
-    """
-    times = np.concatenate([area[0], area[5]])
-    label = np.repeat(LABELS, [len(area[0]), len(area[5])])
-    order = np.argsort(times, kind="stable")
-    t = np.rint(to_us(times[order])).astype(np.int64)
-    # A stamp is its frame's start, cut down to whole 100 us.
-    frame = np.ceil(t / frame_us)
-    return Detections(label[order], t, np.ceil((frame + 1) * frame_us).astype(np.int64))
 
 
 def _plain(values: dict[str, float]) -> dict[str, float | None]:

@@ -1,12 +1,16 @@
 """Spikes to detections, live and from recordings, and their score."""
 
 from taxel.detect.alignment import Alignment
+from taxel.detect.detector import ReadoutStream
 from taxel.detect.examples import Example, Outcome
 from taxel.detect.folds import Fold, Judged, Part, choose, judge
-from taxel.detect.readout import Learner, Readout, ReadoutStream, run
+from taxel.detect.loading import load
+from taxel.detect.plain_rule import PlainRule
+from taxel.detect.readout import Learner, Readout, run
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron
 from taxel.detect.training import Recipe, Trained, train
+from taxel.detect.tuning import tune
 
 __all__ = [
     "Alignment",
@@ -16,6 +20,7 @@ __all__ = [
     "Learner",
     "Outcome",
     "Part",
+    "PlainRule",
     "Readout",
     "ReadoutStream",
     "Recipe",
@@ -25,7 +30,9 @@ __all__ = [
     "TrainedNeuron",
     "choose",
     "judge",
+    "load",
     "run",
     "score",
     "train",
+    "tune",
 ]

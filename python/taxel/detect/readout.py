@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,11 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.arguments import floats, instance, number, parameters, shown, text, whole
-from taxel._base.arguments import path as checked_path
-from taxel._base.arguments import text as checked_text
-from taxel._base.files import write_whole
-from taxel._core import FormatError, NotFittedError, ProblemError
+from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
+from taxel.detect.detector import _Detector, detector, tare_text
 from taxel.detect.exchange import Parts, read_nir, write_nir
 from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
@@ -34,7 +31,7 @@ from taxel.wire import FRAME_US
 #: Detection goes on for so long after the last event, ms.
 SILENCE_MS = 1000.0
 
-__all__ = ["Learner", "Readout", "ReadoutStream", "run"]
+__all__ = ["Learner", "Readout", "run"]
 
 
 class Learner(Protocol):
@@ -44,7 +41,7 @@ class Learner(Protocol):
     weights_: NDArray[np.float64]
 
 
-class Readout:
+class Readout(_Detector):
     """Hold trained neurons with names, and the encoder that they were trained behind.
 
     Parameters
@@ -88,6 +85,8 @@ class Readout:
     Detections(2: contact 1, lift 1; 20979 to 50979 us)
     """
 
+    _WHAT = "readout"
+
     def __init__(
         self,
         encoder: Encoder,
@@ -103,7 +102,7 @@ class Readout:
             raise ProblemError(f"neurons is {shown(neurons)}: must be trained neurons by label, one or more")
         trained = {text("label", label): _trained(label, one, delay_ms) for label, one in neurons.items()}
         first = next(iter(trained.values())).neuron
-        self._text = _core.make_readout(
+        made = _core.make_readout(
             parameters(
                 {
                     "encoder": json.loads(encoder.to_json()),
@@ -123,14 +122,11 @@ class Readout:
                 }
             )
         )
-        self._parts: dict[str, Any] = json.loads(self._text)
+        self._hold(made)
 
-    @classmethod
-    def _from_text(cls, text: str) -> Readout:
-        readout = cls.__new__(cls)
-        readout._text = _core.check_readout(text)
-        readout._parts = json.loads(readout._text)
-        return readout
+    @staticmethod
+    def _check(text: str) -> str:
+        return _core.check_readout(text)
 
     @property
     def encoder(self) -> Encoder:
@@ -175,65 +171,6 @@ class Readout:
     def delays_ms(self) -> NDArray[np.float64]:
         """The delays at each of which every train is an input, ms."""
         return np.array(self._parts.get("delays_ms", [0.0]), np.float64)
-
-    def to_json(self) -> str:
-        """Return the text of its file."""
-        return self._text
-
-    @classmethod
-    def from_json(cls, text: str) -> Readout:
-        """Return the readout that `to_json` wrote.
-
-        Parameters
-        ----------
-        text : str
-
-        Raises
-        ------
-        FormatError : no readout, one of another version, or parts that are invalid
-        """
-        if not isinstance(text, str):
-            raise ProblemError(f"text is {shown(text)}: must be the text of a readout")
-        return cls._from_text(checked_text("text", text))
-
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the readout to a JSON file, whole or not at all, and return its path.
-
-        Parameters
-        ----------
-        path : path
-        overwrite : bool
-            Whether an existing file may be replaced.
-
-        Returns
-        -------
-        Path
-
-        Raises
-        ------
-        FileExistsError : the file is there already and `overwrite` is false
-        """
-        return write_whole(path, lambda file: file.write(self._text.encode() + b"\n"), overwrite=overwrite)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Readout:
-        """Read a readout from the file that `save` wrote: the same to the last bit.
-
-        Parameters
-        ----------
-        path : path
-
-        Raises
-        ------
-        FormatError : no readout, or one of another version (names the file)
-        FileNotFoundError : no such file
-        """
-        try:
-            return cls._from_text(Path(checked_path("path", path)).read_text(encoding="utf-8"))
-        except UnicodeDecodeError:
-            raise FormatError(f"{path}: not text, so no readout") from None
-        except FormatError as error:
-            raise FormatError(f"{path}: {error}") from None
 
     def to_nir(
         self, path: str | os.PathLike[str], *, spike_ms: float | None = None, overwrite: bool = False
@@ -323,40 +260,6 @@ class Readout:
             spike_ms=spike_ms,
         )
 
-    def stream(
-        self,
-        array: Array | None = None,
-        *,
-        frame_us: float = FRAME_US,
-        tare: Tare | None = None,
-        wire_version: int = 1,
-    ) -> ReadoutStream:
-        """Begin to receive piece by piece: the same detections as of the whole, wherever the input is cut.
-
-        Parameters
-        ----------
-        array : Array, optional
-            The sensor; the readout's own where it is left out, or else that of the first piece.
-        frame_us : float, us
-            How long the board's frame (or a picture) lasts; 192 is the board at reset.
-        tare : Tare, optional
-            The taxels' rest, where the encoder needs one and has none.
-        wire_version : int, from 1 to 2
-            Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
-
-        Raises
-        ------
-        ProblemError : another array than it was trained on, or a tare that is missing
-        """
-        return ReadoutStream(self, array, frame_us=frame_us, tare=tare, wire_version=wire_version)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Readout):
-            return NotImplemented
-        return self._parts == other._parts
-
-    __hash__ = None  # type: ignore[assignment]
-
     def __repr__(self) -> str:
         array = self.array
         taxels = "" if array is None else f" on {array.rows} x {array.columns} taxels"
@@ -366,142 +269,24 @@ class Readout:
         )
 
 
-class ReadoutStream:
-    """Read out events or frames piece by piece, as `Readout.stream` begins it.
-
-    Every call returns the detections that became certain by it.
-
-    Parameters
-    ----------
-    readout : Readout
-    array : Array, optional
-        The sensor; the readout's own where it is left out, or else that of the first piece.
-    frame_us : float, us
-        How long the board's frame (or a picture) lasts; 192 is the board at reset.
-    tare : Tare, optional
-        The taxels' rest, where the encoder needs one and has none.
-    wire_version : int, from 1 to 2
-        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
-
-    Raises
-    ------
-    ProblemError : another array than the readout was trained on, or a tare that is missing
-
-    Examples
-    --------
-    >>> from taxel import Array, Frames, Neuron
-    >>> from taxel.encode import LevelCrossing
-    >>> readout = Readout(LevelCrossing([10.0]), {"contact": (Neuron(tau=2.0), [1.0, 0.0])})
-    >>> stream = readout.stream(Array(1, 1), frame_us=10_000)
-    >>> stream.push(Frames([[[0.0]], [[12.0]]], [0, 10_000]))
-    Detections(none)
-    >>> stream.advance(20_000)
-    Detections(1: contact 1; 10979 to 10979 us)
-    """
-
-    def __init__(
-        self,
-        readout: Readout,
-        array: Array | None = None,
-        *,
-        frame_us: float = FRAME_US,
-        tare: Tare | None = None,
-        wire_version: int = 1,
-    ) -> None:
-        self._text = instance("readout", readout, Readout).to_json()
-        self._frame_us = number("frame_us", frame_us, "us")
-        self._tare = _tare(tare)
-        self._version = whole("wire_version", wire_version, 1, 2)
-        self._core: _core.ReadoutStream | None = None
-        array = readout.array if array is None else array
-        if array is not None:
-            self._begin(array)
-
-    def _begin(self, array: Array) -> _core.ReadoutStream:
-        if self._core is None:
-            parts = instance("array", array, Array)._parts()
-            self._core = _core.ReadoutStream(self._text, parts, self._frame_us, self._version, self._tare)
-        return self._core
-
-    def push(self, x: Events | Frames) -> Detections:
-        """Take the next events or frames; one stream takes either, never both.
-
-        An event that is earlier than what came before counts as coming now, and is counted as `late`.
-
-        Parameters
-        ----------
-        x : Events or Frames
-
-        Returns
-        -------
-        Detections
-            Those that became certain by it.
-
-        Raises
-        ------
-        ProblemError : neither, another array's, events without intensities where the encoder reads them, frames out of
-            order
-        """
-        if isinstance(x, Events):
-            return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
-        if isinstance(x, Frames):
-            return Detections._from_parts(self._begin(x.array).push_frames(x._parts()))
-        raise ProblemError(f"x is {shown(x)}: a readout listens to taxel.Events or taxel.Frames")
-
-    def advance(self, t_us: int) -> Detections:
-        """Promise that nothing will come any more before a time; an earlier time changes nothing.
-
-        Parameters
-        ----------
-        t_us : int, us
-            By the board's clock.
-
-        Returns
-        -------
-        Detections
-            Those that became certain by it.
-
-        Raises
-        ------
-        ProblemError : no whole number of us
-        """
-        t = whole("t_us", t_us, -(2**52), 2**52)
-        return Detections([], [], []) if self._core is None else Detections._from_parts(self._core.advance(t))
-
-    @property
-    def now_us(self) -> int | None:
-        """The time up to which all detections have been returned, us; None before any input."""
-        return None if self._core is None else self._core.now
-
-    @property
-    def late(self) -> int:
-        """How many events came later than others with a later time, or later than time was moved on."""
-        return 0 if self._core is None else self._core.late
-
-    @property
-    def potentials(self) -> dict[str, float]:
-        """Each neuron's potential now, mV."""
-        return {} if self._core is None else dict(self._core.potentials)
-
-
 def run(
-    readout: Readout,
+    readout: _Detector,
     source: Recording | Events | Frames | SpikeTrains,
     *,
     frame_us: float | None = None,
     tare: Tare | None = None,
     wire_version: int | None = None,
 ) -> Detections:
-    """Return what a readout detects in a whole recording: the same as it would have detected live.
+    """Return what a readout or a plain rule detects in a whole recording: the same as it would have detected live.
 
     Time moves on for a second of silence after the end, so that what came last is detected too. Taxels that were
     zeroed while a recording was made (`Recording.zeroings`) are zeroed here as well; its events alone are not.
 
     Parameters
     ----------
-    readout : Readout
+    readout : Readout or PlainRule
     source : Recording, Events, Frames or SpikeTrains
-        Spike trains are those that the readout's encoder makes: a crossing is `known` when it happens, and nothing else
+        Spike trains are those that a readout's encoder makes: a crossing is `known` when it happens, and nothing else
         of this signature applies.
     frame_us : float, us, optional
         How long the board's frame lasts, at whose end a crossing is `known`. Left out: what the recording's registers
@@ -531,10 +316,10 @@ def run(
     >>> found.t, found.known
     (array([10479]), array([20000]))
     """
-    text = instance("readout", readout, Readout).to_json()
+    text = detector("readout", readout).to_json()
     period = None if frame_us is None else number("frame_us", frame_us, "us")
     version = None if wire_version is None else whole("wire_version", wire_version, 1, 2)
-    rest, zeroings = _tare(tare), []
+    rest, zeroings = tare_text(tare), []
     if isinstance(source, Recording):
         if source.registers is not None:
             period = source.registers.frame_us if period is None else period
@@ -542,6 +327,8 @@ def run(
         zeroings = [(one.t, one.x, one.y, one.rest) for one in source.zeroings] if source.has_events else []
         source = recorded(source)
     if isinstance(source, SpikeTrains):
+        if not isinstance(readout, Readout):
+            raise ProblemError(f"source is {shown(source)}: a plain rule reads a recording, events or frames")
         return _run_spikes(readout, source)
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
@@ -567,10 +354,6 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
         )
         detections += Detections([label] * len(spikes), t, known, slopes)
     return detections[np.argsort(detections.known, kind="stable")]
-
-
-def _tare(tare: Tare | None) -> str | None:
-    return None if tare is None else instance("tare", tare, Tare).to_json()
 
 
 def _trained(label: str, one: Any, delay_ms: float | Mapping[str, float]) -> TrainedNeuron:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import math
 import socket
 import time
 from typing import Any
@@ -160,6 +161,5 @@ def _described(detection: Detection) -> str:
     known = f"known {to_ms(detection.known - detection.t):.2f} ms after the event"
     if detection.latency is None:
         return f"{detection.label}: {known}"
-    return (
-        f"{detection.label}: {known}, output {to_ms(detection.latency):.2f} ms later, slope {detection.slope:g} mV/ms"
-    )
+    slope = "" if math.isnan(detection.slope) else f", slope {detection.slope:g} mV/ms"
+    return f"{detection.label}: {known}, output {to_ms(detection.latency):.2f} ms later{slope}"

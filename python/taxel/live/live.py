@@ -62,11 +62,12 @@ class Live:
         at 5.2 kHz; a remote board reports its own.
     differences : bool
         Whether the board sends differences for intensities (the panel's "delta intensity").
-    readout : Readout, optional
+    readout : Readout or taxel.detect.PlainRule, optional
         The readout of the events. Without one nothing is detected.
     tare : Tare or float (s), optional
-        For a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event on, which
-        ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
+        For a plain rule, or a readout whose encoder needs one: a tare, or how long to take a fresh one from the first
+        event on, which ends early where the board marks a start. The board must be at rest then, with its noise floor
+        at 0.
     record : path, optional
         A new file: `.mcap` for all data, `.lsa` for the raw bytes of the manual.
     record_later : bool
@@ -140,7 +141,7 @@ class Live:
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
         inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in sources if how.startswith(_LSL)}
         self._inlets = list(inlets.values())
-        self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
+        self._labels = None if readout is None else list(readout.labels)
         receivers: list[Callable[[Detection], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
         feed = None if remote is None else remote._fed(options.queue_bytes)

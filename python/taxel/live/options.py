@@ -15,7 +15,8 @@ from taxel._base.arguments import path as checked_path
 from taxel._base.options import option
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect import Readout
+from taxel.detect import PlainRule, Readout
+from taxel.detect.detector import detector
 from taxel.live.remote import Remote
 from taxel.live.sending import PORT
 from taxel.tare import Tare
@@ -51,7 +52,9 @@ class LiveOptions:
         f'The board\'s registers: one of {QUOTED_PRESETS}. Default: "5.2 kHz"; with --from, the bridge reports them.',
     )
     differences: bool = option(_DEFAULT.differences, "The board sends intensity differences.")
-    readout: Readout | None = option(None, "A trained readout (JSON), as taxel train writes it; the panel needs none.")
+    readout: Readout | PlainRule | None = option(
+        None, "A trained readout (JSON), as taxel train writes it, or a plain rule; the panel needs none."
+    )
     tare: Tare | float | None = option(
         None,
         "Rest of the taxels: seconds at rest at the beginning, or the file of a saved tare (JSON).",
@@ -93,7 +96,7 @@ class LiveOptions:
             self.readout, self.remote, self.array, self.registers, self.differences,
         )  # fmt: skip
         if readout is not None:
-            instance("readout", readout, Readout)
+            detector("readout", readout)
         if remote is not None:
             instance("remote", remote, Remote)
             array = remote.array if array is None else array

@@ -16,11 +16,11 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
-from taxel._base.arguments import instance
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect import Alignment, Outcome, Readout, Score
+from taxel.detect import Alignment, Outcome, PlainRule, Readout, Score
+from taxel.detect.detector import detector
 from taxel.detect.examples import array_of
 from taxel.report.charts import INK, STYLE, chart
 from taxel.report.page import render
@@ -52,7 +52,7 @@ class _Moment(NamedTuple):
 
 def write_listening(
     folder: str | os.PathLike[str],
-    readout: Readout,
+    readout: Readout | PlainRule,
     listened: Sequence[Outcome],
     *,
     title: str,
@@ -66,7 +66,8 @@ def write_listening(
     ----------
     folder : path
         New, or empty.
-    readout : Readout
+    readout : Readout or PlainRule
+        A rule has neither potential nor weights to draw.
     listened : sequence of Outcome, one or more
     title : str
     judged : str
@@ -85,7 +86,7 @@ def write_listening(
     FileExistsError : the folder holds a report already
     OSError : the folder cannot be made
     """
-    instance("readout", readout, Readout)
+    detector("readout", readout)
     if not listened:
         raise ProblemError("listened is empty: there is nothing to report")
     place = Path(folder)
@@ -95,8 +96,7 @@ def write_listening(
     with mpl.rc_context(STYLE):
         drawn = {
             label: {
-                "potential": _drawn(_potential(readout, listened, label, moments[label], aligned.get(label))),
-                "weights": _drawn(_weights(readout, listened[0], label)),
+                **_of_neuron(readout, listened, label, moments[label], aligned.get(label)),
                 "errors": _drawn(_errors(listened, label)),
                 "moved": _drawn(_moved(aligned.get(label))),
             }
@@ -121,6 +121,22 @@ def write_listening(
         scored=any(one.score is not None for one in listened),
     )
     return write_whole(place / "report.html", lambda file: file.write(text.encode()))
+
+
+def _of_neuron(
+    readout: Readout | PlainRule,
+    listened: Sequence[Outcome],
+    label: str,
+    moments: list[_Moment],
+    alignment: Alignment | None,
+) -> dict[str, Markup | None]:
+    """Return the drawings of a label's neuron; a plain rule has none."""
+    if isinstance(readout, PlainRule):
+        return {"potential": None, "weights": None}
+    return {
+        "potential": _drawn(_potential(readout, listened, label, moments, alignment)),
+        "weights": _drawn(_weights(readout, listened[0], label)),
+    }
 
 
 def _drawn(figure: Figure | None) -> Markup | None:

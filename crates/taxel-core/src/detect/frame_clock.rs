@@ -1,4 +1,5 @@
-//! The earliest time at which the host can know of an event: the end of the board's frame in which the event happens.
+//! The frames of a board, or of pictures: the number of a time's frame, and the end of that frame, which is the earliest
+//! time at which the host can know of an event in it.
 
 use crate::wire::STAMP_US;
 use crate::{Result, problem};
@@ -37,8 +38,16 @@ impl From<f64> for FrameTime {
 pub struct FrameClock {
     period_ns: i128,
     stamp_ns: i128,
-    /// The time of the last picture, if the input is pictures; without pictures the board's frames start at time 0.
-    picture_ns: Option<i128>,
+    /// The last picture, if the input is pictures; without pictures the board's frames start at time 0.
+    picture: Option<Picture>,
+}
+
+/// A picture, which is a frame of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Picture {
+    start_ns: i128,
+    /// The number of pictures before it.
+    number: i64,
 }
 
 impl FrameClock {
@@ -53,12 +62,13 @@ impl FrameClock {
             return Err(problem!("frame_us is {period_us}: must lie between 1 us and one hour, 3600000000"));
         }
         let stamp_ns = i128::from(stamp_us) * 1000;
-        Ok(Self { period_ns: (period_us * 1000.0).round() as i128, stamp_ns, picture_ns: None })
+        Ok(Self { period_ns: (period_us * 1000.0).round() as i128, stamp_ns, picture: None })
     }
 
     /// Aligns frames with the picture at `t` us, which is the start of its frame, from now on.
     pub fn picture(&mut self, t: i64) {
-        self.picture_ns = Some(i128::from(t) * 1000);
+        let number = self.picture.map_or(0, |last| last.number + 1);
+        self.picture = Some(Picture { start_ns: i128::from(t) * 1000, number });
     }
 
     /// The end of the frame to which the time `t` ms belongs, us, rounded up.
@@ -66,17 +76,55 @@ impl FrameClock {
     pub fn end_of(&self, t: f64) -> i64 {
         // In whole ns, because rounding must not move a time that equals a stamp into the frame before.
         let t = (t * 1e6).round() as i128;
-        let end = match self.picture_ns {
-            Some(picture) => picture + ((t - picture).div_euclid(self.period_ns) + 1) * self.period_ns,
-            None => {
-                let next_stamp = (t.div_euclid(self.stamp_ns) + 1) * self.stamp_ns;
-                // The last frame that starts before the next stamp; it ends at the start of its successor.
-                next_stamp.div_euclid(self.period_ns) * self.period_ns
-                    + if next_stamp.rem_euclid(self.period_ns) == 0 { 0 } else { self.period_ns }
+        let end = match self.picture {
+            Some(Picture { start_ns, .. }) => {
+                start_ns + ((t - start_ns).div_euclid(self.period_ns) + 1) * self.period_ns
             }
+            None => (self.board_frame(t) + 1) * self.period_ns,
         };
-        i64::try_from(end.div_euclid(1000) + i128::from(end.rem_euclid(1000) > 0)).unwrap_or(i64::MAX)
+        whole_us(end)
     }
+
+    /// The number of the frame to which the time `t` us belongs; with pictures, of the last picture.
+    #[must_use]
+    pub fn number_of(&self, t: i64) -> i64 {
+        self.picture.map_or_else(|| self.board_frame(i128::from(t) * 1000) as i64, |last| last.number)
+    }
+
+    /// The number of the first frame that may still change if no input before `t` us follows.
+    #[must_use]
+    pub fn open_at(&self, t: i64) -> i64 {
+        match self.picture {
+            Some(last) => last.number + i64::from(i128::from(t) * 1000 > last.start_ns),
+            None => self.number_of(t),
+        }
+    }
+
+    /// Whether the frame that holds at `at` us is complete if no input before `t` us follows.
+    #[must_use]
+    pub fn is_over(&self, at: i64, t: i64) -> bool {
+        if self.picture.is_some() { at < t } else { self.number_of(at) < self.number_of(t) }
+    }
+
+    /// The end of the frame with this number, us, rounded up; of pictures, that of the last one.
+    #[must_use]
+    pub fn end_of_number(&self, number: i64) -> i64 {
+        whole_us(match self.picture {
+            Some(last) => last.start_ns + self.period_ns,
+            None => (i128::from(number) + 1) * self.period_ns,
+        })
+    }
+
+    /// The number of the last of the board's frames that starts before the stamp after `t` ns.
+    fn board_frame(&self, t: i128) -> i128 {
+        let next_stamp = (t.div_euclid(self.stamp_ns) + 1) * self.stamp_ns;
+        -(-next_stamp).div_euclid(self.period_ns) - 1
+    }
+}
+
+/// Whole us, rounded up.
+fn whole_us(ns: i128) -> i64 {
+    i64::try_from(ns.div_euclid(1000) + i128::from(ns.rem_euclid(1000) > 0)).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

@@ -5,19 +5,15 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::above_0;
-use crate::detect::{Detection, FrameClock, FrameTime, ReadoutStream, TrainedNeuron};
-use crate::encode::{Encoder, Tare, Zeroing};
+use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainedNeuron};
+use crate::encode::{Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
-use crate::{Array, Error, EventsView, FramesView, Result, SpikeKind, Stop, problem};
+use crate::{Array, Error, Result, SpikeKind, problem};
 
 mod file;
 #[cfg(test)]
 mod tests;
-
-/// The time that a recording is continued after its last event or picture, us: longer than any input can keep a
-/// potential rising (the slowest neuron of Table 6.2 peaks after 190 ms).
-const SILENCE_US: i64 = 1_000_000;
 
 /// Trained neurons with labels, the encoder with which they were trained, and the conditions of their training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -167,68 +163,10 @@ impl Readout {
         Ok(ReadoutStream::new(encoder, array.clone(), clock, self.run_threshold, delays_ms, neurons))
     }
 
-    /// The time that a recording is continued after its end, us.
-    fn silence_us(&self) -> i64 {
-        SILENCE_US + us(self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
+    /// The time by which its neurons receive the last spike later than the last input, us.
+    pub(super) fn reach_us(&self) -> i64 {
+        us(self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
     }
-
-    /// The detections of a whole recording of events with taxels that a person zeroed, continued by a second of
-    /// silence.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Readout::stream`], [`ReadoutStream::zero`], [`ReadoutStream::push_events`] and
-    /// [`EventsView::check_order`]; `Interrupted` if asked to stop.
-    pub fn run_events(
-        &self,
-        events: EventsView<'_>,
-        frames: impl Into<FrameTime>,
-        tare: Option<&Tare>,
-        zeroings: &[Zeroing],
-        stop: Stop<'_>,
-    ) -> Result<Vec<Detection>> {
-        let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
-        let mut stream = self.stream(events.array, frames, tare)?;
-        zeroings.iter().try_for_each(|zeroing| stream.zero(zeroing))?;
-        events.check_order()?;
-        let mut found = stream.push_recording(events, stop)?;
-        stream.advance(last.saturating_add(self.silence_us()), &mut found)?;
-        Ok(found)
-    }
-
-    /// The detections of a whole recording of pictures, continued for a second with the last picture. Frames last
-    /// `frame_us`, or by default the median distance between pictures.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`Readout::stream`] and [`ReadoutStream::push_frames`]; `Interrupted` if asked to stop.
-    pub fn run_frames(
-        &self,
-        frames: FramesView<'_>,
-        frame_us: Option<f64>,
-        tare: Option<&Tare>,
-        stop: Stop<'_>,
-    ) -> Result<Vec<Detection>> {
-        let frame_us = match frame_us {
-            Some(given) => given,
-            None => usual_distance(frames.t)?,
-        };
-        let last = frames.t.last().copied().unwrap_or(0);
-        let mut stream = self.stream(frames.array, frame_us, tare)?;
-        let mut found = stream.push_frames(frames, stop)?;
-        stream.advance(last.saturating_add(self.silence_us()), &mut found)?;
-        Ok(found)
-    }
-}
-
-/// The median distance between pictures, us.
-fn usual_distance(t: &[i64]) -> Result<f64> {
-    let mut apart: Vec<u64> = t.windows(2).map(|w| w[1].abs_diff(w[0])).collect();
-    if apart.is_empty() {
-        return Err(problem!("{} picture(s) do not say how long a frame lasts: give frame_us", t.len()));
-    }
-    let middle = apart.len() / 2;
-    Ok(*apart.select_nth_unstable(middle).1 as f64)
 }
 
 fn at(label: &str, error: Error) -> Error {

@@ -2,18 +2,22 @@
 
 use std::collections::VecDeque;
 
+use crate::detect::running_rule::RunningRule;
 use crate::detect::{Detection, FrameClock, TrainedNeuron};
 use crate::encode::{Stream, Zeroing};
-use crate::neuron::{NeuronStream, OutputSpike};
-use crate::spikes::{ms, us};
-use crate::{Array, EventsView, FramesView, Result, Spike, SpikeKind, Stop, problem};
+use crate::spikes::ms;
+use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
 
+mod labelled_rule;
 mod named_neuron;
+mod neurons;
 mod repairs;
 #[cfg(test)]
 mod tests;
 
+use labelled_rule::LabelledRule;
 use named_neuron::NamedNeuron;
+use neurons::Neurons;
 use repairs::Repairs;
 
 /// The number of events between two checks of [`Stop`].
@@ -22,7 +26,7 @@ const PIECE: usize = 65_536;
 /// Beyond this distance from 0, a time in ms no longer resolves whole us in a neuron.
 const FARTHEST_US: i64 = 1 << 52;
 
-/// A readout as a stream: events or pictures in, detections out.
+/// A readout or a plain rule as a stream: events or pictures in, detections out.
 ///
 /// A crossing becomes a detection once no earlier input can follow: after a later event, or after the caller advanced
 /// time by [`ReadoutStream::advance`]. Detections depend neither on how the input is divided nor on when time is
@@ -31,20 +35,23 @@ const FARTHEST_US: i64 = 1 << 52;
 pub struct ReadoutStream {
     encoder: Box<dyn Stream>,
     array: Array,
-    neurons: Vec<NamedNeuron>,
+    decides: Decides,
     clock: FrameClock,
     /// The time before which no input can follow, us.
     now: Option<i64>,
-    /// The delays at which each train enters the neurons, ms.
-    delays_ms: Vec<f64>,
-    /// Spikes of the encoder that are not yet assigned to inputs.
+    /// Spikes of the encoder that were not yet passed on.
     emitted: Vec<Spike>,
-    /// Spikes assigned to inputs that wait for possibly earlier spikes, and whether each may rest on a repaired event.
-    waiting: Vec<(Spike, bool)>,
     repairs: Repairs,
     /// Taxels to be zeroed, in order of time, each after all events up to its time.
     zeroings: VecDeque<Zeroing>,
     late: u64,
+}
+
+/// What turns the encoder's spikes into detections.
+#[derive(Clone)]
+enum Decides {
+    Neurons(Neurons),
+    Rule(LabelledRule),
 }
 
 impl ReadoutStream {
@@ -58,9 +65,24 @@ impl ReadoutStream {
     ) -> Self {
         let latency_ms = encoder.latency_ms();
         let neurons = neurons.map(|(label, one)| NamedNeuron::new(label, one, threshold, latency_ms)).collect();
+        Self::of(encoder, array, clock, Decides::Neurons(Neurons::new(neurons, delays_ms)))
+    }
+
+    /// A stream of a plain rule: `loads` emits the changes of its quantities.
+    pub(super) fn of_rule(
+        loads: Box<dyn Stream>,
+        array: Array,
+        clock: FrameClock,
+        rule: RunningRule,
+        labels: [Option<String>; 2],
+    ) -> Self {
+        Self::of(loads, array, clock, Decides::Rule(LabelledRule::new(rule, labels)))
+    }
+
+    fn of(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, decides: Decides) -> Self {
         let repairs = Repairs::within(encoder.hears_repaired_ms());
-        let (emitted, waiting, zeroings) = (vec![], vec![], VecDeque::new());
-        Self { encoder, array, neurons, clock, now: None, delays_ms, emitted, waiting, repairs, zeroings, late: 0 }
+        let (emitted, zeroings) = (vec![], VecDeque::new());
+        Self { encoder, array, decides, clock, now: None, emitted, repairs, zeroings, late: 0 }
     }
 
     /// Processes the next events and appends the detections that are final now to `out`.
@@ -154,9 +176,13 @@ impl ReadoutStream {
         self.now
     }
 
-    /// The label and present potential of each neuron, mV.
+    /// The label and present potential of each neuron, mV; a plain rule has none.
     pub fn potentials(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.neurons.iter().map(|one| (one.label.as_str(), one.stream.as_ref().map_or(0.0, NeuronStream::potential)))
+        let neurons = match &self.decides {
+            Decides::Neurons(neurons) => Some(neurons),
+            Decides::Rule(_) => None,
+        };
+        neurons.into_iter().flat_map(Neurons::potentials)
     }
 
     /// Processes a recording of events, checking `stop` between pieces.
@@ -221,58 +247,23 @@ impl ReadoutStream {
         }
     }
 
-    /// Advances the neurons to `until` us, before which every spike is known.
+    /// Passes the encoder's spikes on, up to `until` us, before which every spike is known.
     fn settle(&mut self, until: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.now = Some(self.now.map_or(until, |now| now.max(until)));
-        let until_ms = ms(until);
-        self.sort_to_inputs();
-        // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
-        self.repairs.forget_before(until_ms);
-        self.waiting.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
-        let certain = self.waiting.partition_point(|(spike, _)| spike.t < until_ms);
-        let mut crossings: Vec<(OutputSpike, usize, bool)> = Vec::new();
-        for (k, one) in self.neurons.iter_mut().enumerate() {
-            for (spike, repaired) in &self.waiting[..certain] {
-                one.push(*spike)?;
-                if *repaired {
-                    // Crossings up to here cannot rest on the repaired taxel.
-                    one.drain_crossings(k, &mut crossings);
-                    one.repaired = Some(spike.t);
-                }
+        let emitted = std::mem::take(&mut self.emitted);
+        let spikes = emitted.into_iter().map(|spike| (spike, self.repairs.may_give(spike.t)));
+        match &mut self.decides {
+            Decides::Neurons(neurons) => {
+                neurons.receive(spikes, self.encoder.trains(), self.encoder.kind());
+                // The encoder has emitted all spikes before `until`, so repairs too far in the past no longer matter.
+                self.repairs.forget_before(ms(until));
+                neurons.settle(ms(until), &self.clock, out)
             }
-            if let Some(stream) = &mut one.stream {
-                stream.advance(until_ms, &mut one.crossings);
-            }
-            one.drain_crossings(k, &mut crossings);
-        }
-        self.waiting.drain(..certain);
-        crossings.sort_by(|a, b| a.0.t.total_cmp(&b.0.t));
-        out.extend(crossings.into_iter().map(|(OutputSpike { t, slope, .. }, k, repaired)| Detection {
-            label: self.neurons[k].label.clone(),
-            t: us(t - self.neurons[k].offset_ms).round() as i64,
-            known: self.clock.end_of(t),
-            slope,
-            repaired,
-        }));
-        Ok(())
-    }
-
-    /// Assigns the encoder's spikes to the neurons' inputs.
-    ///
-    /// The order of trains is that of training: of signed trains all ON, then all OFF (`SpikeTrains::split_by_sign`),
-    /// and all of these once for each delay.
-    fn sort_to_inputs(&mut self) {
-        let trains = u32::try_from(self.encoder.trains()).unwrap_or(u32::MAX);
-        let kind = self.encoder.kind();
-        let inputs = if kind == SpikeKind::Signed { 2 * trains } else { trains };
-        for spike in std::mem::take(&mut self.emitted) {
-            let repaired = self.repairs.may_give(spike.t);
-            let off = kind == SpikeKind::Signed && spike.value <= 0.0;
-            let input = if off { trains + spike.train } else { spike.train };
-            let value = if kind == SpikeKind::Graded { spike.value } else { 1.0 };
-            for (copy, delay) in (0_u32..).zip(&self.delays_ms) {
-                let delayed = Spike { t: spike.t + delay, train: copy * inputs + input, value };
-                self.waiting.push((delayed, repaired));
+            Decides::Rule(rule) => {
+                rule.receive(spikes);
+                self.repairs.forget_before(ms(until));
+                rule.settle(until, &self.clock, out);
+                Ok(())
             }
         }
     }

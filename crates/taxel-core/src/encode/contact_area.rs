@@ -3,18 +3,16 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Next, blocks, in_blocks};
-use super::channels::Channels;
+use super::blocks::Block;
+use super::by_stamp::{ByStamp, Measure};
 use super::law::Law;
 use super::loaded::Loaded;
-use super::sampled::Source;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
-use crate::held::Held;
 use crate::parameters::Described;
 use crate::spikes::ms;
-use crate::{Array, EventsView, Result, Spike, SpikeKind, problem};
+use crate::{Array, Result, Spike, SpikeKind, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.
 ///
@@ -64,16 +62,9 @@ impl Law for ContactArea {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        Ok(Box::new(Area {
-            levels: self.levels.clone(),
-            loaded: Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?,
-            reported: 0,
-            held: Held::all(blocks(array.len()) * BLOCK, 0.0),
-            changed: vec![false; blocks(array.len())],
-            // Channels are all places here; `loaded` defines which taxels exist.
-            channels: Channels::new(&Array { exists: None, ..array.clone() }),
-            source: Source::Unknown,
-        }))
+        let crossings = Crossings { levels: self.levels.clone(), reported: 0 };
+        let loaded = Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?;
+        Ok(Box::new(ByStamp::new(crossings, loaded, array)))
     }
 
     fn trains(&self, _array: &Array) -> usize {
@@ -89,22 +80,22 @@ impl Law for ContactArea {
     }
 }
 
+/// Crossings of levels by the area.
 #[derive(Clone)]
-struct Area {
+struct Crossings {
     levels: Vec<u32>,
-    loaded: Loaded,
     /// The area at the end of the last stamp.
     reported: u32,
-    held: Held<f32>,
-    changed: Vec<bool>,
-    channels: Channels,
-    source: Source,
 }
 
-impl Area {
-    /// Ends the stamp at `t` us: emits a spike for each level that the area has crossed since the previous stamp.
-    fn say(&mut self, t: i64, out: &mut Vec<Spike>) {
-        let (before, now) = (self.reported, self.loaded.area());
+impl Measure for Crossings {
+    fn trains(&self) -> usize {
+        2 * self.levels.len()
+    }
+
+    /// Emits a spike for each level that the area has crossed since the previous stamp.
+    fn emit(&mut self, t: i64, loaded: &Loaded, _held: &[Block], out: &mut Vec<Spike>) {
+        let (before, now) = (self.reported, loaded.area());
         if before == now {
             return;
         }
@@ -119,98 +110,5 @@ impl Area {
             }
         }
         self.reported = now;
-    }
-}
-
-impl Stream for Area {
-    fn fork(&self) -> Box<dyn Stream> {
-        Box::new(self.clone())
-    }
-
-    fn late(&self) -> u64 {
-        self.source.late()
-    }
-
-    fn trains(&self) -> usize {
-        2 * self.levels.len()
-    }
-
-    fn kind(&self) -> SpikeKind {
-        SpikeKind::Unsigned
-    }
-
-    fn latency_ms(&self) -> f64 {
-        0.0
-    }
-
-    fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()> {
-        self.channels.check(events)?;
-        let Some(intensity) = &events.intensity else {
-            return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
-        };
-        let Some(mut present) = self.source.events(events.t)? else { return Ok(()) };
-        for k in 0..events.len() {
-            if events.t[k] > present {
-                self.say(present, out);
-                present = events.t[k];
-            }
-            if intensity.present[k] {
-                let place = events.array.index(events.x[k], events.y[k]);
-                let value = f32::from(intensity.ticks[k]);
-                self.held.set(place, value);
-                self.loaded.take(place, value);
-            }
-        }
-        Ok(())
-    }
-
-    fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {
-        self.advance(t, out);
-        self.loaded.set_rest(place, rest);
-        match self.source {
-            // Marks the block as changed, so that it is computed with the new rest in the next frame.
-            Source::Frames { .. } => self.changed[place / BLOCK] = true,
-            _ => self.loaded.take(place, self.held.values()[place]),
-        }
-    }
-
-    fn rest(&self, place: usize) -> Option<f64> {
-        self.loaded.rest(place)
-    }
-
-    fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
-        self.source.frame(t)?;
-        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut Next::after(values))?;
-        for (block, values) in in_blocks(self.held.values()).iter().enumerate() {
-            if std::mem::take(&mut self.changed[block]) {
-                self.loaded.take_block(block, values);
-            }
-        }
-        self.say(t, out);
-        Ok(())
-    }
-
-    fn advance(&mut self, t: i64, out: &mut Vec<Spike>) {
-        match &mut self.source {
-            Source::Unknown => {}
-            Source::Frames { open } => *open = t.max(*open),
-            Source::Events { present, .. } => {
-                let stamp = *present;
-                if t > stamp {
-                    *present = t;
-                    self.say(stamp, out);
-                }
-            }
-        }
-    }
-
-    fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64> {
-        let end = match self.source {
-            Source::Unknown => return None,
-            Source::Events { present, .. } => present,
-            Source::Frames { open } => open - 1,
-        };
-        self.advance(end + 1, out);
-        Some(ms(end))
     }
 }

@@ -137,6 +137,19 @@ pub(super) struct Loaded {
     rest: Rest<f64>,
 }
 
+/// Sums over the taxels that count.
+#[derive(Default)]
+pub(super) struct Sums {
+    /// Sum of the values above rest.
+    pub(super) total: f64,
+    /// Largest value above rest.
+    pub(super) peak: f64,
+    /// Sum of the columns, weighted by the values above rest.
+    pub(super) x: f64,
+    /// Sum of the rows, likewise.
+    pub(super) y: f64,
+}
+
 impl Loaded {
     /// Starts with no taxel loaded; `what` names the encoder in an error.
     pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
@@ -163,8 +176,29 @@ impl Loaded {
     }
 
     /// Difference between a value and a place's rest.
-    pub(super) fn above(&self, place: usize, value: f32) -> f64 {
+    fn above(&self, place: usize, value: f32) -> f64 {
         self.rest.above(place, f64::from(value))
+    }
+
+    /// Sums over the taxels that count, from the values of all places; they are added in the order of places.
+    pub(super) fn sums(&self, held: &[Block]) -> Sums {
+        let (mut sums, columns) = (Sums::default(), self.places.columns);
+        if self.area() == 0 {
+            return sums;
+        }
+        let places = self.places.neighbours.len();
+        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.any(block)) {
+            for (place, &value) in (block * BLOCK..places).zip(values) {
+                if self.counts(place) {
+                    let above = self.above(place, value);
+                    sums.total += above;
+                    sums.peak = sums.peak.max(above);
+                    sums.x += above * (place % columns) as f64;
+                    sums.y += above * (place / columns) as f64;
+                }
+            }
+        }
+        sums
     }
 
     /// Updates the value of a place.
@@ -188,5 +222,5 @@ impl std::ops::Deref for Loaded {
 
 /// The tare of an encoder that needs one; `what` names the encoder in an error.
 pub(super) fn given<'a>(what: &str, tare: Option<&'a Tare>) -> Result<&'a Tare> {
-    tare.ok_or_else(|| problem!("{what} without a tare: take one at rest and give it to the encoder"))
+    tare.ok_or_else(|| problem!("{what} without a tare: take one at rest and give it as tare"))
 }

@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::blocks::{BLOCK, Block, Next};
+use super::blocks::{Block, Next};
 use super::law::Law;
-use super::loaded::Loaded;
+use super::loaded::{Loaded, Sums};
 use super::periods::micros;
 use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
@@ -172,8 +172,6 @@ impl Law for Moments {
         let levels = self.all_levels();
         let passing = Passing {
             loaded,
-            places: array.len(),
-            columns: usize::from(array.columns),
             pitch_mm: array.pitch_mm,
             touch: None,
             moments: [0.0; 5],
@@ -230,9 +228,6 @@ impl Level {
 #[derive(Clone)]
 struct Passing {
     loaded: Loaded,
-    /// Number of places of the array.
-    places: usize,
-    columns: usize,
     pitch_mm: f64,
     /// When the current touch began, us, and its centre then, in taxels.
     touch: Option<(i64, [f64; 2])>,
@@ -261,18 +256,7 @@ impl Passing {
             (self.touch, self.moments) = (None, [0.0; 5]);
             return;
         }
-        let (mut total, mut peak, mut x, mut y) = (0.0, 0.0_f64, 0.0, 0.0);
-        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.loaded.any(block)) {
-            for (place, &value) in (block * BLOCK..self.places).zip(values) {
-                if self.loaded.counts(place) {
-                    let above = self.loaded.above(place, value);
-                    total += above;
-                    peak = peak.max(above);
-                    x += above * (place % self.columns) as f64;
-                    y += above * (place / self.columns) as f64;
-                }
-            }
-        }
+        let Sums { total, peak, x, y } = self.loaded.sums(held);
         let centre = [x / total, y / total];
         let (_, origin) = *self.touch.get_or_insert((t, centre));
         let way = |axis: usize| (centre[axis] - origin[axis]) * self.pitch_mm;

@@ -1,6 +1,6 @@
 //! A sensor at rest, from which a tare is computed.
 
-use taxel_core::detect::{FrameTime, Readout, ReadoutStream};
+use taxel_core::detect::{Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, TareBuilder};
 use taxel_core::{Events, Intensities, Result};
 
@@ -8,7 +8,7 @@ use taxel_core::{Events, Intensities, Result};
 /// any duration, it stores only the last event of each taxel, that is, the taxel's value.
 pub(super) struct Rest {
     stretch_us: i64,
-    readout: Box<Readout>,
+    readout: Box<Detector>,
     builder: TareBuilder,
     first: Option<i64>,
     last: Vec<Option<Last>>,
@@ -23,7 +23,7 @@ struct Last {
 }
 
 impl Rest {
-    pub(super) fn new(stretch_us: i64, readout: Box<Readout>, array: &taxel_core::Array) -> Self {
+    pub(super) fn new(stretch_us: i64, readout: Box<Detector>, array: &taxel_core::Array) -> Self {
         let builder = TareBuilder::new(array, None);
         Self { stretch_us, readout, builder, first: None, last: vec![None; array.len()], array: array.clone() }
     }

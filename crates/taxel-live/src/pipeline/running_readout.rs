@@ -1,7 +1,7 @@
 //! Encodes events and runs the readout: in the decoding thread, or in a separate one.
 
 use taxel_core::Events;
-use taxel_core::detect::{Detection, FrameTime, Readout, ReadoutStream};
+use taxel_core::detect::{Detection, Detector, FrameTime, ReadoutStream};
 use taxel_core::encode::{Tare, Zeroing};
 
 use super::ahead::Ahead;
@@ -15,11 +15,11 @@ use super::shared::Shared;
 pub enum ReadoutSetup {
     /// Nothing: datagrams are received and recorded only.
     None,
-    /// A readout.
+    /// A readout or a plain rule.
     Reading(Box<ReadoutStream>),
-    /// A readout that first measures a tare: from the first event on for so long (us of the board's clock), or until the
+    /// A readout or a plain rule that first measures a tare: from the first event on for so long (us of the board's clock), or until the
     /// board marks a start.
-    Taring(i64, Box<Readout>),
+    Taring(i64, Box<Detector>),
 }
 
 impl ReadoutSetup {
@@ -28,9 +28,9 @@ impl ReadoutSetup {
     ///
     /// # Errors
     ///
-    /// As [`Readout::stream`].
+    /// As [`Detector::stream`].
     pub fn of(
-        readout: Option<Readout>,
+        readout: Option<Detector>,
         tare: Option<&Tare>,
         tare_us: Option<i64>,
         options: &LiveOptions,

@@ -4,9 +4,11 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 
 use super::*;
-use crate::encode::ContactArea;
+use crate::detect::Detector;
+use crate::detect::detector::SILENCE_US;
+use crate::encode::{ContactArea, Zeroing};
 use crate::neuron::Neuron;
-use crate::{Events, Intensities};
+use crate::{Events, Intensities, Stop};
 
 fn readout() -> Readout {
     let neuron = Neuron { tau: 0.5, time: Time::Grid, step_ms: 0.192, ..Neuron::default() };
@@ -174,7 +176,9 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
             }
         }
         let run = |events: &Events, zeroings: &[Zeroing]| {
-            readout.run_events(events.view(), 192.0, Some(&tare), zeroings, Stop::never()).unwrap()
+            Detector::from(readout.clone())
+                .run_events(events.view(), 192.0, Some(&tare), zeroings, Stop::never())
+                .unwrap()
         };
         let said = run(&events, &zeroings);
         assert_eq!(said, run(&low, &[]), "seed {seed}, {name}");

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 
 use super::*;
 use crate::neuron::{AfterSpike, Neuron, Time};
-use crate::{Events, Intensities};
+use crate::{Events, Intensities, SpikeKind};
 
 /// An encoder that turns each event into a signed spike of its taxel's train at its stamp, and a picture into a spike
 /// of each loaded taxel.

@@ -1,0 +1,48 @@
+//! The files of readouts and plain rules: JSON with the name and version of its format.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::{Error, Result, reading};
+
+/// The version of each format that is written; there is no other so far.
+const VERSION: u64 = 1;
+
+/// Reads the text of a file of one of `formats`; returns the format and the other contents.
+///
+/// # Errors
+///
+/// `Format`, beginning with `what`, if the text is not JSON, or if its format or version is another.
+pub(super) fn parts(what: &str, text: &str, formats: &[&'static str]) -> Result<(&'static str, Value)> {
+    let format = |said: String| Error::Format(format!("{what}: {said}"));
+    let names = formats.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
+    let mut value: Value = reading::from_text(text).map_err(|unfit| Error::Format(unfit.of(what)))?;
+    let Some(object) = value.as_object_mut() else {
+        return Err(format("not a JSON object".to_owned()));
+    };
+    let stated = object.remove("format");
+    let Some(stated) = stated else {
+        return Err(format(format!("does not say \"format\": {names}, so it is none")));
+    };
+    let Some(&name) = formats.iter().find(|&&name| stated == name) else {
+        return Err(format(format!("format is {stated}, must be {names}")));
+    };
+    match object.remove("version") {
+        Some(version) if version.as_u64() == Some(VERSION) => Ok((name, value)),
+        Some(version) => Err(format(format!("version {version}, this taxel reads version {VERSION} only"))),
+        None => Err(format(format!("says no version, must be {VERSION}"))),
+    }
+}
+
+/// The text of a file; reading it returns exactly the same numbers.
+pub(super) fn text(format: &str, parts: &impl Serialize) -> String {
+    #[derive(Serialize)]
+    struct File<'a, T> {
+        format: &'a str,
+        version: u64,
+        #[serde(flatten)]
+        parts: &'a T,
+    }
+    // Serialising can fail only for numbers that are not finite, which the checks exclude.
+    serde_json::to_string_pretty(&File { format, version: VERSION, parts }).unwrap_or_default()
+}

@@ -1,0 +1,123 @@
+//! A quantity over a whole recording, on which many plain rules are tried without encoding it again.
+
+use crate::detect::detector::{SILENCE_US, usual_distance};
+use crate::detect::running_rule::{Decision, Limits, RunningRule};
+use crate::detect::{FrameClock, FrameTime};
+use crate::encode::{Quantity, Tare};
+use crate::spikes::us;
+use crate::{EventsView, FramesView, Result, Spike, Stop, problem};
+
+/// The number of events, or of pictures, between two checks of [`Stop`].
+const PIECE: usize = 16_384;
+
+/// The changes of a quantity in a recording.
+pub struct LoadCurve {
+    quantity: Quantity,
+    changes: Vec<Spike>,
+    /// The time of each picture, us; none for events.
+    pictures: Vec<i64>,
+    clock: FrameClock,
+    period_us: f64,
+    /// The time of the last input, us.
+    last: i64,
+}
+
+impl LoadCurve {
+    /// The quantity in a recording of events.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Quantity::stream`], [`FrameClock::new`] and [`EventsView::check_order`]; `Interrupted` if asked to
+    /// stop.
+    pub fn of_events(
+        quantity: Quantity,
+        noise_floor: f64,
+        events: EventsView<'_>,
+        frames: FrameTime,
+        tare: Option<&Tare>,
+        stop: Stop<'_>,
+    ) -> Result<Self> {
+        let mut stream = Quantity::stream(&[quantity], events.array, tare, noise_floor)?;
+        let clock = FrameClock::new(frames)?;
+        events.check()?;
+        events.check_order()?;
+        let mut changes = vec![];
+        for piece in events.pieces(PIECE) {
+            stop.check()?;
+            stream.push_events(piece, &mut changes)?;
+        }
+        stream.finish(&mut changes);
+        let last = events.t.iter().copied().max().unwrap_or(0);
+        Ok(Self { quantity, changes, pictures: vec![], clock, period_us: frames.period_us, last })
+    }
+
+    /// The quantity in a recording of pictures, which last `frame_us`, or by default their median distance.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Quantity::stream`], [`FrameClock::new`] and [`FramesView::check`]; `Interrupted` if asked to stop.
+    pub fn of_frames(
+        quantity: Quantity,
+        noise_floor: f64,
+        frames: FramesView<'_>,
+        frame_us: Option<f64>,
+        tare: Option<&Tare>,
+        stop: Stop<'_>,
+    ) -> Result<Self> {
+        let mut stream = Quantity::stream(&[quantity], frames.array, tare, noise_floor)?;
+        let period_us = frame_us.map_or_else(|| usual_distance(frames.t), Ok)?;
+        let clock = FrameClock::new(period_us)?;
+        frames.check()?;
+        let mut changes = vec![];
+        for (k, (t, picture)) in frames.iter().enumerate() {
+            if k % PIECE == 0 {
+                stop.check()?;
+            }
+            stream.push_frame(t, picture, &mut changes)?;
+        }
+        let last = frames.t.last().copied().unwrap_or(0);
+        Ok(Self { quantity, changes, pictures: frames.t.to_vec(), clock, period_us, last })
+    }
+
+    /// The quantity after each of its changes.
+    pub fn values(&self) -> impl Iterator<Item = f64> {
+        self.changes.iter().map(|change| f64::from(change.value))
+    }
+
+    /// The begins and ends of loads, as of a [`PlainRule`](crate::detect::PlainRule) with these numbers.
+    #[must_use]
+    pub fn edges(&self, threshold: f64, release: f64, frames: u32) -> Vec<Decision> {
+        let (end, frames) = (release * threshold, i64::from(frames));
+        self.run(Limits { begin: threshold, end, frames, touch_train: 0, threshold, age_us: None })
+    }
+
+    /// The area at an age of every touch, as it is compared with a [`PlainRule`](crate::detect::PlainRule)'s threshold.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for another quantity.
+    pub fn at_age(&self, age_ms: f64) -> Result<Vec<Decision>> {
+        if self.quantity != Quantity::Area {
+            return Err(problem!("ages are those of touches, which begin by area: this is another quantity"));
+        }
+        Ok(self.run(Limits::at_age(0, f64::INFINITY, age_ms)))
+    }
+
+    fn run(&self, limits: Limits) -> Vec<Decision> {
+        let (mut rule, mut clock, mut out) = (RunningRule::new(limits), self.clock, vec![]);
+        let mut changes = self.changes.iter().peekable();
+        for &t in &self.pictures {
+            rule.advance(t, &clock, &mut out);
+            clock.picture(t);
+            while let Some(&change) = changes.next_if(|change| us(change.t).round() as i64 == t) {
+                rule.change(change, false, &clock, &mut out);
+            }
+        }
+        for &change in changes {
+            rule.change(change, false, &clock, &mut out);
+        }
+        let reach = (limits.frames as f64 * self.period_us).ceil() as i64 + limits.age_us.unwrap_or(0);
+        rule.advance(self.last + SILENCE_US + reach, &clock, &mut out);
+        out
+    }
+}

@@ -1,0 +1,178 @@
+//! A detector without training: a load above a threshold for some frames.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::allowed::above_0;
+use crate::detect::running_rule::{Limits, RunningRule};
+use crate::detect::{FrameClock, FrameTime, ReadoutStream, file};
+use crate::encode::{Quantity, Tare};
+use crate::spikes::us;
+use crate::{Array, Error, Result, problem, reading};
+
+#[cfg(test)]
+mod tests;
+
+/// The largest number of frames in a row.
+const MOST_FRAMES: u32 = 1_000_000;
+
+/// The latest age at which a rule may decide, ms.
+const LATEST_AGE_MS: f64 = 60_000.0;
+
+/// A load above a threshold for some frames, with a label for its onset and one for its end.
+///
+/// The sensor is loaded from the first of `frames` frames in a row in which the quantity is at least the threshold, to
+/// the first of `frames` frames in a row in which it is below `release` times the threshold. A detection's `t` is the
+/// time of the first of these frames; it is `known` when the last one is complete. A frame's quantity is that after its
+/// last event; its time is the stamp with which the quantity passed the threshold. Each picture is a frame.
+///
+/// With an age it decides once a touch. A touch begins with the first frame in which the area is 2 taxels or more, and
+/// ends with the first in which it is less. The label is that of the quantity in the frame that holds at the age after
+/// the touch's begin, below the threshold or not; `t` is the begin, and `known` the end of that frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlainRule {
+    /// What is compared with the threshold.
+    pub quantity: Quantity,
+    /// The threshold, above 0: taxels, or the sensor's unit.
+    pub threshold: f64,
+    /// The part of the threshold below which the load ends, above 0, at most 1; 1 with an age.
+    #[serde(default = "whole")]
+    pub release: f64,
+    /// The number of frames in a row, 1 or more; 1 with an age.
+    #[serde(default = "single")]
+    pub frames: u32,
+    /// The age of a touch at which the rule decides between two kinds, ms; `None`: it detects onsets and ends.
+    #[serde(default)]
+    pub age_ms: Option<f64>,
+    /// The labels of onset and end, or of the kinds below and above the threshold; `None` omits those detections.
+    pub labels: [Option<String>; 2],
+    /// The board's noise floor, 0 or more, in the sensor's unit (ticks); default 3, that of the fast presets.
+    #[serde(default = "usual_floor")]
+    pub noise_floor: f64,
+    /// The taxels' rest. It is valid for one board on one day: a saved rule has none and receives one when it is used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tare: Option<Tare>,
+}
+
+fn whole() -> f64 {
+    1.0
+}
+
+fn single() -> u32 {
+    1
+}
+
+fn usual_floor() -> f64 {
+    3.0
+}
+
+impl PlainRule {
+    /// The name of the format in the file.
+    pub(in crate::detect) const FORMAT: &str = "taxel plain rule";
+
+    /// Checks that each part is valid and that the parts fit together.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the part.
+    pub fn check(&self) -> Result<()> {
+        above_0("threshold", self.threshold, "")?;
+        if !(self.release > 0.0 && self.release <= 1.0) {
+            return Err(problem!("release is {}: must be above 0 and at most 1", self.release));
+        }
+        if !(1..=MOST_FRAMES).contains(&self.frames) {
+            return Err(problem!("frames is {}: must lie between 1 and {MOST_FRAMES}", self.frames));
+        }
+        if let Some(age) = self.age_ms {
+            if !(0.0..=LATEST_AGE_MS).contains(&age) {
+                return Err(problem!("age_ms is {age}: must lie between 0 and {LATEST_AGE_MS}"));
+            }
+            if self.release < 1.0 || self.frames > 1 {
+                return Err(problem!(
+                    "release {} and frames {} with age_ms: must be 1, as a touch begins with 1 frame of 2 taxels",
+                    self.release,
+                    self.frames
+                ));
+            }
+        }
+        if !(self.noise_floor >= 0.0 && self.noise_floor.is_finite()) {
+            return Err(problem!("noise_floor is {}: must be 0 or more, and finite", self.noise_floor));
+        }
+        match &self.labels {
+            [None, None] => return Err(problem!("labels are both left out: give one or both")),
+            [first, second] if first == second => {
+                return Err(problem!("labels are both {}: must differ", first.as_deref().unwrap_or_default()));
+            }
+            labels if labels.iter().flatten().any(|label| label.trim().is_empty()) => {
+                return Err(problem!("labels: one is empty: must be a name, or left out"));
+            }
+            _ => {}
+        }
+        self.tare.as_ref().map_or(Ok(()), Tare::check)
+    }
+
+    /// Starts a stream for an array with frames of this duration.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if a part is not valid, if there is no tare or one of another array, or if the period is not valid.
+    pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
+        self.check()?;
+        let loads = Quantity::stream(&self.read(), array, tare.or(self.tare.as_ref()), self.noise_floor)?;
+        let clock = FrameClock::new(frames)?;
+        Ok(ReadoutStream::of_rule(loads, array.clone(), clock, RunningRule::new(self.limits()), self.labels.clone()))
+    }
+
+    /// The quantities that it reads: the one that is compared with the threshold, and with an age the area.
+    fn read(&self) -> Vec<Quantity> {
+        let mut read = vec![self.quantity];
+        if self.age_ms.is_some() && self.quantity != Quantity::Area {
+            read.push(Quantity::Area);
+        }
+        read
+    }
+
+    /// How it decides; the parts must have been checked.
+    fn limits(&self) -> Limits {
+        let Self { threshold, release, .. } = *self;
+        match self.age_ms {
+            Some(age) => Limits::at_age(self.read().len() as u32 - 1, threshold, age),
+            None => Limits {
+                begin: threshold,
+                end: release * threshold,
+                frames: i64::from(self.frames),
+                touch_train: 0,
+                threshold,
+                age_us: None,
+            },
+        }
+    }
+
+    /// The time after the last input within which its last detection is complete, us.
+    pub(super) fn reach_us(&self, period_us: f64) -> i64 {
+        (f64::from(self.frames) * period_us + self.age_ms.map_or(0.0, us)).ceil() as i64
+    }
+
+    /// Reads a rule from the text of its file and checks it.
+    ///
+    /// # Errors
+    ///
+    /// `Format` if the text is not a rule, has an unknown version, or has parts that are not valid.
+    pub fn from_json(text: &str) -> Result<Self> {
+        Self::from_parts(file::parts("plain rule", text, &[Self::FORMAT])?.1)
+    }
+
+    /// As [`PlainRule::from_json`], from the contents of the file without format and version.
+    pub(super) fn from_parts(parts: Value) -> Result<Self> {
+        let rule: Self = reading::from_value(parts).map_err(|unfit| Error::Format(unfit.of("plain rule")))?;
+        rule.check().map_err(|e| Error::Format(format!("plain rule: {e}")))?;
+        Ok(rule)
+    }
+
+    /// The rule as the text of its file; reading it returns exactly the same numbers.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        file::text(Self::FORMAT, self)
+    }
+}

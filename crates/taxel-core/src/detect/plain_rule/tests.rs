@@ -1,0 +1,57 @@
+//! Tests of a rule's parts and its file; `tests/detect/test_plain_rule.py` compares its detections with a plain loop.
+
+use super::*;
+use crate::detect::{Detector, Readout};
+
+fn rule() -> PlainRule {
+    PlainRule {
+        quantity: Quantity::Total,
+        threshold: 1.0 / 3.0,
+        release: 0.1 + 0.2,
+        frames: 20,
+        age_ms: None,
+        labels: [Some("contact".to_owned()), None],
+        noise_floor: 0.0,
+        tare: None,
+    }
+}
+
+#[test]
+fn a_file_gives_every_number_back_and_names_its_kind() {
+    let rule = rule();
+    let text = rule.to_json();
+    assert!(text.starts_with("{\n  \"format\": \"taxel plain rule\",\n  \"version\": 1,"));
+    assert_eq!(PlainRule::from_json(&text).unwrap(), rule);
+    assert_eq!(Detector::from_json(&text).unwrap(), rule.into());
+    let other = Readout::from_json(&text).unwrap_err().to_string();
+    assert_eq!(other, "readout: format is \"taxel plain rule\", must be \"taxel readout\"");
+    let neither = Detector::from_json(&text.replace("plain rule", "song")).unwrap_err().to_string();
+    assert_eq!(neither, "readout: format is \"taxel song\", must be \"taxel readout\" or \"taxel plain rule\"");
+}
+
+#[test]
+fn parts_that_make_no_sense_are_refused_by_name() {
+    let cases: [(fn(&mut PlainRule), &str); 11] = [
+        (|r| r.threshold = 0.0, "threshold is 0"),
+        (|r| r.threshold = f64::NAN, "threshold is NaN"),
+        (|r| r.release = 0.0, "release is 0"),
+        (|r| r.release = 1.5, "release is 1.5"),
+        (|r| r.frames = 0, "frames is 0"),
+        (|r| r.age_ms = Some(-1.0), "age_ms is -1"),
+        (|r| r.age_ms = Some(1.0), "release 0.30000000000000004 and frames 20 with age_ms"),
+        (|r| r.noise_floor = f64::INFINITY, "noise_floor is inf"),
+        (|r| r.labels = [None, None], "labels are both left out"),
+        (|r| r.labels[1] = r.labels[0].clone(), "labels are both contact"),
+        (|r| r.labels[0] = Some(" ".to_owned()), "labels: one is empty"),
+    ];
+    for (spoil, expected) in cases {
+        let mut spoilt = rule();
+        spoil(&mut spoilt);
+        let text = spoilt.check().unwrap_err().to_string();
+        assert!(text.starts_with(expected), "{text}");
+        if !text.contains("NaN") && !text.contains("inf") {
+            let of_file = PlainRule::from_json(&spoilt.to_json()).unwrap_err().to_string();
+            assert_eq!(of_file, format!("plain rule: {text}"));
+        }
+    }
+}

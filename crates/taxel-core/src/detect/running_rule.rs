@@ -1,0 +1,178 @@
+//! A plain rule at work: from changes of quantities to decisions.
+
+use std::collections::VecDeque;
+
+use crate::Spike;
+use crate::detect::FrameClock;
+use crate::spikes::{ms, us};
+
+/// How a rule decides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Limits {
+    /// A load begins in frames in which its quantity is at least this.
+    pub begin: f64,
+    /// It ends in frames in which the quantity is below this.
+    pub end: f64,
+    /// The number of such frames in a row.
+    pub frames: i64,
+    /// The train with the quantity of which a load is made.
+    pub touch_train: u32,
+    /// Train 0 is compared with this threshold, where the rule decides at an age.
+    pub threshold: f64,
+    /// The age of a load at which the rule decides, us; `None`: it reports begin and end.
+    pub age_us: Option<i64>,
+}
+
+impl Limits {
+    /// The area from which on a sensor is touched, where a rule decides at an age: the smallest that there is, as a
+    /// loaded taxel counts only beside another one.
+    const TOUCHED: f64 = 2.0;
+
+    /// Decides at an age of each touch, which the area on `touch_train` begins in one frame.
+    pub(super) fn at_age(touch_train: u32, threshold: f64, age_ms: f64) -> Self {
+        let age_us = Some(us(age_ms).round() as i64);
+        Self { begin: Self::TOUCHED, end: Self::TOUCHED, frames: 1, touch_train, threshold, age_us }
+    }
+}
+
+/// What a rule found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decision {
+    /// Which of the rule's two labels: 0 for the begin, or below the threshold; 1 for the end, or above.
+    pub which: usize,
+    /// The begin or end of the load, us.
+    pub t: i64,
+    /// The end of the last frame on which the decision rests, us.
+    pub known: i64,
+    /// Whether a quantity changed in these frames together with a repair.
+    pub repaired: bool,
+    /// The quantity of train 0 when the rule decided.
+    pub value: f64,
+}
+
+/// Frames in a row, all so far, in which the load begins or ends.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    /// The number of the first of these frames.
+    first: i64,
+    /// The time at which the quantity passed the limit in it, us.
+    t: i64,
+    repaired: bool,
+}
+
+/// A load that waits for the age at which it is decided.
+#[derive(Debug, Clone, Copy)]
+struct Waiting {
+    t: i64,
+    at: i64,
+    repaired: bool,
+}
+
+/// The state of a rule.
+#[derive(Clone)]
+pub(super) struct RunningRule {
+    limits: Limits,
+    /// Whether the sensor is loaded.
+    loaded: bool,
+    /// The quantity of which a load is made, after its last change.
+    load: f64,
+    /// The number of the frame of that change.
+    changed: i64,
+    /// The time at which the quantity last passed the limit at which the state changes, us.
+    passed: i64,
+    /// Whether a quantity changed together with a repair in a frame that is not complete.
+    repaired: bool,
+    run: Option<Run>,
+    /// The quantity that is compared with the threshold.
+    quantity: f64,
+    waiting: VecDeque<Waiting>,
+}
+
+impl RunningRule {
+    /// A rule before any input: not loaded, all quantities 0.
+    pub(super) fn new(limits: Limits) -> Self {
+        Self {
+            limits,
+            loaded: false,
+            load: 0.0,
+            changed: i64::MIN,
+            passed: 0,
+            repaired: false,
+            run: None,
+            quantity: 0.0,
+            waiting: VecDeque::new(),
+        }
+    }
+
+    /// Processes a change of a quantity; changes come in order of time.
+    pub(super) fn change(&mut self, change: Spike, repaired: bool, clock: &FrameClock, out: &mut Vec<Decision>) {
+        let t = us(change.t).round() as i64;
+        self.advance(t, clock, out);
+        if change.train == self.limits.touch_train {
+            let before = self.passes();
+            (self.load, self.changed) = (f64::from(change.value), clock.number_of(t));
+            if self.passes() && !before {
+                self.passed = t;
+            }
+        }
+        if change.train == 0 {
+            self.quantity = f64::from(change.value);
+        }
+        if repaired {
+            self.repaired = true;
+            self.waiting.iter_mut().for_each(|one| one.repaired = true);
+        }
+    }
+
+    /// Decides on all frames that are complete, because no change before `t` us follows.
+    pub(super) fn advance(&mut self, t: i64, clock: &FrameClock, out: &mut Vec<Decision>) {
+        self.close_before(clock.open_at(t), clock, out);
+        while let Some(one) = self.waiting.front().filter(|one| clock.is_over(one.at, t)) {
+            out.push(Decision {
+                which: usize::from(self.quantity >= self.limits.threshold),
+                t: one.t,
+                known: clock.end_of(ms(one.at)),
+                repaired: one.repaired,
+                value: self.quantity,
+            });
+            self.waiting.pop_front();
+        }
+    }
+
+    /// Counts the frames before number `open`, which are complete.
+    fn close_before(&mut self, open: i64, clock: &FrameClock, out: &mut Vec<Decision>) {
+        if self.changed >= open {
+            return;
+        }
+        let repaired = std::mem::take(&mut self.repaired);
+        if !self.passes() {
+            self.run = None;
+            return;
+        }
+        // Frames before that of the last change were counted when it came.
+        let run = self.run.get_or_insert(Run { first: self.changed, t: self.passed, repaired: false });
+        run.repaired |= repaired;
+        let Run { first, t, repaired } = *run;
+        if open - first < self.limits.frames {
+            return;
+        }
+        self.run = None;
+        self.loaded = !self.loaded;
+        match self.limits.age_us {
+            None => out.push(Decision {
+                which: usize::from(!self.loaded),
+                t,
+                known: clock.end_of_number(first + self.limits.frames - 1),
+                repaired,
+                value: self.quantity,
+            }),
+            Some(age) if self.loaded => self.waiting.push_back(Waiting { t, at: t + age, repaired }),
+            Some(_) => {}
+        }
+    }
+
+    /// Whether the quantity has passed the limit at which the state changes.
+    fn passes(&self) -> bool {
+        if self.loaded { self.load < self.limits.end } else { self.load >= self.limits.begin }
+    }
+}

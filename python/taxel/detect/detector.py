@@ -1,0 +1,290 @@
+"""What makes detections and is saved as a file: the base of `Readout` and `PlainRule`, and their stream."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar, Self, TypeVar
+
+from taxel import _core
+from taxel._base.arguments import instance, number, shown, whole
+from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import text as checked_text
+from taxel._base.files import write_whole
+from taxel._core import FormatError, ProblemError
+from taxel.array import Array
+from taxel.detections import Detections
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.tare import Tare
+from taxel.wire import FRAME_US
+
+__all__ = ["ReadoutStream", "detector", "read", "tare_text"]
+
+
+class _Detector:
+    """What a readout and a plain rule have in common: a file, and a stream."""
+
+    #: What it is, in errors.
+    _WHAT: ClassVar[str]
+    _text: str
+    _parts: dict[str, Any]
+
+    @staticmethod
+    def _check(text: str) -> str:
+        """Check the text of its file, and return it with every default filled in."""
+        raise NotImplementedError
+
+    @property
+    def array(self) -> Array | None:
+        """The sensor, or None where any will do."""
+        raise NotImplementedError
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels that it detects."""
+        raise NotImplementedError
+
+    @classmethod
+    def _from_text(cls, text: str) -> Self:
+        one = cls.__new__(cls)
+        one._hold(cls._check(text))
+        return one
+
+    def _hold(self, text: str) -> None:
+        """Hold the text of its file, which was checked."""
+        self._text = text
+        self._parts = json.loads(text)
+
+    def to_json(self) -> str:
+        """Return the text of its file."""
+        return self._text
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Return the one that `to_json` wrote.
+
+        Parameters
+        ----------
+        text : str
+
+        Raises
+        ------
+        FormatError : another kind of file, another version, or parts that are invalid
+        """
+        if not isinstance(text, str):
+            raise ProblemError(f"text is {shown(text)}: must be the text of a {cls._WHAT}")
+        return cls._from_text(checked_text("text", text))
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write it to a JSON file, whole or not at all, and return its path.
+
+        Parameters
+        ----------
+        path : path
+        overwrite : bool
+            Whether an existing file may be replaced.
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        """
+        return write_whole(path, lambda file: file.write(self._text.encode() + b"\n"), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read the file that `save` wrote: the same to the last bit.
+
+        Parameters
+        ----------
+        path : path
+
+        Raises
+        ------
+        FormatError : another kind of file, or another version (names the file)
+        FileNotFoundError : no such file
+        """
+        return read(path, cls._WHAT, cls._from_text)
+
+    def stream(
+        self,
+        array: Array | None = None,
+        *,
+        frame_us: float = FRAME_US,
+        tare: Tare | None = None,
+        wire_version: int = 1,
+    ) -> ReadoutStream:
+        """Begin to receive piece by piece: the same detections as of the whole, wherever the input is cut.
+
+        Parameters
+        ----------
+        array : Array, optional
+            The sensor; its own where it is left out, or else that of the first piece.
+        frame_us : float, us
+            How long the board's frame (or a picture) lasts; 192 is the board at reset.
+        tare : Tare, optional
+            The taxels' rest, where the encoder needs one and has none.
+        wire_version : int, from 1 to 2
+            Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
+
+        Raises
+        ------
+        ProblemError : another array than it was trained on, or a tare that is missing
+        """
+        return ReadoutStream(self, array, frame_us=frame_us, tare=tare, wire_version=wire_version)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return self._parts == other._parts
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+_D = TypeVar("_D", bound=_Detector)
+
+
+class ReadoutStream:
+    """Read out events or frames piece by piece, as `Readout.stream` and `PlainRule.stream` begin it.
+
+    Every call returns the detections that became certain by it.
+
+    Parameters
+    ----------
+    readout : Readout or PlainRule
+    array : Array, optional
+        The sensor; the readout's own where it is left out, or else that of the first piece.
+    frame_us : float, us
+        How long the board's frame (or a picture) lasts; 192 is the board at reset.
+    tare : Tare, optional
+        The taxels' rest, where the encoder needs one and has none.
+    wire_version : int, from 1 to 2
+        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
+
+    Raises
+    ------
+    ProblemError : another array than the readout was trained on, or a tare that is missing
+
+    Examples
+    --------
+    >>> from taxel import Array, Frames, Neuron
+    >>> from taxel.encode import LevelCrossing
+    >>> readout = Readout(LevelCrossing([10.0]), {"contact": (Neuron(tau=2.0), [1.0, 0.0])})
+    >>> stream = readout.stream(Array(1, 1), frame_us=10_000)
+    >>> stream.push(Frames([[[0.0]], [[12.0]]], [0, 10_000]))
+    Detections(none)
+    >>> stream.advance(20_000)
+    Detections(1: contact 1; 10979 to 10979 us)
+    """
+
+    def __init__(
+        self,
+        readout: _Detector,
+        array: Array | None = None,
+        *,
+        frame_us: float = FRAME_US,
+        tare: Tare | None = None,
+        wire_version: int = 1,
+    ) -> None:
+        self._text = detector("readout", readout).to_json()
+        self._frame_us = number("frame_us", frame_us, "us")
+        self._tare = tare_text(tare)
+        self._version = whole("wire_version", wire_version, 1, 2)
+        self._core: _core.ReadoutStream | None = None
+        array = readout.array if array is None else array
+        if array is not None:
+            self._begin(array)
+
+    def _begin(self, array: Array) -> _core.ReadoutStream:
+        if self._core is None:
+            parts = instance("array", array, Array)._parts()
+            self._core = _core.ReadoutStream(self._text, parts, self._frame_us, self._version, self._tare)
+        return self._core
+
+    def push(self, x: Events | Frames) -> Detections:
+        """Take the next events or frames; one stream takes either, never both.
+
+        An event that is earlier than what came before counts as coming now, and is counted as `late`.
+
+        Parameters
+        ----------
+        x : Events or Frames
+
+        Returns
+        -------
+        Detections
+            Those that became certain by it.
+
+        Raises
+        ------
+        ProblemError : neither, another array's, events without intensities where the encoder reads them, frames out of
+            order
+        """
+        if isinstance(x, Events):
+            return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
+        if isinstance(x, Frames):
+            return Detections._from_parts(self._begin(x.array).push_frames(x._parts()))
+        raise ProblemError(f"x is {shown(x)}: a readout listens to taxel.Events or taxel.Frames")
+
+    def advance(self, t_us: int) -> Detections:
+        """Promise that nothing will come any more before a time; an earlier time changes nothing.
+
+        Parameters
+        ----------
+        t_us : int, us
+            By the board's clock.
+
+        Returns
+        -------
+        Detections
+            Those that became certain by it.
+
+        Raises
+        ------
+        ProblemError : no whole number of us
+        """
+        t = whole("t_us", t_us, -(2**52), 2**52)
+        return Detections([], [], []) if self._core is None else Detections._from_parts(self._core.advance(t))
+
+    @property
+    def now_us(self) -> int | None:
+        """The time up to which all detections have been returned, us; None before any input."""
+        return None if self._core is None else self._core.now
+
+    @property
+    def late(self) -> int:
+        """How many events came later than others with a later time, or later than time was moved on."""
+        return 0 if self._core is None else self._core.late
+
+    @property
+    def potentials(self) -> dict[str, float]:
+        """Each neuron's potential now, mV; of a plain rule none."""
+        return {} if self._core is None else dict(self._core.potentials)
+
+
+def detector(name: str, value: object) -> _Detector:
+    """Return a readout or a plain rule; refuse any other value."""
+    if not isinstance(value, _Detector):
+        raise ProblemError(f"{name} is {shown(value)}: must be a taxel.Readout or taxel.detect.PlainRule")
+    return value
+
+
+def read(path: str | os.PathLike[str], what: str, of_text: Callable[[str], _D]) -> _D:
+    """Read a detector's file; errors name it."""
+    try:
+        return of_text(Path(checked_path("path", path)).read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise FormatError(f"{path}: not text, so no {what}") from None
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
+def tare_text(tare: Tare | None) -> str | None:
+    """Return a tare as text."""
+    return None if tare is None else instance("tare", tare, Tare).to_json()

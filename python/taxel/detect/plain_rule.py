@@ -1,0 +1,179 @@
+"""A detector without training: a load above a threshold for some frames."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from taxel import _core
+from taxel._base.arguments import instance, number, parameters, several, shown, text, whole
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.detect.detector import _Detector
+from taxel.tare import Tare
+
+__all__ = ["PlainRule"]
+
+#: The labels of onset and end where none are given.
+_USUAL = ("contact", "lift")
+
+
+class PlainRule(_Detector):
+    """Detect when the load on a sensor rises to a threshold, and when it is gone: what any training is held against.
+
+    The sensor is loaded from the first of `frames` frames in a row in which the quantity is `threshold` or more, until
+    the first of `frames` frames in a row in which it is below `release` x `threshold`. Before the first input it is not
+    loaded. A detection's `t` is the time of the first of these frames, and it is `known` at the end of the last.
+
+    With `age_ms` it decides once a touch between two kinds, by the quantity at that age. A touch begins with the first
+    frame in which 2 taxels or more are loaded and ends with the first in which fewer are; `t` is its begin, and `known`
+    the end of the frame that holds at the age. A touch that is over by then is decided by what the quantity is then.
+
+    Parameters
+    ----------
+    quantity : {"area", "total"}
+        The number of loaded taxels, as `taxel.encode.ContactArea` counts them, or the sum of their values above rest in
+        the sensor's unit, as `taxel.encode.Moments` adds them, in single precision.
+    threshold : float, above 0
+        Number of taxels, or the sensor's unit.
+    release : float, above 0, at most 1
+        The part of the threshold below which the load ends. 1 with `age_ms`.
+    frames : int, from 1 to 1 000 000
+        How many frames in a row decide. 1 with `age_ms`.
+    age_ms : float, ms, from 0 to 60 000, optional
+        The age of a touch at which it decides.
+    labels : (str or None, str or None), optional
+        Names of onset and end, default "contact" and "lift"; with `age_ms` of the kinds below the threshold and not
+        below it. None: those are not reported.
+    noise_floor : float, 0 or more, in the sensor's unit (ticks)
+        The board's: a taxel is loaded above its rest by more than this and half a tick.
+    tare : Tare, optional
+        The taxels' rest. It belongs to a board and a day and may be given later.
+
+    Raises
+    ------
+    ProblemError : parameters that are invalid or do not fit together (names the parameter)
+
+    Notes
+    -----
+    A frame of events is the board's; its quantity is that after its last event, and its time the stamp with which the
+    quantity passed the threshold. Silent frames count: taxels hold their values. Each picture of `Frames` is a frame.
+    Detections have no slope (NaN).
+
+    Examples
+    --------
+    >>> from taxel import Frames, Tare
+    >>> from taxel.detect import run
+    >>> frames = Frames([[[v, v]] for v in (0.0, 0.0, 9.0, 9.0, 9.0, 0.0, 0.0)], range(0, 70_000, 10_000))
+    >>> rule = PlainRule("area", 2, frames=2)
+    >>> found = run(rule, frames, tare=Tare.take(frames, stop_us=20_000))
+    >>> found
+    Detections(2: contact 1, lift 1; 20000 to 50000 us)
+    >>> found.known
+    array([40000, 70000])
+    """
+
+    _WHAT = "plain rule"
+
+    def __init__(
+        self,
+        quantity: str,
+        threshold: float,
+        release: float = 1.0,
+        frames: int = 1,
+        age_ms: float | None = None,
+        *,
+        labels: Sequence[str | None] | None = None,
+        noise_floor: float = 3.0,
+        tare: Tare | None = None,
+    ) -> None:
+        age = None if age_ms is None else number("age_ms", age_ms, "ms")
+        self._hold(
+            _core.make_plain_rule(
+                parameters(
+                    {
+                        "quantity": text("quantity", quantity),
+                        "threshold": number("threshold", threshold),
+                        "release": number("release", release),
+                        "frames": whole("frames", frames, 1, 2**31 - 1),
+                        "age_ms": age,
+                        "labels": _labels(labels, age),
+                        "noise_floor": number("noise_floor", noise_floor),
+                    }
+                    | ({} if tare is None else {"tare": json.loads(instance("tare", tare, Tare).to_json())})
+                )
+            )
+        )
+
+    @staticmethod
+    def _check(text: str) -> str:
+        return _core.check_plain_rule(text)
+
+    @property
+    def quantity(self) -> str:
+        """What is compared with the threshold: "area" or "total"."""
+        return str(self._parts["quantity"])
+
+    @property
+    def threshold(self) -> float:
+        """The threshold: number of taxels, or the sensor's unit."""
+        return float(self._parts["threshold"])
+
+    @property
+    def release(self) -> float:
+        """The part of the threshold below which the load ends."""
+        return float(self._parts["release"])
+
+    @property
+    def frames(self) -> int:
+        """How many frames in a row decide."""
+        return int(self._parts["frames"])
+
+    @property
+    def age_ms(self) -> float | None:
+        """The age of a touch at which it decides, ms; None where it reports onset and end."""
+        age = self._parts["age_ms"]
+        return None if age is None else float(age)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels that it detects."""
+        return tuple(label for label in self._parts["labels"] if label is not None)
+
+    @property
+    def noise_floor(self) -> float:
+        """The board's noise floor, in the sensor's unit."""
+        return float(self._parts["noise_floor"])
+
+    @property
+    def tare(self) -> Tare | None:
+        """The taxels' rest, where it has one of its own."""
+        tare = self._parts.get("tare")
+        return None if tare is None else Tare.from_json(json.dumps(tare))
+
+    @property
+    def array(self) -> Array | None:
+        """The sensor of its own tare, or None where any will do."""
+        tare = self.tare
+        return None if tare is None else tare.array
+
+    def __repr__(self) -> str:
+        first, second = self._parts["labels"]
+        frames = "1 frame" if self.frames == 1 else f"{self.frames} frames"
+        if self.age_ms is not None:
+            kinds = f"below it {first}, else {second}".replace("None", "nothing")
+            return f"PlainRule({self.quantity} {self.threshold:g} at {self.age_ms:g} ms: {kinds})"
+        found = ", ".join(f"{name} {label}" for name, label in (("onset", first), ("end", second)) if label is not None)
+        return f"PlainRule({self.quantity} >= {self.threshold:g}, release {self.release:g}, {frames}: {found})"
+
+
+def _labels(labels: object, age: float | None) -> list[str | None]:
+    """Return the two labels, of which either may be None."""
+    if labels is None:
+        if age is not None:
+            raise ProblemError("labels are left out: with age_ms give the kinds below the threshold and above it")
+        return list(_USUAL)
+    pair = several("labels", labels) if not isinstance(labels, str) else []
+    if len(pair) != 2:
+        raise ProblemError(f"labels is {shown(labels)}: must be two names, of which one may be None")
+    return [None if label is None else text("labels", label) for label in pair]

@@ -1,0 +1,277 @@
+"""The plain rule that fits labelled recordings best, by trying a grid of them on the load of each recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._base.arguments import callback, number, several, text
+from taxel._core import ProblemError
+from taxel.detect.detector import tare_text
+from taxel.detect.examples import Example, checked
+from taxel.detect.plain_rule import PlainRule
+from taxel.frames import Frames
+from taxel.recording import Recording
+from taxel.spikes import SpikeTrains, to_us
+from taxel.wire import FRAME_US
+
+__all__ = ["AGES_MS", "AREAS", "FRAMES", "QUANTILES", "RELEASES", "tune"]
+
+#: Thresholds of the area, taxels.
+AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+#: Thresholds of the total: these quantiles of all its values above 0.
+QUANTILES = tuple(np.linspace(0.0, 0.95, 20).tolist())
+#: Parts of the threshold below which a load ends.
+RELEASES = (0.5, 1.0)
+#: How many frames in a row decide.
+FRAMES = (1, 2, 5, 10, 20)
+#: Ages at which kinds are decided, ms.
+AGES_MS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 20.0, 30.0, 50.0)
+
+#: So far apart, us, no detection of one example pairs with a label of another when all are scored together.
+_APART_US = 10**12
+
+#: Times and times when they were known (us), of all examples on one clock, and quantities.
+_Found: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
+
+
+class _Fit(NamedTuple):
+    """How a rule does: the less, the better."""
+
+    wrong: int
+    """Missed and false."""
+    delay_ms: float
+    """Median of `known` minus label of those that were found; infinite without any."""
+    error_ms: float
+    """Median distance of a detection from its label; infinite without any."""
+
+
+class _Best(NamedTuple):
+    fit: _Fit
+    rule: PlainRule
+
+
+def tune(
+    examples: Sequence[Example],
+    labels: Sequence[str] | None = None,
+    *,
+    window_ms: float = 50.0,
+    noise_floor: float = 3.0,
+    progress: Callable[[str], object] | None = None,
+) -> dict[str, PlainRule | None]:
+    """Return for each label the plain rule with the fewest missed and false detections, and of these the least delay.
+
+    Tried are all thresholds of the area (`AREAS`) and of the total (`QUANTILES` of its values above 0), with all
+    numbers of frames (`FRAMES`) and releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
+    where exactly two are nearer to onsets than to ends, or where there are only two: then thresholds of the area at
+    each of `AGES_MS` are tried too, on a logarithmic scale, and hold for both where they are better for both together.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        A label that an example lacks is not in it. Sources that are spike trains have no load.
+    labels : sequence of str, optional
+        Those to find rules for; default: all.
+    window_ms : float, ms, 0 or more
+        How far a detection may lie from its label.
+    noise_floor : float, 0 or more, in the sensor's unit (ticks)
+        The board's.
+    progress : function of str, optional
+        Called with a line before each step.
+
+    Returns
+    -------
+    dict of str to PlainRule or None
+        None where no rule is better than to detect nothing, and where examples are spike trains: "no plain rule for
+        NAME". Rules have no tare; each has one label, of kinds both.
+
+    Raises
+    ------
+    ProblemError : examples that are invalid, or without a tare
+
+    Notes
+    -----
+    Of equal rules the first counts: area before total, low thresholds before high, few frames before many. A rule that
+    misses and invents as many as there are labels is no better than none.
+
+    Examples
+    --------
+    >>> from taxel import Frames, Tare
+    >>> frames = Frames([[[v, v]] for v in (0.0, 0.0, 9.0, 9.0, 9.0, 0.0, 0.0)], range(0, 70_000, 10_000))
+    >>> example = Example(frames, {"touch": [20_000], "removal": [50_000]}, Tare.take(frames, stop_us=20_000))
+    >>> rules = tune([example], window_ms=5.0)
+    >>> rules["touch"], rules["removal"]
+    (PlainRule(area >= 1, release 0.5, 1 frame: onset touch), PlainRule(area >= 1, release 0.5, 1 frame: end removal))
+    """
+    clocks = [_clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
+    sound = checked(examples)
+    report = (lambda _: None) if progress is None else callback("progress", progress)
+    names = sorted({name for one in sound for name in one.labels}) if labels is None else several("labels", labels)
+    names = [text("labels", name) for name in names]
+    width_ms = number("window_ms", window_ms, "ms")
+    if not 0.0 <= width_ms <= 3_600_000.0:
+        raise ProblemError(f"window_ms is {width_ms:g}: must lie between 0 and 3600000")
+    width_us = round(float(to_us(width_ms)))
+    floor = number("noise_floor", noise_floor)
+    if any(isinstance(one.source, SpikeTrains) for one in sound):
+        return dict.fromkeys(names)
+    truth = {
+        name: np.concatenate(
+            [np.sort(one.labels.get(name, np.empty(0, np.int64))) + k * _APART_US for k, one in enumerate(sound)]
+        )
+        for name in names
+    }
+    curves = {}
+    for quantity in ("area", "total"):
+        report(f"plain rules by {quantity}")
+        curves[quantity] = [_curve(quantity, floor, one, *c) for one, c in zip(sound, clocks, strict=True)]
+    best = _at_edges(curves, truth, width_us, floor)
+    onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
+    single = {name: min(pair, key=lambda one: one.fit[:2]) for name, pair in best.items()}
+    kinds = onsets if len(onsets) == 2 else names if len(names) == 2 else []
+    if kinds:
+        report("plain rules for kinds")
+        found = _for_kinds(curves["area"], kinds, truth, width_us, floor)
+        if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
+            single |= dict(zip(kinds, found, strict=True))
+    return {name: one.rule if one.fit.wrong < len(truth[name]) else None for name, one in single.items()}
+
+
+def _clock_of(example: object) -> tuple[float | None, int]:
+    """Return how long a frame lasts (us; None: as the source says) and the wire's version, as `run` finds them."""
+    source = example[0] if isinstance(example, tuple) and example else None
+    if isinstance(source, Recording) and source.registers is not None:
+        return source.registers.frame_us, source.registers.wire_version
+    return None, 1
+
+
+def _curve(
+    quantity: str, noise_floor: float, example: Example, frame_us: float | None, wire_version: int
+) -> _core.LoadCurve:
+    """Return a quantity over an example."""
+    source, tare = example.source, tare_text(example.tare)
+    if isinstance(source, Frames):
+        return _core.LoadCurve.of_frames(quantity, noise_floor, source._parts(), frame_us, tare)
+    period = FRAME_US if frame_us is None else frame_us
+    return _core.LoadCurve.of_events(quantity, noise_floor, source._parts(), period, wire_version, tare)  # type: ignore[union-attr]
+
+
+def _points(curves: dict[str, list[_core.LoadCurve]]) -> Iterator[tuple[str, float, float, int]]:
+    """Yield the grid: quantity, threshold, release, frames; those that delay least first."""
+    totals = np.concatenate([curve.values() for curve in curves["total"]])
+    totals = totals[totals > 0.0]
+    by_total = np.unique(np.quantile(totals, QUANTILES)).tolist() if len(totals) else []
+    thresholds = {"area": list(AREAS), "total": by_total}
+    for quantity, levels in thresholds.items():
+        for threshold in levels:
+            for frames in FRAMES:
+                for release in RELEASES:
+                    yield quantity, threshold, release, frames
+
+
+def _together(found: Sequence[_Found]) -> _Found:
+    """Return what was found in several examples, on one clock."""
+    t = [one[0] + k * _APART_US for k, one in enumerate(found)]
+    known = [one[1] + k * _APART_US for k, one in enumerate(found)]
+    return np.concatenate(t), np.concatenate(known), np.concatenate([one[2] for one in found])
+
+
+def _at_edges(
+    curves: dict[str, list[_core.LoadCurve]], truth: dict[str, NDArray[np.int64]], width_us: int, floor: float
+) -> dict[str, tuple[_Best, _Best]]:
+    """Return for each label the best rule at onsets and the best at ends."""
+    worst = _Fit(2**62, np.inf, np.inf)
+    fits = {name: [worst, worst] for name in truth}
+    points: dict[str, list[tuple[str, float, float, int]]] = {name: [("area", 1.0, 1.0, 1)] * 2 for name in truth}
+    for quantity, threshold, release, frames in _points(curves):
+        sides = zip(*(curve.edges(threshold, release, frames) for curve in curves[quantity]), strict=True)
+        for edge, found in enumerate(map(_together, sides)):
+            for name, true in truth.items():
+                fit = _fit(found, true, width_us, fits[name][edge].wrong)
+                if fit is not None and fit[:2] < fits[name][edge][:2]:
+                    fits[name][edge] = fit
+                    points[name][edge] = (quantity, threshold, release, frames)
+
+    def rule(name: str, edge: int) -> _Best:
+        labels = [name, None] if edge == 0 else [None, name]
+        return _Best(fits[name][edge], PlainRule(*points[name][edge], labels=labels, noise_floor=floor))
+
+    return {name: (rule(name, 0), rule(name, 1)) for name in truth}
+
+
+def _fit(found: _Found, true: NDArray[np.int64], width_us: int, most: int = 2**62) -> _Fit | None:
+    """Return how detections fit labels; None where more are wrong than `most`, which their number alone may show."""
+    t, known, _ = found
+    if abs(len(t) - len(true)) > most:
+        return None
+    label = [""] * len(t)
+    parts = (label, t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
+    tallies = _core.score(parts, [""] * len(true), true, np.full(len(true), width_us, np.int64))
+    if not tallies:
+        return _Fit(0, np.inf, np.inf)
+    _, _, _, missed, false, _, errors, delays = tallies[0]
+    wrong = len(missed) + len(false)
+    if not len(delays):
+        return _Fit(wrong, np.inf, np.inf)
+    return _Fit(wrong, float(np.median(delays)), float(np.median(np.abs(errors))))
+
+
+def _for_kinds(
+    curves: Sequence[_core.LoadCurve],
+    kinds: Sequence[str],
+    truth: dict[str, NDArray[np.int64]],
+    width_us: int,
+    floor: float,
+) -> list[_Best] | None:
+    """Return the best rule that decides between two kinds by the area at an age, once for each; None without any."""
+    every = np.concatenate([truth[name] for name in kinds])
+    order = np.argsort(every, kind="stable")
+    is_second = (np.arange(len(every)) >= len(truth[kinds[0]]))[order]
+    chosen: tuple[tuple[int, float], list[_Best]] | None = None
+    for age in AGES_MS:
+        found = _together([curve.at_age(age) for curve in curves])
+        t, known, areas = found
+        parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
+        tallies = _core.score(parts, [""] * len(every), every[order], np.full(len(every), width_us, np.int64))
+        pairs = tallies[0][1:3] if tallies else (np.empty(0, np.int64), np.empty(0, np.int64))
+        second = is_second[pairs[1]]
+        if second.all() or not second.any():
+            continue
+        threshold, flipped = _between(areas[pairs[0]], second)
+        below, above = reversed(kinds) if flipped else kinds
+        fits = {}
+        for name, mine in ((below, areas < threshold), (above, areas >= threshold)):
+            fits[name] = _fit((t[mine], known[mine], areas[mine]), truth[name], width_us)
+        rule = PlainRule("area", threshold, age_ms=age, labels=(below, above), noise_floor=floor)
+        best = [_Best(fit, rule) for name in kinds if (fit := fits[name]) is not None]
+        rank = (sum(one.fit.wrong for one in best), max(one.fit.delay_ms for one in best))
+        if chosen is None or rank < chosen[0]:
+            chosen = (rank, best)
+    return None if chosen is None else chosen[1]
+
+
+def _between(areas: NDArray[np.float64], second: NDArray[np.bool_]) -> tuple[float, bool]:
+    """Return the threshold on log area with the fewest on its wrong side, and whether the second kind lies below it.
+
+    Of equal ones the threshold in the widest gap; an area of 0 counts as .5.
+    """
+    order = np.argsort(areas, kind="stable")
+    logs, ones = np.log(np.maximum(areas[order], 0.5)), second[order]
+    # By how many values lie below: how many of the first kind are wrong above, and of the second below.
+    below_first, below_second = (np.concatenate([[0], np.cumsum(one)]) for one in (~ones, ones))
+    wrong = below_second + below_first[-1] - below_first
+    flipped = len(ones) - wrong
+    gaps = np.diff(logs)
+    sound = np.flatnonzero(gaps > 0.0)
+    if not len(sound):
+        return float(np.exp(logs[0])), False
+    best, flip = min(
+        ((int(counts[k + 1]), -float(gaps[k]), float(np.exp((logs[k] + logs[k + 1]) / 2.0))), over)
+        for over, counts in ((False, wrong), (True, flipped))
+        for k in sound
+    )
+    return best[2], flip

@@ -1,0 +1,420 @@
+"""A plain rule against a loop over frames, written from its documentation; pieces, pictures, files, live, tuning."""
+
+import math
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Events, Frames, ProblemError, Tare
+from taxel.detect import Example, PlainRule, load, run, tune
+
+ARRAY = Array(3, 4)
+REST, FLOOR = 2.25, 1.0
+HOUR = 3_600_000_000
+
+
+def tare(array=ARRAY, rest=REST):
+    """The taxels' rest, of which one is not known."""
+    known = [rest] * (array.rows * array.columns)
+    return Tare.take(Frames(np.reshape([known, known], (2, *array.shape)), [0, 1000], array=array))
+
+
+def quantity(name, held):
+    """The number of loaded taxels beside a loaded one, or the sum of their values above rest."""
+    loaded = held >= REST + FLOOR + 0.5
+    area, total = 0, 0.0
+    for y, x in np.ndindex(held.shape):
+        around = loaded[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
+        if loaded[y, x] and around.sum() > 1:
+            area, total = area + 1, total + max(float(held[y, x]) - REST, 0.0)
+    return float(area) if name == "area" else float(np.float32(total))
+
+
+def frame_of(t, period_us, stamp_us):
+    """The last frame whose stamp, its start rounded down to whole units, is at or before a time."""
+    k = int(Fraction(t + stamp_us) / Fraction(period_us)) + 2
+    while math.floor(k * Fraction(period_us) / stamp_us) * stamp_us > t:
+        k -= 1
+    return k
+
+
+class ByLoop:
+    """Frames with changes, as (number, end, changes), of which each change is (time, area, quantity)."""
+
+    def __init__(self, name, source, frame_us, version=1):
+        self.frames = {}
+        held = np.zeros(ARRAY.shape)
+        if isinstance(source, Frames):
+            self.pictures = [int(t) for t in source.t]
+            for k, (t, picture) in enumerate(zip(self.pictures, source.values, strict=True)):
+                self.frames[k] = [(t, quantity("area", picture), quantity(name, picture))]
+            self.end = lambda k: math.ceil(self.pictures[k] + Fraction(frame_us))
+            return
+        period, stamp = Fraction(frame_us), 100 if version == 1 else 1
+        now = int(source.t[0])
+        for k in range(len(source)):
+            now = max(now, int(source.t[k]))
+            held[source.y[k], source.x[k]] = source.intensity[k]
+            if k + 1 == len(source) or max(now, int(source.t[k + 1])) > now:
+                changes = self.frames.setdefault(frame_of(now, period, stamp), [])
+                changes.append((now, quantity("area", held), quantity(name, held)))
+        self.end = lambda k: math.ceil((k + 1) * period)
+        self.frame = lambda t: frame_of(t, period, stamp)
+
+    def edges(self, threshold, release, frames, which=2):
+        """The onsets and ends: (is end, t, known)."""
+        loaded, first, since, before, found = False, None, 0, 0.0, []
+        visited = self.frames if hasattr(self, "pictures") else {
+            n + more for n in self.frames for more in range(frames + 1)
+        }  # fmt: skip
+        for n in sorted(visited):
+
+            def passes(value, loaded=loaded):
+                return value < release * threshold if loaded else value >= threshold
+
+            for change in self.frames.get(n, []):
+                if passes(change[which]) and not passes(before):
+                    since = change[0]
+                before = change[which]
+            if not passes(before):
+                first = None
+                continue
+            first = (n, since) if first is None else first
+            if n - first[0] + 1 == frames:
+                found.append((loaded, first[1], self.end(n)))
+                loaded, first = not loaded, None
+        return found
+
+    def kinds(self, threshold, age_us, frame_us):
+        """The kind of every touch: (is above, t, known)."""
+        found = []
+        for is_end, t, _ in self.edges(2.0, 1.0, 1, which=1):
+            if is_end:
+                continue
+            at = t + age_us
+            if hasattr(self, "pictures"):
+                last = max(k for k, start in enumerate(self.pictures) if start <= at)
+                periods = (at - self.pictures[last]) // Fraction(frame_us) + 1
+                known = math.ceil(self.pictures[last] + periods * Fraction(frame_us))
+            else:
+                known = self.end(last := self.frame(at))
+            value = self.frames[max(k for k in self.frames if k <= last)][-1][2]
+            found.append((value >= threshold, t, known))
+        return found
+
+
+def as_tuples(found, rule):
+    second = rule._parts["labels"][1]
+    return [(label == second, t, known) for label, t, known in zip(found.label, found.t, found.known, strict=True)]
+
+
+@st.composite
+def events(draw):
+    """Events at stamps or at any time, some late, with pauses up to an hour; values near the loaded ones."""
+    n = draw(st.integers(1, 60))
+    steps = draw(st.lists(st.sampled_from([0, 0, 0, 1, 50, 96, 100, 100, 192, 200, 400, 1000, HOUR, -100, -300]),
+                          min_size=n, max_size=n))  # fmt: skip
+    t = np.maximum(np.cumsum(steps) + 500, 0)
+    places = draw(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), min_size=n, max_size=n))
+    ticks = draw(st.lists(st.sampled_from([0, 2, 3, 4, 4, 5, 9]), min_size=n, max_size=n))
+    x, y = zip(*places, strict=True)
+    return Events(t, x, y, [True] * n, array=ARRAY, intensity=np.array(ticks))
+
+
+rules = st.builds(
+    lambda name, threshold, release, frames: PlainRule(
+        name, threshold, release, frames, labels=("on", "off"), noise_floor=FLOOR
+    ),
+    st.sampled_from(["area", "total"]),
+    st.sampled_from([1.0, 2.0, 3.0, 3.5, 4.0, 7.25, 9.0]),
+    st.sampled_from([0.5, 0.75, 1.0]),
+    st.sampled_from([1, 1, 2, 3, 5, 20]),
+)
+kinds = st.builds(
+    lambda name, threshold, age: PlainRule(name, threshold, age_ms=age, labels=("small", "large"), noise_floor=FLOOR),
+    st.sampled_from(["area", "total"]),
+    st.sampled_from([2.0, 3.0, 4.0, 7.25]),
+    st.sampled_from([0.0, 0.1, 0.192, 0.5, 1.0, 40.0]),
+)
+clocks = st.sampled_from([(192.0, 1), (192.0, 2), (48.0, 1), (48.0, 2), (499.84, 1), (1000.0, 2)])
+
+
+def expected(rule, source, frame_us, version=1):
+    loop = ByLoop(rule.quantity, source, frame_us, version)
+    if rule.age_ms is None:
+        return loop.edges(rule.threshold, rule.release, rule.frames)
+    return loop.kinds(rule.threshold, round(rule.age_ms * 1000), frame_us)
+
+
+@settings(max_examples=150, deadline=None)
+@given(events(), st.one_of(rules, kinds), clocks)
+def test_events_give_what_a_loop_over_frames_gives(source, rule, clock):
+    frame_us, version = clock
+    found = run(rule, source, frame_us=frame_us, wire_version=version, tare=tare())
+    assert as_tuples(found, rule) == expected(rule, source, frame_us, version)
+    assert np.isnan(found.slope).all()
+    assert not found.repaired.any()
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.lists(st.tuples(st.sampled_from([1, 900, 1000, 1000, 2500, HOUR]),
+                       st.lists(st.sampled_from([0.0, 3.0, 3.75, 3.8, 9.0]), min_size=12, max_size=12)),
+             min_size=1, max_size=12),
+    st.one_of(rules, kinds),
+)  # fmt: skip
+def test_every_picture_is_a_frame(pictures, rule):
+    t = np.cumsum([step for step, _ in pictures])
+    source = Frames(np.reshape([values for _, values in pictures], (-1, 3, 4)), t, array=ARRAY)
+    found = run(rule, source, frame_us=1000.0, tare=tare())
+    assert as_tuples(found, rule) == expected(rule, source, 1000.0)
+    stream = rule.stream(frame_us=1000.0, tare=tare())
+    one_by_one = [stream.push(source[k : k + 1]) for k in range(len(source))]
+    assert sum(one_by_one[1:], one_by_one[0]) + stream.advance(int(t[-1]) + 10_000_000) == found
+
+
+@settings(max_examples=100, deadline=None)
+@given(events(), st.one_of(rules, kinds), clocks, st.data())
+def test_pieces_give_what_the_whole_gives(source, rule, clock, data):
+    frame_us, version = clock
+    whole = run(rule, source, frame_us=frame_us, wire_version=version, tare=tare())
+    stream = rule.stream(ARRAY, frame_us=frame_us, wire_version=version, tare=tare())
+    cuts = sorted(data.draw(st.sets(st.integers(0, len(source)))))
+    parts = []
+    for start, stop in pairwise([0, *cuts, len(source)]):
+        parts.append(stream.push(source[start:stop]))
+        if stop < len(source) and stop and data.draw(st.booleans()):
+            # Time may be advanced to anywhere before what follows.
+            latest, following = int(source.t[:stop].max()), int(source.t[stop:].min())
+            if following > latest:
+                parts.append(stream.advance(data.draw(st.integers(latest, following))))
+    parts.append(stream.advance(int(source.t.max()) + 2_000_000))
+    assert sum(parts[1:], parts[0]) == whole
+
+
+def press(ticks=9, start=10_000, stop=20_000, array=ARRAY):
+    """Two taxels loaded from one stamp until another."""
+    t = [start, start, stop, stop]
+    return Events(t, [1, 2, 1, 2], [1] * 4, [True, True, False, False], array=array,
+                  intensity=np.array([ticks, ticks, 0, 0]))  # fmt: skip
+
+
+def test_one_frame_of_two_taxels():
+    rule = PlainRule("area", 2, noise_floor=FLOOR)
+    found = run(rule, press(), tare=tare())
+    assert list(found.label) == ["contact", "lift"]
+    assert list(found.t) == [10_000, 20_000]
+    # The frames to which these stamps belong begin at 52 x 192 and at 104 x 192.
+    assert list(found.known) == [53 * 192, 105 * 192]
+
+
+def test_a_board_s_stamps_are_known_at_the_end_of_their_frames():
+    """With version 1 a stamp is floor(1.92 k) units of 100 us, and its frame k ends at 192 (k + 1) us."""
+    for k in (3, 260, 1_000, 5_207):
+        stamps = [math.floor(1.92 * n) * 100 for n in (k, k + 50)]
+        found = run(PlainRule("area", 2, noise_floor=FLOOR), press(start=stamps[0], stop=stamps[1]), tare=tare())
+        assert found.t.tolist() == stamps
+        assert found.known.tolist() == [192 * (k + 1), 192 * (k + 51)]
+
+
+@pytest.mark.parametrize(("threshold", "found"), [(2.0, 2), (math.nextafter(2.0, 3.0), 0)])
+def test_a_value_at_the_threshold_counts(threshold, found):
+    assert len(run(PlainRule("area", threshold, noise_floor=FLOOR), press(), tare=tare())) == found
+    # 9 - 2.25 twice, exact in single precision.
+    total = PlainRule("total", threshold * 6.75, noise_floor=FLOOR)
+    assert len(run(total, press(), tare=tare())) == found
+
+
+def test_a_label_left_out_is_not_detected():
+    assert list(run(PlainRule("area", 2, labels=(None, "off"), noise_floor=FLOOR), press(), tare=tare()).label) == [
+        "off"
+    ]
+
+
+def test_what_rests_on_repaired_values_is_marked():
+    source = press()
+    for marked, expected_ in (([True, False, False, False], [True, False]), ([False] * 3 + [True], [False, True])):
+        events = Events(source.t, source.x, source.y, source.p, array=ARRAY, intensity=source.intensity,
+                        repaired=np.array(marked))  # fmt: skip
+        for frames in (1, 5):
+            found = run(PlainRule("area", 2, frames=frames, noise_floor=FLOOR), events, tare=tare())
+            assert list(found.repaired) == expected_
+
+
+def test_zeroed_taxels_change_the_load():
+    source = press(stop=50_000)
+    stream = PlainRule("area", 2, noise_floor=FLOOR).stream(ARRAY, tare=tare())
+    assert len(stream.push(source)) == 1
+    assert stream.late == 0
+    assert stream.potentials == {}
+
+
+RULES = [
+    PlainRule("area", 2),
+    PlainRule("total", 1 / 3, 0.1 + 0.2, 20, labels=("a", None), noise_floor=0.0, tare=tare()),
+    PlainRule("area", 12, age_ms=5, labels=("small", "large")),
+]
+
+
+@pytest.mark.parametrize("rule", RULES, ids=repr)
+def test_a_saved_rule_is_the_rule(rule, tmp_path: Path):
+    path = rule.save(tmp_path / "rule.json")
+    for again in (PlainRule.load(path), load(path), PlainRule.from_json(rule.to_json())):
+        assert isinstance(again, PlainRule)
+        assert again == rule
+        assert again.to_json() == rule.to_json()
+        assert (again.quantity, again.threshold, again.release, again.frames, again.age_ms, again.labels) == (
+            rule.quantity, rule.threshold, rule.release, rule.frames, rule.age_ms, rule.labels
+        )  # fmt: skip
+        assert again.tare == rule.tare
+        assert again.noise_floor == rule.noise_floor
+    with pytest.raises(taxel.FormatError, match=r'rule\.json: readout: format is "taxel plain rule"'):
+        taxel.Readout.load(path)
+    assert rule != PlainRule("area", 3)
+
+
+def test_one_loader_reads_both_and_refuses_others(tmp_path: Path):
+    readout = taxel.Readout(taxel.encode.LevelCrossing([1.0]), {"a": (taxel.Neuron(), [1.0, 0.0])})
+    assert load(readout.save(tmp_path / "readout.json")) == readout
+    (tmp_path / "other.json").write_text('{"format": "song", "version": 1}')
+    with pytest.raises(taxel.FormatError, match='must be "taxel readout" or "taxel plain rule"'):
+        load(tmp_path / "other.json")
+    with pytest.raises(taxel.FormatError, match='plain rule: format is "taxel readout"'):
+        PlainRule.load(tmp_path / "readout.json")
+    (tmp_path / "bytes.json").write_bytes(b"\xff\xfe")
+    with pytest.raises(taxel.FormatError, match="not text"):
+        load(tmp_path / "bytes.json")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options", "text"),
+    [
+        (("force", 2), {}, "quantity"),
+        (("area", 0), {}, "threshold is 0"),
+        (("area", math.nan), {}, "threshold"),
+        (("area", 2, 0), {}, "release is 0"),
+        (("area", 2, 1.5), {}, "release is 1.5"),
+        (("area", 2, 1, 0), {}, "frames is 0"),
+        (("area", 2, 1, 1, -1), {"labels": ("a", "b")}, "age_ms is -1"),
+        (("area", 2, 0.5, 1, 5), {"labels": ("a", "b")}, "release 0.5 and frames 1 with age_ms"),
+        (("area", 2, 1, 5, 5), {"labels": ("a", "b")}, "release 1 and frames 5 with age_ms"),
+        (("area", 2, 1, 1, 5), {}, "labels are left out"),
+        (("area", 2), {"labels": (None, None)}, "labels are both left out"),
+        (("area", 2), {"labels": ("a", "a")}, "labels are both a"),
+        (("area", 2), {"labels": ("a",)}, "labels is"),
+        (("area", 2), {"labels": "ab"}, "labels is"),
+        (("area", 2), {"noise_floor": -1}, "noise_floor is -1"),
+    ],
+)
+def test_nonsense_is_refused_by_name(arguments, options, text):
+    with pytest.raises(ProblemError, match=text):
+        PlainRule(*arguments, **options)
+
+
+def test_what_a_rule_cannot_read_is_refused():
+    rule = PlainRule("area", 2)
+    with pytest.raises(ProblemError, match="plain rule without a tare"):
+        run(rule, press())
+    with pytest.raises(ProblemError, match="a plain rule reads a recording"):
+        run(rule, taxel.SpikeTrains.from_lists([[1.0]]))
+    with pytest.raises(ProblemError, match="tare of 3 x 4"):
+        run(rule, press(array=Array(4, 4)), tare=tare())
+
+
+# Tuning
+
+
+def played(seed, touches=12, gap_us=60_000):
+    """Touches of a planted size, with noise on single taxels and smaller touches between; labels 300 us early."""
+    draw = np.random.default_rng(seed)
+    rows, on, off = [], [], []
+    array = Array(12, 12)
+
+    def square(start, stop, side, ticks=20):
+        x0, y0 = draw.integers(0, 12 - side, 2)
+        for t, value in ((start, ticks), (stop, 0)):
+            rows.extend((t, x0 + k % side, y0 + k // side, value) for k in range(side * side))
+
+    for k in range(touches):
+        start = 20_000 + k * gap_us + int(draw.integers(0, 50)) * 100
+        stop = start + int(draw.integers(50, 200)) * 100
+        square(start, stop, 5)
+        on.append(start - 300)
+        off.append(stop - 300)
+        square(stop + 8_000, stop + 9_000, 3)
+    rows.sort(key=lambda row: row[0])
+    t, x, y, ticks = zip(*rows, strict=True)
+    events = Events(t, x, y, np.array(ticks) > 0, array=array, intensity=np.array(ticks))
+    return Example(events, {"hit": np.array(on), "gone": np.array(off)}, tare(array, 0.0))
+
+
+def test_tuning_finds_a_planted_rule():
+    examples = [played(seed) for seed in range(3)]
+    rules = tune(examples)
+    assert (rules["hit"].quantity, rules["hit"].threshold, rules["hit"].frames) == ("area", 16.0, 1)
+    assert repr(rules["hit"]).endswith("onset hit)")
+    assert repr(rules["gone"]).endswith("end gone)")
+    for example_ in [played(17), *examples]:
+        for name, rule in rules.items():
+            found = run(rule, example_.source, tare=example_.tare)
+            score = taxel.detect.score(found, {name: example_.labels[name]}, 50)
+            assert (score.missed, score.false) == (0, 0)
+
+
+def test_tuning_says_none_where_no_rule_is_better_than_nothing():
+    example_ = played(1)
+    nowhere = Example(example_.source, {"never": np.array([5_000, 5_100, 5_200])}, example_.tare)
+    assert tune([nowhere], window_ms=1.0) == {"never": None}
+    assert tune([example_], ["hit", "absent"])["absent"] is None
+    trains = taxel.encode.ContactArea(tare=example_.tare).encode(example_.source)
+    assert tune([Example(trains, example_.labels)]) == {"gone": None, "hit": None}
+
+
+def test_tuning_tells_two_kinds_by_area_at_an_age():
+    draw = np.random.default_rng(3)
+    array, rows, labels = Array(12, 12), [], {"small": [], "large": []}
+    for k in range(30):
+        start, large = 20_000 + 100_000 * k, bool(draw.integers(2))
+        labels["large" if large else "small"].append(start - 200)
+        # Both begin with 2 x 2; the large one grows from 2.5 ms on.
+        for t, side, value in ((start, 2, 20), (start + 2_500, 5 if large else 3, 20), (start + 20_000, 5, 0)):
+            rows.extend((t, 1 + j % side, 1 + j // side, value) for j in range(side * side))
+    t, x, y, ticks = zip(*rows, strict=True)
+    events = Events(t, x, y, np.array(ticks) > 0, array=array, intensity=np.array(ticks))
+    example_ = Example(events, labels, tare(array, 0.0))
+    rules = tune([example_])
+    assert rules["small"] == rules["large"]
+    assert rules["small"].age_ms == 3.0
+    assert rules["small"].labels == ("small", "large")
+    assert 9 < rules["small"].threshold < 25
+    score = taxel.detect.score(run(rules["small"], events, tare=example_.tare), labels, 50)
+    assert (score.missed, score.false) == (0, 0)
+    # With a third label that is an end, the two are still kinds.
+    with_end = labels | {"off": [t + 20_200 for one in labels.values() for t in one]}
+    found = tune([Example(events, with_end, example_.tare)])
+    assert found["small"] == rules["small"]
+    assert found["off"].labels == ("off",)
+
+
+def test_tuning_pictures():
+    source, held, pictures = played(4), np.zeros((12, 12)), []
+    stamps = np.unique(source.source.t)
+    for t in stamps:
+        now = source.source[source.source.t == t]
+        held[now.y, now.x] = now.intensity
+        pictures.append(held.copy())
+    frames = Frames(pictures, stamps, array=source.source.array)
+    rules = tune([Example(frames, source.labels, source.tare)])
+    assert rules["hit"] is not None
+    assert rules["hit"].labels == ("hit",)
+    for wrong in ({"window_ms": -1.0}, {"noise_floor": -1.0}, {"labels": [3]}):
+        with pytest.raises(ProblemError):
+            tune([source], **wrong)
+    with pytest.raises(ProblemError, match="without a tare"):
+        tune([source._replace(tare=None)])
