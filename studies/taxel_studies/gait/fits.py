@@ -158,7 +158,8 @@ def _recipe(
     first, *others = (point["learner"] for point in points)
     recipe = Recipe(Encoder.from_json(json.dumps(dict(encoder))), {}, {event: first | {"search": others}})
     judged = judge(examples, recipe, [outer], search=bool(others), window_ms=WINDOW_MS)
-    ((chosen, learners, _),) = judged.trained
+    (trained,) = judged.trained
+    chosen, learners = trained.recipe, trained.learners
     inside = judge(examples, chosen, inner, window_ms=WINDOW_MS).together if inner else None
     tested: dict[str, dict[str, Any]] = {g: {} for g, _ in rows}
     for (g, row), result in zip(rows, judged.scores, strict=True):
