@@ -29,9 +29,12 @@ fn a_file_gives_every_number_back_and_names_its_kind() {
     assert_eq!(neither, "readout: format is \"taxel song\", must be \"taxel readout\" or \"taxel plain rule\"");
 }
 
+/// Makes one part of a rule invalid.
+type Spoil = fn(&mut PlainRule);
+
 #[test]
 fn parts_that_make_no_sense_are_refused_by_name() {
-    let cases: [(fn(&mut PlainRule), &str); 11] = [
+    let cases: [(Spoil, &str); 11] = [
         (|r| r.threshold = 0.0, "threshold is 0"),
         (|r| r.threshold = f64::NAN, "threshold is NaN"),
         (|r| r.release = 0.0, "release is 0"),
