@@ -1,6 +1,6 @@
 """How many times faster than real time the local load is, beside the obvious NumPy.
 
-Peer: the obvious NumPy. Unit: times real time, on one core. Goals: 20; with two running means 5.
+Peer: the obvious NumPy. Unit: times real time, on one core. Goal: 20; with two running means 5.
 """
 
 from __future__ import annotations

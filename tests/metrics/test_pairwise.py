@@ -60,7 +60,7 @@ def test_lanes_give_the_bits_of_one_pair_after_the_other(vectors, q):
     random = np.random.default_rng(17)
     trains = [t for spikes in (0.3, 5, 40, 41, 200) for t in poisson(random, 15, spikes)]
     trains += [trains[20], np.repeat(trains[30], 2), np.round(trains[40]), np.round(trains[41])]
-    a, b = listed("a", trains), listed("b", trains[3:40])
+    a, b = (listed("victor_purpura", name, of) for name, of in (("a", trains), ("b", trains[3:40])))
     metric = stated("victor_purpura", {"q": q})
     try:
         wide = [_core.pairwise(metric, a, other, 1, vectors, None) for other in (None, b)]

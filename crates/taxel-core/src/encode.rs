@@ -31,6 +31,7 @@ pub use stream::Stream;
 pub use tare::{Tare, TareBuilder, Zeroing};
 
 use law::Law;
+use stream::{spikes_of_events, spikes_of_frames};
 
 use crate::parameters::Described;
 use crate::reading::{self, Unfit};
@@ -208,43 +209,6 @@ impl Encoder {
         let (out, end) = spikes_of_frames(&mut *stream, frames, stop)?;
         collect(&*stream, &out, frames.t.first().copied(), end)
     }
-}
-
-/// All spikes of a whole recording of events, and the end of their window, ms.
-fn spikes_of_events(
-    stream: &mut dyn Stream,
-    events: EventsView<'_>,
-    stop: Stop<'_>,
-) -> Result<(Vec<Spike>, Option<f64>)> {
-    /// Events between two checks of `stop`.
-    const PIECE: usize = 65_536;
-    events.check()?;
-    events.check_order()?;
-    let mut out = vec![];
-    for piece in events.pieces(PIECE) {
-        stop.check()?;
-        stream.push_events(piece, &mut out)?;
-    }
-    let end = stream.finish(&mut out);
-    Ok((out, end))
-}
-
-/// All spikes of a whole recording of pictures, and the end of their window, ms.
-fn spikes_of_frames(
-    stream: &mut dyn Stream,
-    frames: FramesView<'_>,
-    stop: Stop<'_>,
-) -> Result<(Vec<Spike>, Option<f64>)> {
-    frames.check()?;
-    let mut out = vec![];
-    for (k, (t, picture)) in frames.iter().enumerate() {
-        if k % 64 == 0 {
-            stop.check()?;
-        }
-        stream.push_frame(t, picture, &mut out)?;
-    }
-    let end = stream.finish(&mut out);
-    Ok((out, end))
 }
 
 fn collect(stream: &dyn Stream, out: &[Spike], first: Option<i64>, end: Option<f64>) -> Result<SpikeTrains> {

@@ -19,7 +19,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["events", "frames", "spikes"],
             &["held"],
             &["rest"],
-            &["circuit"],
+            &["baseline", "circuit"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],

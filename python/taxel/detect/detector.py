@@ -173,7 +173,7 @@ class ReadoutStream:
 
     Examples
     --------
-    >>> from taxel import Array, Frames, Neuron
+    >>> from taxel import Array, Frames, Neuron, Readout
     >>> from taxel.encode import LevelCrossing
     >>> readout = Readout(LevelCrossing([10.0]), {"contact": (Neuron(tau=2.0), [1.0, 0.0])})
     >>> stream = readout.stream(Array(1, 1), frame_us=10_000)

@@ -45,7 +45,7 @@ class _Fit(NamedTuple):
     wrong: int
     """Missed and false."""
     delay_ms: float
-    """Median of `known` minus label of those that were found; infinite without any."""
+    """Median distance of `known` from the label of those that were found; infinite without any."""
     error_ms: float
     """Median distance of a detection from its label; infinite without any."""
 
@@ -63,7 +63,9 @@ def tune(
     noise_floor: float = 3.0,
     progress: Callable[[str], object] | None = None,
 ) -> dict[str, PlainRule | None]:
-    """Return for each label the plain rule with the fewest missed and false detections, and of these the least delay.
+    """Return for each label the plain rule with the fewest missed and false detections, and of these the one nearest to them.
+
+    Nearest is `known`, at the median; before the label as after it, as what is known earlier responds to something else.
 
     Tried are all thresholds of the area (`AREAS`) and of the total (`QUANTILES` of its values above 0), with all
     numbers of frames (`FRAMES`) and releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
@@ -217,7 +219,7 @@ def _fit(found: _Found, true: NDArray[np.int64], width_us: int, most: int = 2**6
     wrong = len(missed) + len(false)
     if not len(delays):
         return _Fit(wrong, np.inf, np.inf)
-    return _Fit(wrong, float(np.median(delays)), float(np.median(np.abs(errors))))
+    return _Fit(wrong, float(np.median(np.abs(delays))), float(np.median(np.abs(errors))))
 
 
 def _for_kinds(

@@ -14,7 +14,7 @@ from taxel import _core
 from taxel._base.arguments import callback, flag, instance, number, shown, whole
 from taxel._base.parameters import defaults
 from taxel._core import NotFittedError, ProblemError
-from taxel.learn._examples import examples
+from taxel.learn._examples import examples, with_kind
 from taxel.learn._learner import SpikeLearner, predicted
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
@@ -364,6 +364,8 @@ class ConeXProblem:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
+        json, parts = self._stated
+        self._stated = json, [with_kind(one) for one in parts]
         self._lay_out()
         self._with_margin(state["margin"])
 

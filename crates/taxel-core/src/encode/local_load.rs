@@ -8,7 +8,7 @@ use super::loaded::given;
 use super::local_sums::{LocalSums, Sums, Values};
 use super::recent::{Recent, Window};
 use super::sampled::{Rule, Sampled};
-use super::stream::Stream;
+use super::stream::{Stream, spikes_of_events, spikes_of_frames};
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
@@ -121,7 +121,7 @@ impl LocalLoad {
     pub fn values_of_events(&self, events: EventsView<'_>, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
         let mut stream = self.sampled(events.array, Emit::Values)?;
-        Ok(quantities(&super::spikes_of_events(&mut stream, events, stop)?.0))
+        Ok(quantities(&spikes_of_events(&mut stream, events, stop)?.0))
     }
 
     /// The quantities of each picture, picture by picture, in the order of [`quantities`](Self::quantities).
@@ -132,7 +132,7 @@ impl LocalLoad {
     pub fn values_of_frames(&self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
         let mut stream = self.sampled(frames.array, Emit::Values)?;
-        Ok(quantities(&super::spikes_of_frames(&mut stream, frames, stop)?.0))
+        Ok(quantities(&spikes_of_frames(&mut stream, frames, stop)?.0))
     }
 
     /// The largest local sum alone, of an array's pictures.

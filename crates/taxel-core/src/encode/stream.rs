@@ -1,6 +1,6 @@
 //! The interface of a running encoder.
 
-use crate::{EventsView, Result, Spike, SpikeKind};
+use crate::{EventsView, FramesView, Result, Spike, SpikeKind, Stop};
 
 /// A running encoder: it reads events or frames in order of time and emits spikes as soon as they are certain.
 ///
@@ -71,4 +71,41 @@ impl Clone for Box<dyn Stream> {
 /// Sorts the spikes from index `from` on by time, then by train.
 pub(super) fn sort_from(out: &mut [Spike], from: usize) {
     out[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
+}
+
+/// All spikes of a whole recording of events, and the end of their window, ms.
+pub(super) fn spikes_of_events(
+    stream: &mut dyn Stream,
+    events: EventsView<'_>,
+    stop: Stop<'_>,
+) -> Result<(Vec<Spike>, Option<f64>)> {
+    /// Events between two checks of `stop`.
+    const PIECE: usize = 65_536;
+    events.check()?;
+    events.check_order()?;
+    let mut out = vec![];
+    for piece in events.pieces(PIECE) {
+        stop.check()?;
+        stream.push_events(piece, &mut out)?;
+    }
+    let end = stream.finish(&mut out);
+    Ok((out, end))
+}
+
+/// All spikes of a whole recording of pictures, and the end of their window, ms.
+pub(super) fn spikes_of_frames(
+    stream: &mut dyn Stream,
+    frames: FramesView<'_>,
+    stop: Stop<'_>,
+) -> Result<(Vec<Spike>, Option<f64>)> {
+    frames.check()?;
+    let mut out = vec![];
+    for (k, (t, picture)) in frames.iter().enumerate() {
+        if k % 64 == 0 {
+            stop.check()?;
+        }
+        stream.push_frame(t, picture, &mut out)?;
+    }
+    let end = stream.finish(&mut out);
+    Ok((out, end))
 }
