@@ -111,7 +111,7 @@ def against_peers(spikes, absent, *, quick):
 def minutes(metric, patterns, vectors=None, **parameters):
     """Return the CPU minutes of a matrix of all of these patterns, on one thread."""
     begun = time.thread_time()
-    _core.pairwise(stated(metric, parameters), listed("victor_purpura", "a", patterns), None, 1, vectors, None)
+    _core.pairwise(stated(metric, parameters), listed(metric, "a", patterns), None, 1, vectors, None)
     return (time.thread_time() - begun) / 60
 
 

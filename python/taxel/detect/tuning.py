@@ -63,9 +63,9 @@ def tune(
     noise_floor: float = 3.0,
     progress: Callable[[str], object] | None = None,
 ) -> dict[str, PlainRule | None]:
-    """Return for each label the plain rule with the fewest missed and false detections, and of these the one nearest to them.
+    """Return for each label the plain rule with the fewest missed and false detections, and of these the nearest one.
 
-    Nearest is `known`, at the median; before the label as after it, as what is known earlier responds to something else.
+    Nearest at the median of `known`, before the label as after it: what is known earlier responds to something else.
 
     Tried are all thresholds of the area (`AREAS`) and of the total (`QUANTILES` of its values above 0), with all
     numbers of frames (`FRAMES`) and releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
