@@ -11,7 +11,7 @@ __all__ = ["bar", "duration"]
 
 @contextmanager
 def bar(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Show a bar; the function takes what is done next, how much is done, and all of it (0 where nobody knows)."""
+    """Show a bar; the function takes what is done next, how much is done, and all of it (0 if unknown)."""
     from rich.console import Console  # noqa: PLC0415  the command line starts quickly
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn  # noqa: PLC0415
 

@@ -195,7 +195,7 @@ class _Training:
             try:
                 scored = judge(self.examples, plan, count, **how, progress=self.update)
             except ProblemError as error:
-                # Nobody asked for these folds, and all of the data may still be learnt from.
+                # These folds are the default, not a request, and all of the data may still be learnt from.
                 if folds is not None:
                     raise
                 count, why = 0, f"a part of the training data cannot be learnt from: {error}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
@@ -24,7 +25,7 @@ from taxel.wire import FRAME_US
 __all__ = ["ReadoutStream", "detector", "read", "tare_text"]
 
 
-class _Detector:
+class _Detector(ABC):
     """What a readout and a plain rule have in common: a file, and a stream."""
 
     #: What it is, in errors.
@@ -33,19 +34,19 @@ class _Detector:
     _parts: dict[str, Any]
 
     @staticmethod
+    @abstractmethod
     def _check(text: str) -> str:
         """Check the text of its file, and return it with every default filled in."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def array(self) -> Array | None:
         """The sensor, or None where any will do."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def labels(self) -> tuple[str, ...]:
         """The labels that it detects."""
-        raise NotImplementedError
 
     @classmethod
     def _from_text(cls, text: str) -> Self:

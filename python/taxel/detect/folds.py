@@ -27,7 +27,7 @@ __all__ = ["Fold", "Judged", "Part", "choose", "judge"]
 
 #: Into how many folds the training data of a fold are split for a search, where nothing else is stated.
 INNER = 3
-#: Into how many folds examples are split at most, where nobody states it.
+#: Into how many folds examples are split at most by default.
 _MOST = 5
 
 
@@ -346,7 +346,7 @@ def _only(examples: Sequence[Example], label: str) -> list[Example]:
 
 
 def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
-    """Return into how many folds (checked) examples are split where nobody states it; 0 where they cannot be, and why.
+    """Return into how many folds (checked) examples are split by default; 0 where they cannot be, and why.
 
     At most five, not more than half the events of the rarest label, of several examples not more than these. Each
     label must be in the training data of every fold.
