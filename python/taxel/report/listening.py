@@ -33,6 +33,8 @@ __all__ = ["write_listening"]
 
 #: How many moments are drawn a label, and how much around each in time constants of the neuron.
 _MOMENTS, _AROUND = 4, 6.0
+#: How much more is drawn around an event that was missed and a false detection, ms: the usual window of a score.
+_MISSED_MS = 50.0
 #: Files that `taxel view` shows, and the largest number of them that the page lists.
 _VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Maps of weights that are drawn a label, those with the largest weights first.
@@ -184,8 +186,10 @@ def _potential(
     figure, axes = plt.subplots(
         1, len(moments), figsize=(2.9 * len(moments), 2.6), layout="constrained", squeeze=False, sharey=True
     )
-    reach = _AROUND * one.neuron.tau + one.delay_ms
     for axis, moment in zip(axes[0], moments, strict=True):
+        # Wide enough for the label and its detection, or for what was felt late of one that has none.
+        apart = moment.badness if np.isfinite(moment.badness) else _MISSED_MS
+        reach = _AROUND * one.neuron.tau + one.delay_ms + apart
         outcome = listened[moment.recording]
         trains = _trains(readout, outcome)
         detected_ms = to_ms(outcome.found[label].t)
