@@ -32,7 +32,7 @@ def held(seed: int, n: int = 3000) -> Events:
     """Touches of all taxels, as events with held values."""
     rng = np.random.default_rng(seed)
     t = np.sort(rng.integers(0, 60_000, n))
-    level = 50 + 30 * (np.sin(t / 4000) > 0) * (t < 50_000)
+    level = 50 + 30 * (np.sin(t / 400) > 0) * (t < 50_000)
     ticks = level + rng.integers(0, 9, n) * (t < 50_000)
     return Events(t, rng.integers(0, 4, n), rng.integers(0, 4, n), rng.random(n) < 0.5, intensity=ticks, array=ARRAY)
 
@@ -49,7 +49,7 @@ def neurons(seed: int, **options: object) -> dict[str, TrainedNeuron]:
         parts = PARTS if names is None else names
         counts = [PARTS[name].trains(ARRAY) * (1 + PARTS[name].signed) for name in parts]
         neuron = Neuron(**({"tau": 2.0, "refractory": 1.0} | options))
-        made[label] = TrainedNeuron(neuron, rng.normal(0.03, 0.2, 2 * sum(counts)), 0.5, tuple(names or ()))
+        made[label] = TrainedNeuron(neuron, rng.normal(1.2 / sum(counts), 0.2, 2 * sum(counts)), 0.5, tuple(names or ()))
     return made
 
 
@@ -69,9 +69,10 @@ def test_a_neuron_detects_what_it_would_behind_its_inputs_alone(source, options)
         assert readout.encoder_of(label) == encoder
         alone = run(Readout(encoder, {label: one._replace(inputs=())}, array=ARRAY, delays_ms=DELAYS), recording)
         own = whole[label]
-        assert len(own) > 3
+        assert len(own) > 0
         assert (own.t.tolist(), own.known.tolist()) == (alone.t.tolist(), alone.known.tolist())
         assert own.slope.tobytes() == alone.slope.tobytes()
+    assert len(whole) > 30
     assert Composite(PARTS).only(INPUTS["c"]).latency_ms == PARTS["late"].latency_ms > 0
 
 
@@ -88,7 +89,8 @@ def test_a_recording_its_pieces_and_its_trains_give_the_same() -> None:
         found += list(stream.advance(start + 500))
     found += list(stream.advance(3_000_000))
     assert [(d.label, d.t) for d in found] == list(zip(whole.label, whole.t, strict=True))
-    same(run(readout, Composite(PARTS).encode(events)), whole)
+    # What is held at the end causes spikes of the late part for as long as the readout runs on.
+    same(run(readout, Composite(PARTS).encode(events)), whole[whole.known < 75_000])
 
 
 def test_the_file_holds_encoders_and_inputs_and_one_without_them_stays_as_it_is(tmp_path: Path) -> None:
@@ -214,10 +216,15 @@ def recipe(**more: object) -> Recipe:
             "displacement_mm": "none",
         },
     }
-    kind = {"inputs": ["moments"], "kernel": "alpha", "tau": 0.5, "ub": 50.0, "lb": -50.0, "delay_ms": 4.0}
+    kind = {
+        "inputs": ["moments"], "kernel": "alpha", "tau": 0.5, "step_ms": 1.0, "ub": 50.0, "lb": -50.0, "delay_ms": 4.0,
+        "lambdas": [0.0, 0.001, 0.0, 1.0, 1.0], "divide_c_by": "targets", "divide_d_by": "targets", "norm": "square",
+        "sides_c": "below", "margin": 0.1,
+    }  # fmt: skip
     values = {
         "encoders": encoder,
         "align": True,
+        "run_threshold": 0.9,
         "learner": LEARNER,
         "neurons": {"contact": {"inputs": ["area"]}, "strong": kind, "weak": kind},
     }
@@ -232,7 +239,7 @@ def test_each_neuron_is_trained_on_its_inputs_as_if_they_were_the_encoder() -> N
         "contact": ("area",), "strong": ("moments",), "weak": ("moments",)
     }  # fmt: skip
     alone = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples]
-    single = train(alone, Recipe(ContactArea(), LEARNER, align=True))
+    single = train(alone, Recipe(ContactArea(), LEARNER, run_threshold=0.9, align=True))
     assert single.neurons["contact"].weights.tobytes() == readout.neurons["contact"].weights.tobytes()
     new = touches(9)
     found = run(readout, new.source, tare=REST)
@@ -247,9 +254,9 @@ def test_each_neuron_is_trained_on_its_inputs_as_if_they_were_the_encoder() -> N
 def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() -> None:
     examples = [touches(seed) for seed in range(4)]
     alone = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples]
-    nothing = {"name": "contact_area", "levels": [1000]}
-    points = {"contact": {"inputs": ["nothing"], "search": [{"inputs": ["area"]}]}}
-    plan = recipe(encoders={"area": {"name": "contact_area"}, "nothing": nothing}, neurons=points)
+    strong = {"name": "contact_area", "noise_floor": 20.0}  # feels half of the touches
+    points = {"contact": {"inputs": ["strong"], "search": [{"inputs": ["area"]}]}}
+    plan = recipe(encoders={"area": {"name": "contact_area"}, "strong": strong}, neurons=points)
     chosen = choose(alone, plan, k=2)
     assert chosen.inputs_of("contact") == ("area",)
     assert chosen.encoder == plan.encoder

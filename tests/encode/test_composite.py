@@ -43,7 +43,7 @@ def test_the_spikes_are_those_of_the_parts_in_the_order_of_their_names(encoder: 
         assert found.kind == wanted.kind == encoder.kind
         assert (found.start, found.stop, len(found)) == (wanted.start, wanted.stop, encoder.trains(ARRAY))
         assert spikes_of(found) == spikes_of(wanted)
-        assert min(len(one.times) for one in each) > 3, "every part has something to say"
+        assert min(len(one.times) for one in each) > 0, "every part has something to say"
     assert encoder.latency_ms == max(part.latency_ms for part in encoder.parts.values())
 
 
@@ -63,10 +63,10 @@ def test_a_part_s_tare_in_seconds_is_taken_at_the_beginning() -> None:
     values = np.full((400, 3, 4), 50.0)
     values[200:300, :2, :2] = 90.0
     frames = Frames(values, np.arange(400) * 200, unit="ticks", array=ARRAY)
-    parts = {"a": ContactArea(tare=0.02), "b": Moments(graded=True, tare=0.01), "c": FA1()}
+    parts = {"a": ContactArea(tare=0.02), "b": Moments(graded=True, tare=0.01), "c": FA1(period_ms=0.2)}
     given = Tare.take(frames, stop_us=20_000)
     assert Composite(parts).encode(frames) == Composite(parts).with_tare(given).encode(frames)
-    with refused("needs a tare"):
+    with refused("a: contact area without a tare"):
         Composite({"a": ContactArea()}).encode(frames)
 
 
@@ -85,7 +85,7 @@ def test_the_order_in_which_parts_are_given_says_nothing() -> None:
     [
         ({}, "parts is empty"),
         (None, "parts is None: must be encoders by name"),
-        ({"a": 3}, r"parts\['a'\] is 3: must be a taxel.encode"),
+        ({"a": 3}, r"parts\['a'\] is 3: must be a taxel.Encoder"),
         ({" ": FA1()}, "a part without a name"),
         ({3: FA1()}, "a name in parts is 3"),
         ({"a": Composite({"b": FA1()})}, "a is a composite itself"),

@@ -47,9 +47,10 @@ def train(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="The recipe to start from: touch (events of a board), gait_plate (counts), gait_insole (N), gait_channel "
-            "(others); or a TOML or JSON file (a path with a dot or a slash): [encoder] or [encoders.NAME], [learner], "
-            "[neurons.LABEL], run_threshold, align. Default, without --encoder: that which fits the recording."
+            help="The recipe to start from: touch (events of a board), gait_plate (counts), gait_insole (N), "
+            "gait_channel (others); or a TOML or JSON file (a path with a dot or a slash): [encoder] or "
+            "[encoders.NAME], [learner], [neurons.LABEL], run_threshold, align. Default, without --encoder: that which "
+            "fits the recording."
         ),
     ] = None,
     encoder: Annotated[
