@@ -49,7 +49,9 @@ def neurons(seed: int, **options: object) -> dict[str, TrainedNeuron]:
         parts = PARTS if names is None else names
         counts = [PARTS[name].trains(ARRAY) * (1 + PARTS[name].signed) for name in parts]
         neuron = Neuron(**({"tau": 2.0, "refractory": 1.0} | options))
-        made[label] = TrainedNeuron(neuron, rng.normal(1.2 / sum(counts), 0.2, 2 * sum(counts)), 0.5, tuple(names or ()))
+        made[label] = TrainedNeuron(
+            neuron, rng.normal(1.2 / sum(counts), 0.2, 2 * sum(counts)), 0.5, tuple(names or ())
+        )
     return made
 
 
