@@ -223,7 +223,9 @@ def open_recording(path: Path, array: str | None = None) -> Recording:
     """Open a file with the sensor of ``--array``."""
     from taxel import recording  # noqa: PLC0415  the command line starts quickly
 
-    return of_array(recording.open_recording(path, array=None if array is None else geometry(array)), array)
+    return of_array(
+        recording.open_recording(path, array=None if array is None else geometry(array, of_wire=False)), array
+    )
 
 
 def of_source(recording: Recording, name: str | None) -> Recording:
@@ -240,5 +242,5 @@ def open_all(paths: Sequence[Path], array: str | None = None) -> list[Recording]
     """Open recordings one after the other; of a folder, or of another maker's file, all trials in it."""
     from taxel.recording.opening import open_any  # noqa: PLC0415  the command line starts quickly
 
-    opened = (open_any(path, array=None if array is None else geometry(array)) for path in paths)
+    opened = (open_any(path, array=None if array is None else geometry(array, of_wire=False)) for path in paths)
     return [of_array(one, array) for each in opened for one in (each if isinstance(each, list) else [each])]

@@ -109,6 +109,10 @@ def array_of(examples: Sequence[Example]) -> Array | None:
     """
     arrays = [None if isinstance(one.source, SpikeTrains) else one.source.array for one in examples]  # type: ignore[union-attr]
     for k, array in enumerate(arrays):
-        if array != arrays[0]:
-            raise ProblemError(f"example {k} is of {array!r}, example 0 of {arrays[0]!r}: must be equal")
+        first = arrays[0]
+        if array is None and first is None:
+            continue
+        if array is None or first is None or not first.fits(array):
+            raise ProblemError(f"example {k} is of {array!r}, example 0 of {first!r}: must have the same taxels")
+        first._warn_apart(array, f"example {k}", stacklevel=3)
     return arrays[0]

@@ -14,12 +14,15 @@ from taxel._core import FormatError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import Trial
+from taxel.formats.layout import Layout
 from taxel.labels import Labels, Note
 from taxel.recording.contents import Contents
 from taxel.recording.csv import read_csv
 from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, kind_of
+from taxel.recording.layout import laid_out
 from taxel.recording.npz import read_npz
+from taxel.recording.read_foreign import is_foreign, read_foreign
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.recording import Recording
@@ -32,7 +35,12 @@ LABELS = "labels.csv"
 
 
 def open_any(
-    path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
+    path: str | os.PathLike[str],
+    *,
+    array: Array | None = None,
+    layout: str | os.PathLike[str] | None = None,
+    pairing: str = "direct",
+    differences: bool = False,
 ) -> Any:
     r"""Open a recording, or a folder of trials.
 
@@ -46,6 +54,9 @@ def open_any(
     array : Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
         a larger one if events lie outside it.
+    layout : path, optional
+        The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
+        ``layout.toml`` beside it, if there is one.
     pairing : {"direct", "taxel"}
         Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
     differences : bool
@@ -81,17 +92,22 @@ def open_any(
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
     place = Path(arguments.path("path", path))
-    how: dict[str, Any] = {"array": array, "pairing": pairing, "differences": differences}
+    how: dict[str, Any] = {"array": array, "layout": layout, "pairing": pairing, "differences": differences}
     if place.is_dir():
         return _folder(place, how)
     # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
     if place.exists() and (names := _formats(place)) and not _is_own(place):
-        return [_of(trial, place, names[0]) for trial in formats.trials(place, names[0])]
+        return [_of(trial, place, names[0], layout) for trial in formats.trials(place, names[0])]
     return open_recording(place, **how)
 
 
 def open_recording(
-    path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
+    path: str | os.PathLike[str],
+    *,
+    array: Array | None = None,
+    layout: str | os.PathLike[str] | None = None,
+    pairing: str = "direct",
+    differences: bool = False,
 ) -> Recording:
     """Open one .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged.
 
@@ -101,6 +117,9 @@ def open_recording(
     array : Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
         a larger one if events lie outside it.
+    layout : path, optional
+        The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
+        ``layout.toml`` beside it, if there is one.
     pairing : {"direct", "taxel"}
         Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
     differences : bool
@@ -124,9 +143,12 @@ def open_recording(
         instance("array", array, Array)
     text("pairing", pairing, ("direct", "taxel"))
     flag("differences", differences)
-    kind = kind_of(place)
+    said = _layout(place, layout)
     try:
-        return Recording(with_sidecars(_read(place, kind, array, pairing, differences)))
+        if said is not None and is_foreign(place):
+            return Recording(with_sidecars(laid_out(read_foreign(place, said), said)))
+        contents = _read(place, kind_of(place), array, pairing, differences)
+        return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
 
@@ -142,12 +164,14 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
 
 def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
-    own = sorted((f for f in folder.iterdir() if f.is_file() and f.name != LABELS and _is_own(f)), key=_order)
+    files = sorted((f for f in folder.iterdir() if f.is_file() and f.name != LABELS), key=_order)
+    own = [file for file in files if _is_own(file)]
     if own:
         opened = [open_recording(file, **how) for file in own]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
+    elif not (names := _formats(folder)) and (foreign := [f for f in files if _is_laid_out(f, how["layout"])]):
+        pairs = [(file.relative_to(folder), open_recording(file, **how)) for file in foreign]
     else:
-        names = _formats(folder)
         if len(names) != 1:
             problem = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
             deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
@@ -155,7 +179,7 @@ def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
             there = f"there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}"
             raise FormatError(f"{folder}: holds {problem}; {hint or there}")
         trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
-        pairs = [(Path(trial.name), _of(trial, folder, names[0])) for trial in trials]
+        pairs = [(Path(trial.name), _of(trial, folder, names[0], how["layout"])) for trial in trials]
     return _labelled(folder / LABELS, pairs)
 
 
@@ -187,7 +211,19 @@ def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
     )
 
 
-def _of(trial: Trial, place: Path, kind: str) -> Recording:
+def _is_laid_out(file: Path, given: str | os.PathLike[str] | None) -> bool:
+    """Return whether a file of a folder is of somebody else, and a layout says how to read it."""
+    is_labels = file.name.endswith(".notes.csv")
+    return is_foreign(file) and not is_labels and (given is not None or Layout.beside(file) is not None)
+
+
+def _layout(place: Path, given: str | os.PathLike[str] | None) -> Layout | None:
+    """Return what the given layout file says, or the one beside a recording; None if there is none."""
+    file = Layout.beside(place) if given is None else Path(arguments.path("layout", given))
+    return None if file is None else Layout.read(file)
+
+
+def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | None) -> Recording:
     """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
@@ -196,7 +232,9 @@ def _of(trial: Trial, place: Path, kind: str) -> Recording:
     events, frames = (table, None) if isinstance(table, Events) else (None, table)
     path = place if place.is_file() else place / trial.name
     held: dict[str, Any] = {"events": events, "frames": frames, "source": trial.source, "notes": tuple(notes)}
-    return Recording(with_sidecars(Contents(path, trial.name, kind, table.array, **held)))
+    contents = Contents(path, trial.name, kind, table.array, side=trial.foot, **held)
+    said = _layout(place, layout)
+    return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
 
 
 def _formats(place: Path) -> list[str]:
