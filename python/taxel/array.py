@@ -356,13 +356,15 @@ class Array:
         instance("other", other, Array)
         return self.shape == other.shape and np.array_equal(self._there(), other._there())
 
-    def _warn_apart(self, other: Array, what: str, stacklevel: int = 2) -> None:
-        """Warn if another sensor's pitch or places differ, of which nothing is refused; unknown ones do not differ."""
-        if self._is_measured and other._is_measured and (self.pitch_mm, self.places) != (other.pitch_mm, other.places):
-            warnings.warn(
-                f"{what}: {other.name} has its taxels {other._apart()}, {self.name} {self._apart()}",
-                stacklevel=stacklevel + 1,
-            )
+    def _warn_apart(self, other: Array, what: str, stacklevel: int = 2) -> bool:
+        """Warn, and return true, if another sensor's known pitch or places differ, for which nothing is refused."""
+        known = self._is_measured and other._is_measured
+        if not known or (self.pitch_mm, self.places) == (other.pitch_mm, other.places):
+            return False
+        own, its = self._apart(), other._apart()
+        differ = f"its taxels {its}, not {own}" if own != its else "its taxels at other places"
+        warnings.warn(f"{what}: {other.name} has {differ} as {self.name}", stacklevel=stacklevel + 1)
+        return True
 
     def _part(self, x: slice, y: slice) -> Array:
         """Return a rectangle of columns `x` and rows `y`, which holds a taxel, as a sensor of its own."""
