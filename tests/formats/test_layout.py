@@ -13,6 +13,8 @@ import taxel
 from taxel import Array, Events, FormatError, Frames, Places
 from taxel.formats.layout import Layout, packaged
 
+from .making import write_gaitpdb
+
 VALUES = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [6.5, 0.0, 1.0, 2.0, 3.0, 4.0], [9.0, 8.0, 7.0, 6.0, 5.0, 4.0]])
 
 
@@ -75,7 +77,6 @@ def test_readings_that_fall_are_turned_once(tmp_path: Path) -> None:
     for falls, expected in (("true", -VALUES), ("10", 10 - VALUES), ("false", VALUES)):
         recording = table(tmp_path, lines(VALUES), f"falls = {falls}\nrate_hz = 100")
         np.testing.assert_array_equal(recording.frames().values[:, 0], expected.astype(np.float32))
-        taxel.convert(recording, tmp_path / "turned" / "kept.npz") if (tmp_path / "turned").exists() else None
     (tmp_path / "turned").mkdir()
     taxel.convert(recording, tmp_path / "turned" / "kept.npz")
     assert taxel.open(tmp_path / "turned" / "kept.npz").frames() == recording.frames()
@@ -134,9 +135,7 @@ def test_a_folder_of_tables_opens_by_its_one_layout(tmp_path: Path) -> None:
 
 
 def test_gaitpdb_comes_with_the_places_that_its_source_states(tmp_path: Path) -> None:
-    from formats.test_gaitpdb import write  # noqa: PLC0415
-
-    left, right = taxel.open(write(tmp_path))
+    left, right = taxel.open(write_gaitpdb(tmp_path))
     assert (left.side, right.side) == ("left", "right")
     for foot, sign in ((left, -1), (right, 1)):
         places = foot.array.places
@@ -201,9 +200,7 @@ def test_a_layout_that_contradicts_the_file_is_refused(tmp_path: Path, frames: F
 
 
 def test_a_layout_for_another_count_of_channels_of_a_trial_is_refused(tmp_path: Path) -> None:
-    from formats.test_gaitpdb import write  # noqa: PLC0415
-
-    write(tmp_path)
+    write_gaitpdb(tmp_path)
     (tmp_path / "layout.toml").write_text("[places]\nx = [1, 2]\ny = [1, 2]\n")
     with pytest.raises(FormatError, match=r"layout\.toml: .*must be \(1, 8\), one a taxel"):
         taxel.open(tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +31,8 @@ def arrays(draw: st.DrawFn) -> Array:
     rows, columns = draw(st.integers(1, 5)), draw(st.integers(1, 5))
     exists = draw(st.none() | st.lists(st.booleans(), min_size=rows * columns, max_size=rows * columns))
     grid = None if exists is None else np.array(exists).reshape(rows, columns)
+    if grid is not None:
+        grid[0, 0] = True
     length = st.floats(1e-6, 1e6) | st.just(1.0)
     pitch = draw(st.none() | length | st.tuples(length, length))
     places = None
@@ -88,13 +91,14 @@ def test_a_pitch_of_1_of_before_is_unknown_and_others_are_kept(name: str, expect
     assert len(table) > 0
 
 
-def test_the_board_s_recording_of_before_is_of_the_thesis_array_and_is_written_with_the_same_header() -> None:
+def test_the_board_s_recording_of_before_is_of_the_thesis_array_and_is_written_the_same(tmp_path: Path) -> None:
     recording = taxel.open(OLD / "board.mcap")
     assert recording.array == Array.thesis()
-    assert json.dumps(recording.array._geometry()).encode()[:60] in json.dumps(Array.thesis()._geometry()).encode()
-    header = b'"array":{"rows":64,"columns":64,"pitch_mm":2.67,"name":"thesis 64x64"'
-    written = (OLD / "board.mcap").read_bytes().replace(b" ", b"")
-    assert header.replace(b" ", b"") in written
+    again = tmp_path / "again.mcap"
+    taxel.convert(recording, again)
+    header = re.search(rb'"array":\{[^}]*\}', (OLD / "board.mcap").read_bytes())
+    assert header is not None
+    assert header[0] in again.read_bytes()
 
 
 def test_tare_calibration_and_readout_of_before_load() -> None:
@@ -176,7 +180,7 @@ def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse()
         (lambda: _encode(taxel.encode.LocalLoad, Array(1, 4, name="foot")), "local load needs neighbours"),
         (lambda: taxel.simulate.Layer(array=Array(8, 8, name="mat")), "the pitch of mat is not known"),
         (lambda: taxel.simulate.Layer(array=Array(8, 8, (2.0, 3.0), name="mat")), "same pitch between rows"),
-        (lambda: taxel.metrics.VanRossumSpatial(array=Array(2, 2, name="mat")).distance(_trains(), _trains()), "mat"),
+        (lambda: taxel.metrics.van_rossum_spatial(_trains(), _trains(), array=Array(2, 2, name="mat")), "pitch of mat"),
         (lambda: Array(2, 2, name="mat").row_mm, "row_mm needs mm, and the pitch of mat"),
     ],
 )
@@ -207,7 +211,8 @@ def test_displacement_is_measured_along_each_axis_s_own_pitch_and_by_places() ->
     def spikes(array: Array) -> int:
         frames = Frames(values, [0, 1000, 2000], array=array)
         tare = Tare.take(Frames(values[:1].repeat(2, 0), [0, 1000], array=array))
-        encoder = taxel.encode.Moments(displacement_mm=(5.0, 7.0), levels=2, tare=tare)
+        only = {"area": None, "total": None, "peak": None}
+        encoder = taxel.encode.Moments(displacement_mm=(5.0, 7.0), levels=2, tare=tare, **only)
         return len(encoder.encode(frames).times)
 
     y, x = np.indices((4, 4)) * np.array([7.62, 5.08])[:, None, None]
