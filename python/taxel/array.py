@@ -448,9 +448,9 @@ class Array:
 def _pitch(pitch: object) -> float | tuple[float, float]:
     """Return a pitch as one number, or as a pair if its two numbers differ."""
     pair = isinstance(pitch, tuple | list) or (isinstance(pitch, np.ndarray) and pitch.ndim > 0)
-    values = list(pitch) if pair else [pitch]  # type: ignore[call-overload]
-    if pair and len(values) != 2:
+    if pair and len(pitch) != 2:  # type: ignore[arg-type]
         raise ProblemError(f"pitch_mm is {shown(pitch)}: must be a number, or two, that of rows and that of columns")
+    values = list(pitch) if pair else [pitch]  # type: ignore[call-overload]
     each = [number("pitch_mm", value, "mm") for value in values]
     if not all(np.isfinite(one) and one > 0 for one in each):
         raise ProblemError(f"pitch_mm is {shown(pitch)}: must be above 0 and finite")
