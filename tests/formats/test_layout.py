@@ -20,7 +20,7 @@ VALUES = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [6.5, 0.0, 1.0, 2.0, 3.0, 4.0
 
 def table(folder: Path, text: str, layout: str, name: str = "step.txt") -> Any:
     (folder / name).write_text(text)
-    (folder / f"{name.split('.')[0]}.layout.toml").write_text(layout)
+    (folder / f"{name.split('.', maxsplit=1)[0]}.layout.toml").write_text(layout)
     return taxel.open(folder / name)
 
 
@@ -96,7 +96,7 @@ def test_arrays_of_somebody_else(tmp_path: Path, ending: str, flat: bool) -> Non
     elif ending == ".npz":
         np.savez(place, palm=values, other=np.zeros(2), when=[0.0, 0.25, 0.75])
     else:
-        import h5py  # noqa: PLC0415
+        import h5py
 
         with h5py.File(place, "w") as h5:
             h5["palm"], h5["other"], h5["when"] = values, np.zeros(2), [0.0, 0.25, 0.75]

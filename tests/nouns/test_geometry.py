@@ -112,7 +112,9 @@ def test_tare_calibration_and_readout_of_before_load() -> None:
     assert taxel.open(OLD / "mat.npz").calibrated().unit == "N"
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, (1.0,), (1.0, 2.0, 3.0), (1.0, 0.0), "wide", True, [[1.0, 2.0]]])
+@pytest.mark.parametrize(
+    "value", [0.0, -1.0, np.nan, np.inf, (1.0,), (1.0, 2.0, 3.0), (1.0, 0.0), "wide", True, [[1.0, 2.0]]]
+)
 def test_a_pitch_that_makes_no_sense_is_refused(value: Any) -> None:
     with pytest.raises(ProblemError, match="pitch_mm"):
         Array(2, 2, pitch_mm=value)

@@ -3,29 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from taxel._core import ProblemError
 
 if TYPE_CHECKING:
     from taxel.array import Array
-    from taxel.recording import Recording
 
-__all__ = ["FileArrayOption", "geometry", "of_array"]
-
-#: Option of the commands that read files; those that receive have `taxel.cli._board.ArrayOption`.
-FileArrayOption = Annotated[
-    str | None,
-    typer.Option(
-        "--array",
-        metavar="ROWSxCOLUMNS[xMM]",
-        help="Rows, columns and pitch (mm) of the sensor, as 24x20x5, for files without them (events as .csv, .lsa). "
-        "Default: 64x64x2.67, or a larger array if events lie outside it. Without the pitch it is 2.67 mm for events "
-        "of the board, else unknown.",
-    ),
-]
+__all__ = ["geometry"]
 
 
 def geometry(size: str, *, of_wire: bool = True) -> Array:
@@ -40,23 +25,3 @@ def geometry(size: str, *, of_wire: bool = True) -> Array:
     pitch = float(match[3]) if match[3] else pitch
     same = (rows, columns, pitch) == (*thesis.shape, thesis.pitch_mm)
     return thesis if same else Array(rows, columns, pitch_mm=pitch, name=size)
-
-
-def of_array(recording: Recording, size: str | None) -> Recording:
-    """Return the recording on the sensor of ``--array``; refuse one that differs from the sensor that it holds.
-
-    A size without a pitch says nothing of it: events without one are of the board's wire, and have that of the thesis.
-    """
-    if size is None:
-        return recording
-    from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
-    from taxel.recording.layout import on_array  # noqa: PLC0415
-
-    own, given = recording.array, geometry(size, of_wire=False)
-    differs = given.pitch_mm is not None and (own.pitch_mm, own.places) != (given.pitch_mm, None)
-    if own.shape != given.shape or differs:
-        raise ProblemError(f"--array {size}: {recording.path} holds its own sensor, {own!r}; leave it out")
-    if not recording.has_events or own._is_measured:
-        return recording
-    wire = geometry(size)
-    return type(recording)(on_array(recording._contents, Array(*own.shape, wire.pitch_mm, own.exists, wire.name)))

@@ -204,6 +204,10 @@ class Layout:
                 return candidate
         return None
 
+    def grid(self) -> Array | None:
+        """Return a sensor of its rows and columns; None if it does not say them."""
+        return None if self.rows is None or self.columns is None else Array(self.rows, self.columns)
+
     def array(self, taxels: int, own: Array | None = None, side: str = "") -> Array:
         """Return the sensor that it describes.
 

@@ -10,7 +10,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.layout import Layout, packaged
 from taxel.frames import Frames
-from taxel.recording.contents import Contents, once
+from taxel.recording.contents import Contents, alone, once
 
 __all__ = ["laid_out", "on_array"]
 
@@ -45,6 +45,11 @@ def laid_out(of: Contents, layout: Layout) -> Contents:
     ------
     FormatError : the layout is of another number of taxels, or contradicts the file (names the layout)
     """
+    if of.sources:
+        sources = {n: one if one.columns else laid_out(one.but(sources={}), layout) for n, one in of.sources.items()}
+        for name, one in sources.items():
+            sources[name] = one.but(sources=sources)
+        return alone(sources)
     try:
         array = _array(of, layout)
     except ProblemError as error:
