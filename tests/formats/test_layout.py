@@ -111,9 +111,8 @@ def test_arrays_of_somebody_else(tmp_path: Path, ending: str, flat: bool) -> Non
 def test_a_layout_says_what_our_own_files_lack(tmp_path: Path) -> None:
     frames = Frames(VALUES[:, None], [0, 1, 2], array=Array(1, 6, name="foot"))
     taxel.convert(frames, tmp_path / "foot.npz")
-    (tmp_path / "foot.layout.toml").write_text(
-        'rows = 3\ncolumns = 2\nunit = "N"\nrate_hz = 1000\n[places]\nx = [0, 9, 1, 8, 2, 7]\ny = [0, 0, 5, 5, 9, 9]\nunit = "mm"\n'
-    )
+    places = '[places]\nx = [0, 9, 1, 8, 2, 7]\ny = [0, 0, 5, 5, 9, 9]\nunit = "mm"\n'
+    (tmp_path / "foot.layout.toml").write_text('rows = 3\ncolumns = 2\nunit = "N"\nrate_hz = 1000\n' + places)
     recording = taxel.open(tmp_path / "foot.npz")
     own = recording.frames()
     assert own.array == Array(3, 2, name="foot", places=Places([0, 9, 1, 8, 2, 7], [0, 0, 5, 5, 9, 9], unit="mm"))

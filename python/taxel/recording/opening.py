@@ -167,15 +167,14 @@ def open_recording(
     flag("differences", differences)
     said = _layout(place, layout)
     named = {"topic": topic, "field": field, "types": types, "ros": ros}
-    topics = Topics(
-        **({} if said is None else said.ros) | {name: one for name, one in named.items() if one is not None}
-    )
+    given = {name: one for name, one in named.items() if one is not None}
+    topics = Topics(**({} if said is None else said.ros) | given)
     try:
         if said is not None and is_foreign(place):
             contents = read_foreign(place, said)
         elif (kind := kind_of(place)) == "ros":
             contents = read_ros(place, topics, said.grid() if array is None and said is not None else array)
-        elif any(one is not None for one in named.values()):
+        elif given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
         else:
             if array is not None:
