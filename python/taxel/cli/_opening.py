@@ -63,8 +63,14 @@ class FileOptions:
         from taxel.recording import open_any  # noqa: PLC0415  the command line starts quickly
 
         arrays = [geometry(size) for size in self.array or ()]
-        named = {"topic": self.topic, "field": self.field, "types": self.types, "ros": self.ros}
-        opened = open_any(path, array=arrays if len(arrays) > 1 else arrays[0] if arrays else None, **named)
+        opened = open_any(
+            path,
+            array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
+            topic=self.topic,
+            field=self.field,
+            types=self.types,
+            ros=self.ros,
+        )
         for one in opened if isinstance(opened, list) else [opened]:
             # A bag holds no sensor, so that its messages are of the given one or are left out.
             if arrays and one.kind != "ros" and one.array != arrays[0]:

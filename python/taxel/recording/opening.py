@@ -159,11 +159,10 @@ def open_recording(
     try:
         if kind == "ros":
             return Recording(with_sidecars(read_ros(place, topics, array)))
-        if topics:
+        if topics.are_given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
-        if array is not None:
-            instance("array", array, Array)
-        return Recording(with_sidecars(_read(place, kind, array, pairing, differences)))
+        own = None if array is None else instance("array", array, Array)
+        return Recording(with_sidecars(_read(place, kind, own, pairing, differences)))
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
 
@@ -179,10 +178,10 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
 
 def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
-    there = sorted((file for file in folder.iterdir() if file.name != LABELS), key=_order)
-    own = [file for file in there if _is_own(file)]
+    files = sorted((file for file in folder.iterdir() if file.name != LABELS), key=_order)
+    own = [file for file in files if _is_own(file)]
     if how["topic"] or not own:
-        own = [file for file in there if file in own or is_bag(file)]
+        own = [file for file in files if file in own or is_bag(file)]
     if own:
         opened = [open_recording(file, **how) for file in own]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
