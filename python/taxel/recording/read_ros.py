@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from taxel._base import arguments
 from taxel._base.messages import counted
@@ -45,6 +46,10 @@ class Topics:
     def are_given(self) -> bool:
         """Whether any of them is."""
         return any(one is not None for one in (self.topic, self.field, self.types, self.ros))
+
+    def but(self, said: Mapping[str, Any]) -> Topics:
+        """Return what is given, and what a layout says of the rest."""
+        return replace(self, **{name: one for name, one in said.items() if getattr(self, name) is None})
 
     @property
     def folder(self) -> Path | None:
