@@ -85,6 +85,13 @@ class FileOptions:
             return [self._on_array(one) for one in opened]
         return self._on_array(opened)
 
+    def names_topic(self, bag: Path) -> bool:
+        """Return whether these options, or the layout file of a ROS bag, say which topic to open."""
+        from taxel.formats.layout import Layout  # noqa: PLC0415  the command line starts quickly
+
+        place = self.layout or Layout.beside(bag)
+        return bool(self.topic) or (place is not None and "topic" in Layout.read(place).ros)
+
     def _on_array(self, recording: Recording) -> Recording:
         """Return a recording on the sensor of ``--array``; refuse one that holds a sensor that differs from it."""
         # A bag holds no sensor, so that its messages are of the given one or are left out.
