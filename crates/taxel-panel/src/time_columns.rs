@@ -222,7 +222,8 @@ impl TimeColumns {
     pub fn first_touch(&self) -> Option<i64> {
         let mut sums: Vec<u32> = self.stored().map(|(_, curve)| curve.sum).collect();
         let most = *sums.iter().max()?;
-        let (_, &mut quiet, _) = sums.select_nth_unstable(sums.len() / QUIET_SHARE);
+        let place = sums.len() / QUIET_SHARE;
+        let (_, &mut quiet, _) = sums.select_nth_unstable(place);
         let least = quiet + ((most - quiet) / TOUCH_SHARE).max(1);
         let touch =
             self.stored().skip_while(|(_, curve)| curve.sum < least).take_while(|(_, curve)| curve.sum >= least);
