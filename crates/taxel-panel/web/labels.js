@@ -49,6 +49,8 @@ export class Labels {
     this.flags = new Map();
     /** @type {number | null} */
     this.chosen = null;
+    /** The name that was marked by the last click. */
+    this.clicked = "";
     /** A click without a name: it is marked as soon as there is one. @type {number | null} */
     this.waiting_us = null;
     /** The one being dragged, and where to. @type {{ label_id: number, t_us: number } | null} */
@@ -58,8 +60,7 @@ export class Labels {
     this.name.oninput = () => settings.set("label", this.name.value);
     this.lane = part("label-lane", HTMLElement);
     this.lane.addEventListener("click", (event) => {
-      // The second click of a double one is no label of its own.
-      if (event.target === this.lane && event.detail < 2) this.mark(this.timeAt(event.clientX));
+      if (event.target === this.lane) this.click(event);
     });
     part("mark", HTMLButtonElement).onclick = () => this.markHere();
     part("label-form", HTMLFormElement).onsubmit = (event) => {
@@ -105,6 +106,13 @@ export class Labels {
   timeAt(clientX) {
     const box = this.lane.getBoundingClientRect();
     return this.timeline()?.time(Math.max(0, Math.min(1, (clientX - box.left) / box.width))) ?? null;
+  }
+
+  /** Marks where the pointer is; the second click of a double one is no label of its own. @param {MouseEvent} event */
+  click({ clientX, detail }) {
+    const name = this.name.value.trim();
+    if (detail < 2 || name !== this.clicked) this.mark(this.timeAt(clientX));
+    this.clicked = name;
   }
 
   /** Marks at the cursor, or at the picture. */

@@ -350,6 +350,7 @@ function move(transport) {
 function showDetections(shown) {
   const none = opened ? "None in this recording: train on labels, or choose a readout." : hello?.readout ? "None yet." : "No readout runs: start taxel live with one, or choose one here.";
   detections.show(shown, none);
+  marksDue = true;
 }
 
 // ------------------------------------------------------------------------------------------------ drawing
