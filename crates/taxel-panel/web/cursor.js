@@ -13,7 +13,7 @@ const LINE_PX = 30;
 /** From here on a press is a drag, CSS pixels. */
 const DRAG = 4;
 /** Where a press is for somebody else. */
-const NOT_TIME = "#label-lane, button, h2";
+const NOT_TIME = "#label-lane, button";
 
 export class Cursor {
   /**

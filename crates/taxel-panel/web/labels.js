@@ -18,7 +18,7 @@ const DRAG = 4;
 /** Levels on which handles are stacked where they would cover each other; more labels than fit are lines alone. */
 const LEVELS = 3;
 /** Width of a handle, CSS pixels. */
-const HANDLE = { mouse: 11, touch: 20 };
+const HANDLE = { mouse: 11, touch: 16 };
 /** Width of a letter of a flag's name, CSS pixels, about. */
 const LETTER = 7;
 

@@ -56,8 +56,12 @@ export class Layout {
     if (chosen === this.done) return;
     this.done = chosen;
     this.views.dataset.place = place;
-    if (width) this.views.style.setProperty("--map", `${Math.floor(width)}px`);
-    else this.views.style.removeProperty("--map");
+    const { maps } = this.shown();
+    const row = place === "beside" ? maps : 1;
+    for (const [name, value] of [["--map", Math.floor(width)], ["--maps", row * Math.floor(width) + (row - 1) * GAP]]) {
+      if (width) this.views.style.setProperty(String(name), `${value}px`);
+      else this.views.style.removeProperty(String(name));
+    }
     this.arranged();
   }
 }

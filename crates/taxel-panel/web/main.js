@@ -244,7 +244,8 @@ function greet(message) {
   labels.offer(message.readout ?? []);
   showAssumed();
   recorder.able = message.live;
-  for (const id of ["record", "record-start"]) part(id, HTMLButtonElement).disabled = !message.live;
+  part("record", HTMLButtonElement).hidden = !message.live;
+  part("record-start", HTMLButtonElement).disabled = !message.live;
   part("live-counters", HTMLElement).hidden = !message.live;
   showDetections(detections.shown);
   document.title = message.live ? "taxel · live" : "taxel · view";
