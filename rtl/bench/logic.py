@@ -130,8 +130,7 @@ class Logic:
             getattr(self._library, f"bench_{name}").restype = result
         self._library.bench_edge.restype = ctypes.c_uint64
         self._bench = ctypes.c_void_p(self._library.bench_new(columns, rows, channels, steps, baud_clocks, seed))
-        self._bytes = b""
-        self.call("reset")
+        self.reset()
 
     def call(self, name: str, *values: Any) -> int:
         """Call one of the bench's functions."""
@@ -140,6 +139,11 @@ class Logic:
     def close(self) -> None:
         """Give its memory back."""
         self._library.bench_delete(self._bench)
+
+    def reset(self) -> None:
+        """Hold the logic in reset for some clocks; what it sent before is forgotten."""
+        self._bytes = b""
+        self.call("reset")
 
     def ticks(self, ticks: Any) -> None:
         """Set the trip times of reads to come: uint16, shape (rows, columns)."""

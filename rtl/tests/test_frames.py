@@ -25,8 +25,11 @@ def pressures(rng: np.random.Generator, pair: Pair, before: np.ndarray) -> np.nd
     return ticks
 
 
-def write(rng: np.random.Generator, pair: Pair) -> bytes:
-    """Return a command: a register of a set that holds all rules, a bit of one that was flipped, or a read."""
+def write(rng: np.random.Generator, pair: Pair, in_version_2: float = 0.0) -> bytes:
+    """Return a command: a register of a set that holds all rules, a bit of one that was flipped, or a read.
+
+    A write of REG0 chooses version 2 of the wire with the given probability.
+    """
     held = pair.board.registers
     kind = rng.choice(["timing", "floor", "flags", "record", "nonsense", "read"])
     if kind == "record":
@@ -35,7 +38,7 @@ def write(rng: np.random.Generator, pair: Pair) -> bytes:
         lines = int(rng.integers(0, pair.array.columns + 1))
         return Command(5, lines << 16 | int(rng.choice([0, 1, 3, 10, 255])) << 8).to_bytes()
     if kind == "flags":
-        return Command(0, int(rng.choice([0, 4, 8, 12]))).to_bytes()
+        return Command(0, int(rng.integers(0, 16)) & ~2 | (rng.random() < in_version_2) << 4).to_bytes()
     if kind == "read":
         return Command(6, int(rng.integers(0, 9))).to_bytes()
     if kind == "nonsense":
@@ -82,16 +85,16 @@ def test_random_pressures_and_writes_give_the_emulated_boards_datagrams(columns,
 
 
 def settles(pair: Pair, command: bytes) -> bool:
-    """Return whether the analogue side can follow a write.
+    """Return whether taxels settle after a write.
 
-    The ramp must fall for one clock at least: to a comparator one that does not fall is no second one. And where there
-    are more lines than before, the whole chain is shifted through once before line 0 is read.
+    In random order, and where there are more lines than before, the whole chain may be shifted through before a read.
     """
     written, held = Command.from_bytes(command), pair.board.registers
-    if written.register == 3:
-        return (written.value >> 16) < written.value & 0xFFFF
+    words = list(held.words)
+    words[written.register] = written.value
     more = written.register == 5 and (written.value >> 16 & 0xFF) + 1 > held.lines
-    return not more or round((held.step_period - held.step_read) * 100) > 2 * pair.array.columns + 4
+    settling = (words[3] & 0xFFFF) - (words[3] >> 16)
+    return not (more or held.random_lines or words[0] & 1) or settling > 2 * pair.array.columns + 4
 
 
 def last_faults(lines: str) -> dict[str, int]:
