@@ -20,8 +20,12 @@ RTL = Path(__file__).parents[1]
 PACKAGES = ("taxel_types.sv", "taxel_registers.sv")
 #: Warnings that say nothing here: fields of a struct that one of its users does not read, and text from left to right.
 QUIET = ("-Wno-UNUSEDSIGNAL", "-Wno-ASCRANGE")
-#: How the logic is compiled. Registers without a reset begin with random bits, as nobody knows what a chip holds.
-OPTIONS = ("-j", "1", "-O3", "--x-assign", "unique", "--x-initial", "unique", "-CFLAGS", "-fPIC -O1")
+#: How the logic is compiled. Registers without a reset begin with random bits, as nobody knows what a chip holds. The
+#: wheel's makefile leaves out how g++ is given a header that is compiled before.
+OPTIONS = (
+    *("-j", "1", "-O3", "--x-assign", "unique", "--x-initial", "unique", "-CFLAGS", "-fPIC -O1"),
+    *("-MAKEFLAGS", "CFG_CXXFLAGS_PCH_I=-include"),
+)
 LINKED = ("-std=c++20", "-O2", "-shared", "-fPIC")
 #: A write acts in the frame whose edge comes so many clocks or more after the middle of its last stop bit.
 WRITE_CLOCKS = 23

@@ -46,7 +46,7 @@ def write(rng: np.random.Generator, pair: Pair, in_version_2: float = 0.0) -> by
         number = int(rng.choice([1, 2, 3, 4, 5, 7]))
         return Command(number, held.words[number] ^ 1 << int(rng.integers(0, 9 if number == 1 else 32))).to_bytes()
     least = held.channels + 10
-    step_period = int(rng.integers(least, 2 * least))
+    step_period = int(rng.integers(least, least + 80))
     step_read = step_period - int(rng.choice([1, 2, 20, 20, least - 1, 0]))
     steps = -(-max(pair.array.rows, 64) // held.channels)
     line_read = steps * step_period + int(rng.integers(0, 40))
