@@ -214,9 +214,13 @@ module taxel_packer_v2
           reached  <= position;
           last    <= now.at;
           any     <= 1'b1;
-          waiting <= units_of;
-          left    <= count_of;
-          state   <= WRITE;
+          write   <= 1'b1;
+          place   <= units;
+          unit    <= units_of[0];
+          units   <= units + 10'd1;
+          waiting <= units_of >> 16;
+          left    <= count_of - 3'd1;
+          state   <= count_of == 3'd1 ? IDLE : WRITE;
           after   <= IDLE;
         end
       end

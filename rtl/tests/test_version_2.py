@@ -28,12 +28,18 @@ def built(columns: int, rows: int, channels: int, previous: str, intensity: str,
     return Pair(columns, rows, channels, previous=previous, intensity=intensity, first=first, version_2=options)
 
 
-def in_version_2(pair: Pair, flags: int = 0b11000) -> None:
-    """Let both boards send version 2."""
+def written(pair: Pair, commands: list[Command]) -> None:
+    """Write registers of both boards, each before the next."""
     still = np.zeros(pair.array.shape, np.uint16)
-    pair.frame(still, Command(0, flags).to_bytes())
-    while not pair.answered:
-        pair.frame(still)
+    for command in commands:
+        pair.frame(still, command.to_bytes())
+        while not pair.answered:
+            pair.frame(still)
+
+
+def in_version_2(pair: Pair) -> None:
+    """Let both boards send version 2."""
+    written(pair, [Command(0, 0b11000)])
     assert pair.board.registers.wire_version == 2
 
 
@@ -64,10 +70,28 @@ def test_quick_frames_of_version_2_are_the_emulated_boards():
         assert len(pair.received) > 5
 
 
+def test_128_lines_begin_in_version_2():
+    rng = np.random.default_rng(128)
+    pair = Pair(128, 8, version_2=OFTEN | {"states_us": 20_000})
+    assert pair.board.registers.wire_version == 2
+    ticks = np.zeros(pair.array.shape, np.uint16)
+    for _ in range(12):
+        ticks = pressures(rng, pair, ticks)
+        pair.frame(ticks)
+    pair.finish()
+    assert pair.agrees
+    assert kinds(pair) == {1, 6}
+    assert max(datagram[17] >> 4 for datagram in pair.received) > 7
+
+
 @pytest.mark.parametrize(("columns", "rows", "channels", "previous", "intensity", "hold_us"), BUILDS)
 def test_random_pressures_and_writes_in_both_versions(columns, rows, channels, previous, intensity, hold_us):
     rng = np.random.default_rng([columns, rows, channels])
     pair = built(columns, rows, channels, previous, intensity, hold_us)
+    if rows <= 64:
+        # Time for ramps of more than 255 ticks.
+        held = pair.board.registers
+        written(pair, held.commands_to(held.with_preset("2 kHz")))
     ticks = np.zeros(pair.array.shape, np.uint16)
     for _ in range(250):
         ticks = pressures(rng, pair, ticks)
