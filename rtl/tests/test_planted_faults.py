@@ -44,8 +44,7 @@ TOTALS = [
 #: Those of version 2 of the wire.
 VERSION_2 = [
     ("taxel_packer_v2.sv", "8'(gap >> 6) - 8'd1", "8'(gap >> 6)"),
-    ("taxel_packer_v2.sv", "quiet >= micros_t'(HEARTBEAT_US)", "quiet > micros_t'(HEARTBEAT_US)"),
-    ("taxel_packer_v2.sv", "? 8'd255 : value_repeated[7:0]", "? 8'd0 : value_repeated[7:0]"),
+    ("taxel_packer_v2.sv", "now.at - last <= RESTLESS", "now.at - last <= '0"),
     ("taxel_packer_v2.sv", "|| position <= reached);", ");"),
     ("taxel_line_sorter.sv", "oldest.x == gathering.x && ", ""),
     ("taxel_refresh.sv", "(EVERY) ? line_next - BITS'(EVERY)", "(EVERY) ? '0"),
