@@ -47,7 +47,7 @@ VERSION_2 = [
     ("taxel_packer_v2.sv", "now.at - last <= RESTLESS", "now.at - last <= '0"),
     ("taxel_packer_v2.sv", "|| position <= reached);", ");"),
     ("taxel_line_sorter.sv", "oldest.x == gathering.x && ", ""),
-    ("taxel_refresh.sv", "(EVERY) ? line_next - BITS'(EVERY)", "(EVERY) ? '0"),
+    ("taxel_refresh.sv", "line_start + BITS'(lines) + BITS'(1)", "line_start + BITS'(lines)"),
     ("taxel_session.sv", "crc_32c(crc, count_before[7:0]), count_before[15:8]", "crc, count_before[7:0]"),
     ("taxel_time_stamper.sv", "clocks_us == 7'(SHORT - 1)", "clocks_us == 7'(SHORT)"),
     ("taxel_change_detector.sv", "if (store) again", "if (store && !of_judged.initial_frame) again"),
