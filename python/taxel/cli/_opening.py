@@ -72,7 +72,7 @@ class FileOptions:
         from taxel.recording import open_any  # noqa: PLC0415  the command line starts quickly
 
         arrays = [geometry(size, of_wire=False) for size in self.array or ()]
-        named = {"topic": self.topic, "field": self.field, "types": self.types, "ros": self.ros}
+        named: dict[str, Any] = {"topic": self.topic, "field": self.field, "types": self.types, "ros": self.ros}
         given = arrays if len(arrays) > 1 else arrays[0] if arrays else None
         opened = open_any(path, array=given, layout=self.layout, **named)
         if isinstance(opened, list):

@@ -166,9 +166,9 @@ def open_recording(
     text("pairing", pairing, ("direct", "taxel"))
     flag("differences", differences)
     said = _layout(place, layout)
-    named = {"topic": topic, "field": field, "types": types, "ros": ros}
+    named: dict[str, Any] = {"topic": topic, "field": field, "types": types, "ros": ros}
     given = {name: one for name, one in named.items() if one is not None}
-    topics = Topics(**({} if said is None else said.ros) | given)
+    topics = Topics(**({} if said is None else dict(said.ros)) | given)
     try:
         if said is not None and is_foreign(place):
             contents = read_foreign(place, said)
@@ -177,9 +177,8 @@ def open_recording(
         elif given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
         else:
-            if array is not None:
-                instance("array", array, Array)
-            contents = _read(place, kind, array, pairing, differences)
+            sensor = None if array is None else instance("array", array, Array)
+            contents = _read(place, kind, sensor, pairing, differences)
         return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
