@@ -32,6 +32,7 @@ KINDS = sorted(set(of(Parameters)), key=lambda kind: kind.__name__)
 #: Values for parameters without a default.
 REQUIRED: dict[str, Any] = {
     "levels": [1.0],
+    "parts": {"area": taxel.encode.ContactArea()},
     "eta": 0.1,
     "epochs": 5,
     "updates": "batch",
