@@ -72,12 +72,25 @@ class FileOptions:
         from taxel.recording import open_any  # noqa: PLC0415  the command line starts quickly
 
         arrays = [geometry(size, of_wire=False) for size in self.array or ()]
-        named: dict[str, Any] = {"topic": self.topic, "field": self.field, "types": self.types, "ros": self.ros}
-        given = arrays if len(arrays) > 1 else arrays[0] if arrays else None
-        opened = open_any(path, array=given, layout=self.layout, **named)
+        opened = open_any(
+            path,
+            array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
+            layout=self.layout,
+            topic=self.topic,
+            field=self.field,
+            types=self.types,
+            ros=self.ros,
+        )
         if isinstance(opened, list):
             return [self._on_array(one) for one in opened]
         return self._on_array(opened)
+
+    def names_topic(self, bag: Path) -> bool:
+        """Return whether these options, or the layout file of a ROS bag, say which topic to open."""
+        from taxel.formats.layout import Layout  # noqa: PLC0415  the command line starts quickly
+
+        place = self.layout or Layout.beside(bag)
+        return bool(self.topic) or (place is not None and "topic" in Layout.read(place).ros)
 
     def _on_array(self, recording: Recording) -> Recording:
         """Return a recording on the sensor of ``--array``; refuse one that holds a sensor that differs from it."""

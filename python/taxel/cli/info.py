@@ -68,7 +68,7 @@ def info(
             try_whole(place, overwrite=overwrite)
     # The status line is shown on a terminal only, and removed at the end.
     with Console(stderr=True).status(f"reading {file}"):
-        if not files.topic and file.exists() and is_bag(file):
+        if file.exists() and is_bag(file) and not files.names_topic(file):
             typer.echo(listed(file, topics(file, files.types, files.ros), as_json))
             return
         opened = files.open(file)

@@ -166,19 +166,19 @@ def open_recording(
     text("pairing", pairing, ("direct", "taxel"))
     flag("differences", differences)
     said = _layout(place, layout)
-    named: dict[str, Any] = {"topic": topic, "field": field, "types": types, "ros": ros}
-    given = {name: one for name, one in named.items() if one is not None}
-    topics = Topics(**({} if said is None else dict(said.ros)) | given)
+    of_layout = {} if said is None else said.ros
+    given = Topics(topic, field, types, ros)
+    topics = given.but(of_layout)
     try:
         if said is not None and is_foreign(place):
             contents = read_foreign(place, said)
         elif (kind := kind_of(place)) == "ros":
             contents = read_ros(place, topics, said.grid() if array is None and said is not None else array)
-        elif given:
+        elif given.are_given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
         else:
-            sensor = None if array is None else instance("array", array, Array)
-            contents = _read(place, kind, sensor, pairing, differences)
+            own = None if array is None else instance("array", array, Array)
+            contents = _read(place, kind, own, pairing, differences)
         return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
