@@ -83,8 +83,8 @@ def kind_of(path: Path) -> str:
         )
     if ending is None:
         raise FormatError(
-            f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}; a layout file beside it, "
-            f"{path.stem}.layout.toml, describes a table or an array of somebody else"
+            f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}; a layout file beside "
+            f"it, {path.stem}.layout.toml, describes a table or an array of somebody else"
         )
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
