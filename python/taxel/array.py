@@ -82,8 +82,8 @@ class Places:
 
     def _part(self, rows: slice, columns: slice) -> Places:
         """Return the places of a rectangle."""
-        parts = (None if v is None else v[rows, columns] for v in (self.x, self.y, self.area))
-        return Places(*parts, unit=self.unit)  # type: ignore[arg-type]
+        area = None if self.area is None else self.area[rows, columns]
+        return Places(self.x[rows, columns], self.y[rows, columns], area, self.unit)
 
     def _json(self) -> dict[str, Any]:
         areas = {} if self.area is None else {"area": self.area.ravel().tolist()}

@@ -108,6 +108,6 @@ def test_on_and_off_trains_are_smoothed_apart_and_missing_taxels_do_not_count():
 def test_long_patterns_neither_overflow_nor_lose_the_tail():
     a = SpikeTrains.from_lists([np.arange(0, 4000.0, 7.0)], stop=5000.0)
     b = SpikeTrains.from_lists([np.arange(0, 4000.0, 7.0) + 0.5], stop=5000.0)
-    one = Array(1, 1)
+    one = Array(1, 1, 1.0)
     expected = van_rossum(a[0], b[0], tau=0.4)
     assert van_rossum_spatial(a, b, array=one, own_train="once") == pytest.approx(expected, rel=1e-12)

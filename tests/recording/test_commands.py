@@ -134,8 +134,10 @@ def test_the_sensor_of_a_table_of_events_is_said_once_and_kept(walk: Path, tmp_p
     table, kept = tmp_path / "walk.csv", tmp_path / "walk.npz"
     assert run("convert", walk, table).returncode == 0
     assumed = run("info", table).stdout
-    assert "64 x 64 taxels, 2.67 mm, thesis 64x64; a .csv does not hold it: --array" in assumed
-    assert "70 x 65 taxels, 5 mm, 70x65x5\n" in run("info", table, "--array", "70x65x5").stdout
+    assert "64 x 64 taxels, 2.67 mm apart, thesis 64x64; a .csv does not hold it: --array" in assumed
+    assert "70 x 65 taxels, 5 mm apart, 70x65x5\n" in run("info", table, "--array", "70x65x5").stdout
+    # Without mm: those of the board's wire.
+    assert "70 x 65 taxels, 2.67 mm apart, 70x65\n" in run("info", table, "--array", "70x65").stdout
     assert run("convert", table, kept, "--array", "70x65x5").returncode == 0
     assert taxel.open(kept).array == taxel.Array(70, 65, pitch_mm=5.0, name="70x65x5")
     assert np.array_equal(taxel.open(kept).events.t, taxel.open(walk).events.t)

@@ -37,7 +37,7 @@ def by_state_equation(x: float, nu: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("nu", [0.0, 0.1, 0.3, 0.45, 0.49])
 def test_displacement_and_base_stress_solve_the_layers_state_equation(nu):
-    layer = Layer({"poisson": nu, "modulus_kpa": 40.0, "thickness_mm": 8.0}, Array(4, 4))
+    layer = Layer({"poisson": nu, "modulus_kpa": 40.0, "thickness_mm": 8.0}, Array(4, 4, 1.0))
     for x in (1e-3, 0.03, 0.3, 1.0, 2.0, 4.0, 7.0):
         face, base = by_state_equation(x, nu)
         assert layer.compliance([x / 8])[0] == pytest.approx(8 / 40 * face, rel=1e-6, abs=1e-9)

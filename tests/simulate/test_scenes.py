@@ -135,7 +135,7 @@ def test_pictures_touch_from_the_empty_one_before_to_the_empty_one_after():
         (lambda: Scene.draw(1, 0.5), ProblemError, "index"),
         (lambda: Scene.draw(1, left_to_rest="yes"), ProblemError, "left_to_rest"),
         (lambda: Scene.draw(1, array=64), ProblemError, "array"),
-        (lambda: Scene.draw(1, array=Array(8, 8)), SceneError, "too small"),
+        (lambda: Scene.draw(1, array=Array(8, 8, 2.67)), SceneError, "too small"),
         (lambda: Scene("ball"), ProblemError, "parameters"),
         (lambda: Scene({}).motion(), SceneError, "^scene: bodies is missing$"),
         (lambda: Scene.draw(1).replace(colour="red"), ProblemError, "colour"),

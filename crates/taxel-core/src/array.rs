@@ -268,7 +268,9 @@ mod tests {
         assert_eq!(of("null").pitch_mm, None);
         assert_eq!(of("2.67").pitch_mm, Some(Pitch::square(2.67)));
         assert_eq!(of("[7.62, 5.08]").pitch_mm, Some(Pitch { rows: 7.62, columns: 5.08 }));
-        assert!(serde_json::from_str::<Array>(r#"{"rows": 2, "columns": 3, "pitch_mm": "wide", "name": "a"}"#).is_err());
+        assert!(
+            serde_json::from_str::<Array>(r#"{"rows": 2, "columns": 3, "pitch_mm": "wide", "name": "a"}"#).is_err()
+        );
         for array in [Array::thesis(), Array::new(3, 4, 1.0, "one").unwrap(), Array::unmeasured(3, 4, "none")] {
             assert_eq!(read(&serde_json::to_string(&array).unwrap()), array);
         }

@@ -190,6 +190,9 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     array = Array._from_geometry(facts["array"])
     size = f"{array.rows} x {array.columns} taxels, {array._apart()}, {array.name}"
     yield "array", size + (f"; a .{facts['kind']} does not hold it: --array" if facts["array_assumed"] else "")
+    for name in ("side", "heel"):
+        if facts[name]:
+            yield name, facts[name]
     if facts["from_us"] is not None:
         yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
     if "events" in facts:

@@ -43,9 +43,10 @@ class ContactArea(Tared):
 
     Examples
     --------
-    >>> from taxel import Frames
-    >>> rest = Frames([[[50.0, 52.0]], [[50.0, 52.0]]], [0, 1000], unit="ticks")
-    >>> touch = Frames([[[50.0, 52.0]], [[58.0, 57.0]], [[58.0, 52.0]]], [0, 192, 384], unit="ticks")
+    >>> from taxel import Array, Frames
+    >>> two = Array(1, 2, pitch_mm=2.0)
+    >>> rest = Frames([[[50.0, 52.0]], [[50.0, 52.0]]], [0, 1000], unit="ticks", array=two)
+    >>> touch = Frames([[[50.0, 52.0]], [[58.0, 57.0]], [[58.0, 52.0]]], [0, 192, 384], unit="ticks", array=two)
     >>> spikes = ContactArea(tare=Tare.take(rest)).encode(touch)
     >>> spikes[0], spikes[5]
     (array([0.192]), array([0.384]))

@@ -73,8 +73,10 @@ class LocalLoad(Tared):
     --------
     Four taxels; two are pressed, far above their noise of at most 0.3 ticks.
 
-    >>> tare = Tare.take(Frames([[[50.0, 50, 50, 50]]] * 2, [0, 1000], unit="ticks"))
-    >>> frames = Frames([[[50.0, 50, 50, 50]], [[50.0, 58, 60, 50]]], [0, 1000], unit="ticks")
+    >>> from taxel import Array
+    >>> four = {"unit": "ticks", "array": Array(1, 4, pitch_mm=2.0)}
+    >>> tare = Tare.take(Frames([[[50.0, 50, 50, 50]]] * 2, [0, 1000], **four))
+    >>> frames = Frames([[[50.0, 50, 50, 50]], [[50.0, 58, 60, 50]]], [0, 1000], **four)
     >>> load = LocalLoad(tare=tare)
     >>> load.quantities[:4]
     ('area', 'largest', 'places', 'total')
@@ -124,8 +126,10 @@ class LocalLoad(Tared):
 
         Examples
         --------
-        >>> tare = Tare.take(Frames([[[50.0, 50]]] * 2, [0, 1000], unit="ticks"))
-        >>> LocalLoad(tare=tare).values(Frames([[[50.0, 55]]], [0], unit="ticks")).shape
+        >>> from taxel import Array
+        >>> two = {"unit": "ticks", "array": Array(1, 2, pitch_mm=2.0)}
+        >>> tare = Tare.take(Frames([[[50.0, 50]]] * 2, [0, 1000], **two))
+        >>> LocalLoad(tare=tare).values(Frames([[[50.0, 55]]], [0], **two)).shape
         (1, 21)
         """
         encoder, held = self._with_rest_of(recorded(x))

@@ -72,9 +72,10 @@ class Moments(Tared):
     --------
     A touch of two taxels, then of three; nothing reaches the largest level, 4.
 
-    >>> from taxel import Frames
-    >>> rest = Frames([[[50.0, 50.0, 50.0]]] * 2, [0, 1000], unit="ticks")
-    >>> frames = Frames([[[50.0, 50, 50]], [[58.0, 58, 50]], [[58.0, 58, 58]]], [0, 200, 400], unit="ticks")
+    >>> from taxel import Array, Frames
+    >>> three = {"unit": "ticks", "array": Array(1, 3, pitch_mm=1.0)}
+    >>> rest = Frames([[[50.0, 50.0, 50.0]]] * 2, [0, 1000], **three)
+    >>> frames = Frames([[[50.0, 50, 50]], [[58.0, 58, 50]], [[58.0, 58, 58]]], [0, 200, 400], **three)
     >>> encoder = Moments(levels=3, area=(1, 4), total=None, peak=None, displacement_mm=(0.3, 5), tonic_ms=None)
     >>> [reached.tolist() for reached in encoder.with_tare(Tare.take(rest)).encode(frames)][:4]
     [[0.2], [0.2], [], [0.4]]

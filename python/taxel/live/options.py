@@ -104,6 +104,8 @@ class LiveOptions:
             differences = flag("differences", differences) or remote.differences
         if array is None and readout is not None:
             array = readout.array
+        elif readout is not None and readout.array is not None:
+            readout.array._warn_apart(instance("array", array, Array), "live")
         if self.say is not None and not callable(self.say):
             raise ProblemError(f"say is {shown(self.say)}: must be a function of a Detection")
         if readout is None and self.tare is not None:

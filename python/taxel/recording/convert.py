@@ -75,9 +75,9 @@ def convert(
     >>> taxel.convert(events, folder / "two.npz")
     []
     >>> taxel.convert(folder / "two.npz", folder / "two.csv")
-    ['the sensor (8 x 8 taxels, 1 mm apart, "array")']
+    ['the sensor (8 x 8 taxels, of unknown pitch, "array")']
     >>> taxel.convert(folder / "two.npz", folder / "two.lsa")
-    ['the sensor (8 x 8 taxels, 1 mm apart, "array")', 'times finer than 100 us']
+    ['the sensor (8 x 8 taxels, of unknown pitch, "array")', 'times finer than 100 us']
     """
     place = Path(path("target", target))
     kind = place.suffix.lower()

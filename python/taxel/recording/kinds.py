@@ -29,7 +29,7 @@ _STRANGERS = {
     b"\xfd7zXZ": "xz; unpack it first",
     b"\x89PNG": "a PNG picture, no recording",
     b"%PDF": "a PDF document, no recording",
-    b"\x93NUMPY": "a single NumPy array; save its columns t, x, y, p with numpy.savez",
+    b"\x93NUMPY": "a single NumPy array; say in NAME.layout.toml what it holds",
 }
 
 
@@ -82,7 +82,10 @@ def kind_of(path: Path) -> str:
             f"{path}, byte 0: starts with {begins} ({what}), not with {right}" + f"; {advice}" * bool(advice)
         )
     if ending is None:
-        raise FormatError(f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}")
+        raise FormatError(
+            f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}; a layout file beside "
+            f"it, {path.stem}.layout.toml, describes a table or an array of somebody else"
+        )
     if ending in {"npz", "h5"}:
         magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
         raise FormatError(f"{path}, byte 0: starts with {begins}, not with {expected[ending]} ({magic})")

@@ -36,6 +36,8 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "kind": recording.kind,
         "source": recording.source,
         "array": {name: value for name, value in array._geometry().items() if name != "exists"},
+        "side": recording.side,
+        "heel": recording.heel,
         "array_assumed": recording.kind in ("csv", "lsa") and recording.has_events,
         "from_us": span[0] if span else None,
         "to_us": span[1] if span else None,
