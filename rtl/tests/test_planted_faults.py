@@ -50,7 +50,7 @@ VERSION_2 = [
     ("taxel_refresh.sv", "line_start + BITS'(lines) + BITS'(1)", "line_start + BITS'(lines)"),
     ("taxel_session.sv", "crc_32c(crc, count_before[7:0]), count_before[15:8]", "crc, count_before[7:0]"),
     ("taxel_time_stamper.sv", "clocks_us == 7'(SHORT - 1)", "clocks_us == 7'(SHORT)"),
-    ("taxel_change_detector.sv", "if (store) again", "if (store && !of_judged.initial_frame) again"),
+    ("taxel_change_detector.sv", "row_written  <= row_copied;", "row_written  <= place;"),
     ("taxel_change_detector.sv", "found.at     = found.format", "found.at     = of_judged.format"),
     ("taxel_datagram_sender.sv", "{now.line[2:0], STRIDE}", "{3'd0, STRIDE}"),
     ("taxel_datagram_sender.sv", "if (at < body_end + 11'(SPAN)) crc", "if (at < body_end) crc"),
