@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::above_0;
-use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainedNeuron};
+use crate::detect::{FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
 use crate::encode::{Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
@@ -42,6 +42,9 @@ pub struct Readout {
     pub delays_ms: Vec<f64>,
     /// The neurons by label.
     pub neurons: BTreeMap<String, TrainedNeuron>,
+    /// The range of each neuron's inputs in its training data, by label; empty if it is not known.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub seen: BTreeMap<String, Seen>,
 }
 
 fn one() -> f64 {
@@ -97,8 +100,16 @@ impl Readout {
             if let Some(array) = &self.array {
                 self.check_weights(label, one, array)?;
             }
+            match self.seen.get(label) {
+                Some(seen) => seen.check(one.weights.len()).map_err(|e| at(label, e))?,
+                None if self.seen.is_empty() => {}
+                None => return Err(problem!("{label}: seen has no ranges of its inputs, as other neurons have")),
+            }
         }
-        Ok(())
+        match self.seen.keys().find(|&label| !self.neurons.contains_key(label)) {
+            Some(label) => Err(problem!("seen: {label} is not among the neurons")),
+            None => Ok(()),
+        }
     }
 
     fn check_delays(&self) -> Result<()> {
@@ -157,7 +168,8 @@ impl Readout {
             self.check_weights(label, one, array)?;
         }
         let encoder = tare.map_or_else(|| self.encoder.clone(), |tare| self.encoder.with_tare(tare));
-        let neurons = self.neurons.iter().map(|(label, one)| (label.clone(), one.clone()));
+        let neurons =
+            self.neurons.iter().map(|(label, one)| (label.clone(), one.clone(), self.seen.get(label).cloned()));
         let (encoder, clock) = (encoder.stream(array)?, FrameClock::new(frames)?);
         let delays_ms = self.delays_ms.clone();
         Ok(ReadoutStream::new(encoder, array.clone(), clock, self.run_threshold, delays_ms, neurons))

@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 
 use crate::detect::running_rule::RunningRule;
-use crate::detect::{Detection, FrameClock, TrainedNeuron};
+use crate::detect::{Detection, FrameClock, Seen, TrainedNeuron};
 use crate::encode::{Stream, Zeroing};
 use crate::spikes::ms;
 use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
 
+mod inputs;
 mod labelled_rule;
 mod named_neuron;
 mod neurons;
@@ -15,6 +16,7 @@ mod repairs;
 #[cfg(test)]
 mod tests;
 
+use inputs::Inputs;
 use labelled_rule::LabelledRule;
 use named_neuron::NamedNeuron;
 use neurons::Neurons;
@@ -61,10 +63,11 @@ impl ReadoutStream {
         clock: FrameClock,
         threshold: f64,
         delays_ms: Vec<f64>,
-        neurons: impl Iterator<Item = (String, TrainedNeuron)>,
+        neurons: impl Iterator<Item = (String, TrainedNeuron, Option<Seen>)>,
     ) -> Self {
-        let latency_ms = encoder.latency_ms();
-        let neurons = neurons.map(|(label, one)| NamedNeuron::new(label, one, threshold, latency_ms)).collect();
+        let (latency_ms, kind) = (encoder.latency_ms(), encoder.kind());
+        let named = |(label, one, seen)| NamedNeuron::new(label, one, Inputs::new(seen, kind), threshold, latency_ms);
+        let neurons = neurons.map(named).collect();
         Self::of(encoder, array, clock, Decides::Neurons(Neurons::new(neurons, delays_ms)))
     }
 
@@ -168,6 +171,16 @@ impl ReadoutStream {
     #[must_use]
     pub fn late(&self) -> u64 {
         self.late
+    }
+
+    /// The number of detections with an input outside the range that it had in training; `None` if that range is not
+    /// known.
+    #[must_use]
+    pub fn outside(&self) -> Option<u64> {
+        match &self.decides {
+            Decides::Neurons(neurons) => neurons.outside(),
+            Decides::Rule(_) => None,
+        }
     }
 
     /// The time up to which all detections are final, us; `None` before any input.

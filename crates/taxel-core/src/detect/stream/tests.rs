@@ -63,7 +63,7 @@ fn stream(neuron: &Neuron, latency_ms: f64, period_us: f64) -> ReadoutStream {
         0.9,
         vec![0.0],
         neurons.into_iter().map(|(label, weights, delay_ms)| {
-            (label.to_owned(), TrainedNeuron { neuron: neuron.clone(), weights, delay_ms })
+            (label.to_owned(), TrainedNeuron { neuron: neuron.clone(), weights, delay_ms }, None)
         }),
     )
 }
