@@ -133,6 +133,7 @@ class ReadoutStream:
 
 # neuron: parameters as JSON, trains as parts
 
+def neuron_memory_ms(parameters: str) -> float: ...
 def neuron_run(
     parameters: str, weights: NDArray[np.float64], trains: _Spikes, threshold: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._base.arguments import callback, finite, flag, instance, mapping, number, parameters, several, shown, text
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -21,6 +22,7 @@ from taxel.detect import recipes
 from taxel.detect.alignment import Alignment, align
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import SILENCE_MS, Readout
+from taxel.detect.seen import seen
 from taxel.encode import Encoder
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
@@ -31,6 +33,14 @@ __all__ = ["Recipe", "Trained", "train"]
 
 #: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
 _OF_THE_FILE = ("fits", "other")
+
+
+#: Parameters of a learner that its rows do not depend on. Bounds could be among them, but that those of a train without
+#: a spike must contain 0.
+_NOT_OF_ROWS = (
+    "lambdas", "kappa", "divide_b_by", "divide_c_by", "divide_d_by", "sides_b", "sides_c", "norm", "tolerance",
+    "engine", "max_seconds",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -352,7 +362,9 @@ def learn(patterns: Sequence[Example], recipe: Recipe, array: Array | None, repo
         learners[label] = fitting.fit(recipe)
         if fitting.alignment is not None:
             alignments[label] = fitting.alignment
-    return Trained(recipe, learners, readout_of(learners, recipe, array), alignments)
+    trains: list[SpikeTrains] = [one.source for one in patterns]  # type: ignore[misc]
+    ranges = {label: seen(trains, _core.neuron_memory_ms(one.neuron_._json())) for label, one in learners.items()}
+    return Trained(recipe, learners, readout_of(learners, recipe, array)._with_seen(ranges), alignments)
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
@@ -368,7 +380,7 @@ def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, 
 
 
 class Fitting:
-    """The rows of one label's learner on encoded examples, for a recipe and all others that differ in `lambdas` alone.
+    """The rows of one label's learner on encoded examples, for a recipe and all others that need the same.
 
     Raises
     ------
@@ -379,7 +391,7 @@ class Fitting:
         self, examples: Sequence[Example], recipe: Recipe, label: str, report: Callable[[str], object]
     ) -> None:
         self._label = label
-        self._needs = _rows_of(recipe, label)
+        self._needs = rows_of(recipe, label)
         learner, delay_ms = recipe.learner_of(label)
         self._shift_ms = recipe.encoder.latency_ms + delay_ms
         given = [_times(k, one, label) for k, one in enumerate(examples)]
@@ -402,7 +414,7 @@ class Fitting:
 
     def fits(self, recipe: Recipe) -> bool:
         """Whether the learner that a recipe describes needs these rows."""
-        return self._needs == _rows_of(recipe, self._label)
+        return self._needs == rows_of(recipe, self._label)
 
     def fit(self, recipe: Recipe) -> ConeR:
         """Fit the learner that a recipe describes, beginning at the fit before, if any; warnings name events."""
@@ -435,10 +447,10 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     return events
 
 
-def _rows_of(recipe: Recipe, label: str) -> str:
+def rows_of(recipe: Recipe, label: str) -> str:
     """Return what the rows of a label's learner depend on, as text."""
     cone, delay_ms = recipe.learner_of(label)
-    values = {name: value for name, value in cone.get_params().items() if name not in ("lambdas", "neuron")}
+    values = {name: value for name, value in cone.get_params().items() if name not in ("neuron", *_NOT_OF_ROWS)}
     return parameters(values | {"delay_ms": delay_ms})
 
 

@@ -10,6 +10,9 @@ use crate::{EventsView, FramesView, Result, Spike, Stop, problem};
 /// The number of events, or of pictures, between two checks of [`Stop`].
 const PIECE: usize = 16_384;
 
+/// How long after the silence that follows a recording a quantity is computed, us: so far its frames or age may reach.
+const LONGEST_REACH_US: i64 = 10_000_000;
+
 /// The changes of a quantity in a recording.
 pub struct LoadCurve {
     quantity: Quantity,
@@ -46,8 +49,8 @@ impl LoadCurve {
             stop.check()?;
             stream.push_events(piece, &mut changes)?;
         }
-        stream.finish(&mut changes);
-        let last = events.t.iter().copied().max().unwrap_or(0);
+        let last = events.t.iter().copied().chain(events.markers.iter().map(|marker| marker.t)).max().unwrap_or(0);
+        stream.advance(last + SILENCE_US + LONGEST_REACH_US, &mut changes);
         Ok(Self { quantity, changes, pictures: vec![], clock, period_us: frames.period_us, last })
     }
 
@@ -113,7 +116,9 @@ impl LoadCurve {
 
     fn run<'a>(&self, limits: Limits, changes: impl Iterator<Item = &'a Spike>) -> Vec<Decision> {
         let (mut rule, mut clock, mut out) = (RunningRule::new(limits), self.clock, vec![]);
-        let mut changes = changes.peekable();
+        let reach = (limits.frames as f64 * self.period_us).ceil() as i64 + limits.age_us.unwrap_or(0);
+        let end = self.last + SILENCE_US + reach;
+        let mut changes = changes.take_while(|change| us(change.t) < end as f64).peekable();
         for &t in &self.pictures {
             rule.advance(t, &clock, &mut out);
             clock.picture(t);
@@ -124,8 +129,7 @@ impl LoadCurve {
         for &change in changes {
             rule.change(change, false, &clock, &mut out);
         }
-        let reach = (limits.frames as f64 * self.period_us).ceil() as i64 + limits.age_us.unwrap_or(0);
-        rule.advance(self.last + SILENCE_US + reach, &clock, &mut out);
+        rule.advance(end, &clock, &mut out);
         out
     }
 }

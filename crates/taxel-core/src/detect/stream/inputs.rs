@@ -32,7 +32,7 @@ impl Inputs {
         let value = match self.recent.get_mut(input) {
             Some(recent) => {
                 recent.push_back(spike.t);
-                while recent.front().is_some_and(|&t| spike.t - t > memory_ms) {
+                while recent.front().is_some_and(|&t| t < spike.t - memory_ms) {
                     recent.pop_front();
                 }
                 recent.len() as f64
