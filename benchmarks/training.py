@@ -1,15 +1,15 @@
 """Contact and lift by neurons trained on ten scenes, and by plain rules tuned on the same ten, on unseen scenes.
 
-Ten trainings of ten scenes each, by the recipe `touch` as `taxel train` chooses it, and the rule that `taxel.detect.tune`
-finds on the same ten; all are judged on the same unseen scenes: as `taxel emulate` plays them, some 1000 touches; with a
-noise of the readings of 0.3, 0.6, 1.2 and 2.4 ticks, with a tare 10 minutes old from which taxels drift by 1 tick a
-minute (sd), with 3 stuck and 2 flickering taxels and a flickering pair (`taxel.simulate.worn`), and with balls that come
-to rest on the array, trained and tuned in each, some 50 touches. One to one, impacts within 10 ms, presses within 50.
-Trainings have the seeds from 2^32 + 100 on, unseen scenes those from 700 on.
+Ten trainings of ten scenes each, by the recipe `touch` as `taxel train` chooses it, and the rules that
+`taxel.detect.tune` finds on the same ten; all are judged on the same unseen scenes: as `taxel emulate` plays them, some
+1000 touches; with a noise of the readings of 0.3, 0.6, 1.2 and 2.4 ticks, with a tare 10 minutes old from which taxels
+drift by 1 tick a minute (sd), with 3 stuck and 2 flickering taxels and a flickering pair (`taxel.simulate.worn`), and
+with balls that come to rest on the array, some 50 touches each, trained and tuned there. One to one, impacts within 10
+ms, presses within 50. Trainings have the seeds from 2^32 + 100 on, unseen scenes those from 700 on.
 
-Peer: the tuned plain rule. Unit: touches. Goal: as played, in sum no fewer found and no more false than the rule, the worst
-training within 2 % of it, first impacts known within 0.1 ms of it at the median, live the same as offline; with noise, an
-old tare and bad taxels together at most 10 more missed and false than the rule; with balls at rest fewer than the rule.
+Peer: the tuned plain rule. Unit: touches. Goal: as played, in sum no fewer found and no more false than the rule, the
+worst training within 2 % of it, first impacts known within 0.1 ms of it at the median, live the same as offline; with
+noise, an old tare and bad taxels together at most 10 more missed and false than the rule; with balls at rest fewer.
 """
 
 from __future__ import annotations
@@ -63,10 +63,12 @@ class Played(NamedTuple):
 
     @property
     def example(self) -> Example:
+        """The scenes with the true times of contact and lift."""
         ends = [[round(one.start_us) for one in self.contacts], [round(one.stop_us) for one in self.contacts]]
         return Example(self.events, dict(zip(LABELS, map(np.sort, ends), strict=True)), self.tare)
 
     def judged(self, found: Detections) -> Score:
+        """Score what was detected in the scenes."""
         windows = {}
         for label, end in zip(LABELS, ("start_us", "stop_us"), strict=True):
             order = np.argsort([round(getattr(one, end)) for one in self.contacts], kind="stable")
@@ -144,17 +146,17 @@ def summed(trainings: list[dict[str, Any]], way: str) -> dict[str, Any]:
     }
 
 
-class Unseen:
-    """Draws nothing."""
+class Blank:
+    """A screen that stays blank."""
 
     def draw(self, *_: object) -> None:
-        pass
+        """Draw nothing."""
 
 
 def lives(readout: Readout, scenes: int) -> bool:
     """Whether a readout detects live what it detects in the recording."""
     with tempfile.TemporaryDirectory() as place:
-        return play_live(readout, Path(place), seed=3, scenes=scenes, screen=lambda *_: Unseen()).agrees
+        return play_live(readout, Path(place), seed=3, scenes=scenes, screen=lambda *_: Blank()).agrees
 
 
 def goals(results: Mapping[str, Any], live: bool | None) -> dict[str, bool | None]:

@@ -115,7 +115,7 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
 
 
 def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
-    """Return a recording's tare: 0 for pictures in N or kPa, else as `tare_before`; None where there is no such time."""
+    """Return a recording's tare: 0 for pictures in N or kPa, else as `tare_before`, or None without such a time."""
     from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
     from taxel.recorded import recorded  # noqa: PLC0415
     from taxel.tare import Tare  # noqa: PLC0415

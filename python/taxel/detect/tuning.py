@@ -91,8 +91,8 @@ def tune(
 
     Notes
     -----
-    Of equal rules the first counts: area before total before local load, low thresholds before high, few frames before many. A rule that
-    misses and invents as many as there are labels is no better than none.
+    Of equal rules the first counts: area before total before local load, low thresholds before high, few frames before
+    many. A rule that misses and invents as many as there are labels is no better than none.
 
     Examples
     --------
