@@ -20,7 +20,7 @@ def held(events: Events, t_us: int) -> np.ndarray:
 
 def test_nothing_asked_changes_no_value(played: Events) -> None:
     same = worn(played, SINCE, seed=1)
-    for t in range(60_000, int(played.t[-1]), 97_300):
+    for t in range(60_000, int(played.t[-1]), 297_300):
         assert np.array_equal(held(same, t), held(played, t))
     assert same.markers == played.markers
 
@@ -41,17 +41,16 @@ def test_every_taxel_drifts_steadily_by_its_own_rate(played: Events) -> None:
 
 def test_bad_taxels_are_as_many_as_asked_and_no_others_change(played: Events) -> None:
     bad = worn(played, SINCE, seed=3, stuck=3, flickering=2, pairs=1)
-    times = range(SINCE + 100, int(played.t[-1]), 5_000)
-    differ = np.array([held(bad, t) != held(played, t) for t in times])
-    assert 5 <= differ.any(axis=0).sum() <= 7
-    moving = [
-        np.unique([held(bad, t)[y, x] for t in times]) for y, x in zip(*np.nonzero(differ.any(axis=0)), strict=True)
-    ]
-    assert sum(len(values) == 1 for values in moving) == 3
-    assert sum(len(values) == 2 for values in moving) == 4
-    flickering = np.array([[len(np.unique(differ[:, y, x])) for x in range(64)] for y in range(64)])
-    y, x = np.nonzero(flickering == 2)
-    assert any(y[k] == y[k + 1] and x[k] + 1 == x[k + 1] for k in range(len(y) - 1))
+    times = range(SINCE + 100, int(played.t[-1]), 20_000)
+    pictures = np.array([held(bad, t) for t in times])
+    differ = pictures != np.array([held(played, t) for t in times])
+    places = np.nonzero(differ.any(axis=0))
+    count = [len(np.unique(pictures[:, y, x])) for y, x in zip(*places, strict=True)]
+    assert (count.count(1), count.count(2), len(count)) == (3, 4, 7)
+    flickering = [(y, x) for y, x, n in zip(*places, count, strict=True) if n == 2]
+    pairs = [(y, x) for y, x in flickering if (y, x + 1) in flickering]
+    up = pictures > pictures.min(axis=0)
+    assert any(np.array_equal(up[:, y, x], up[:, y, x + 1]) for y, x in pairs)
 
 
 def test_a_seed_gives_the_same_again_and_another_gives_another(played: Events) -> None:
