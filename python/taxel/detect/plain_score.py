@@ -61,6 +61,14 @@ class PlainScore:
         Raises
         ------
         ProblemError : no Score
+
+        Examples
+        --------
+        >>> from taxel.detect import score
+        >>> true = {"contact": [1000]}
+        >>> plain = PlainScore({"contact": PlainRule("area", 2)}, score(Detections(["contact"], [1100], [1200]), true))
+        >>> plain.better(score(Detections([], [], []), true))
+        ('contact',)
         """
         neuron = instance("than", than, Score)
         mine = {} if self.together is None else self.together.by_label

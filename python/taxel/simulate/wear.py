@@ -15,8 +15,8 @@ __all__ = ["worn"]
 
 #: The unit of added stamps, us: that of version 1 of the wire.
 _STAMP_US = 100
-#: How long a flickering taxel stays as it is, on average, ms.
-_FLICKER_MS = 20.0
+#: How long a flickering taxel stays as it is, on average, us.
+_FLICKER_US = 20_000
 #: The largest value of an event, ticks; one more means unknown.
 _MOST = 65_534
 _MINUTE_US = 60_000_000
@@ -154,7 +154,7 @@ def _bad(
         left -= set(both)
         t, up = np.array([since]), np.array([True])
         if n >= stuck:
-            apart = rng.exponential(1000 * _FLICKER_MS, 10 + (stop - since) // int(250 * _FLICKER_MS))
+            apart = rng.exponential(_FLICKER_US, 10 + 4 * (stop - since) // _FLICKER_US)
             later = since + np.cumsum(apart).astype(np.int64) // _STAMP_US * _STAMP_US
             t = np.concatenate([t, np.unique(later[(later > since) & (later <= stop)])])
             up = np.arange(len(t)) % 2 == 1
