@@ -108,17 +108,17 @@ class Loads:
     def truth(self, name: str, parts: Sequence[Stretch]) -> NDArray[np.int64]:
         """Return the labels of a name in parts of the examples, us on the one clock."""
         every = [self._labels[k].get(name, np.empty(0, np.int64)) + shift for k, shift in enumerate(self._shift)]
-        labels = Found(*[np.concatenate(every)] * 2, np.zeros(sum(map(len, every))))
-        return labels.between(self.windows(parts)).t
+        times = np.concatenate(every)
+        return Found(times, times, np.zeros(len(times))).between(self.windows(parts)).t
 
     def windows(self, parts: Iterable[Stretch]) -> list[tuple[int, int]]:
         """Return from when to when parts of the examples last on the one clock, us, ascending."""
         half = APART_US // 2
-        edges = [
-            (k * APART_US, *(float(np.clip(t + self._shift[k] - k * APART_US, -half, half)) for t in (start, stop)))
-            for k, start, stop in parts
-        ]
-        return sorted((int(np.ceil(start)) + base, int(np.ceil(stop)) + base) for base, start, stop in edges)
+
+        def edge(k: int, t: float) -> int:
+            return k * APART_US + int(np.ceil(np.clip(t + self._shift[k] - k * APART_US, -half, half)))
+
+        return sorted((edge(k, start), edge(k, stop)) for k, start, stop in parts)
 
     def off(self, found: Found, k: int) -> Found:
         """Return what was found by the clock of example k."""
@@ -126,8 +126,11 @@ class Loads:
 
     def _together(self, found: Iterable[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]) -> Found:
         t, known, values = zip(*found, strict=True)
-        shifted = [np.concatenate([one + by for one, by in zip(each, self._shift, strict=True)]) for each in (t, known)]
-        return Found(*shifted, np.concatenate(values))
+
+        def shifted(times: Iterable[NDArray[np.int64]]) -> NDArray[np.int64]:
+            return np.concatenate([one + by for one, by in zip(times, self._shift, strict=True)])
+
+        return Found(shifted(t), shifted(known), np.concatenate(values))
 
 
 def lacks_noise(examples: Sequence[Example]) -> bool:

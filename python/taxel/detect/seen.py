@@ -35,6 +35,7 @@ def seen(patterns: Sequence[SpikeTrains], memory_ms: float) -> dict[str, Any]:
 def _extremes(trains: SpikeTrains) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the least and the largest value of each train, with 0."""
     low, high = np.zeros(len(trains)), np.zeros(len(trains))
+    assert trains.values is not None
     train = np.repeat(np.arange(len(trains)), trains.counts)
     np.minimum.at(low, train, trains.values)
     np.maximum.at(high, train, trains.values)

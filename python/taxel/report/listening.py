@@ -138,7 +138,8 @@ def _beside(labels: Sequence[str], scored: Judged | None) -> list[tuple[str, str
     for label in labels:
         rule, together = scored.plain.rules[label], scored.plain.together
         rows.append((label, "neuron", scored.together[label]))
-        rows.append((label, "none" if rule is None else repr(rule), together and rule and together[label]))
+        score = None if rule is None or together is None else together[label]
+        rows.append((label, "none" if rule is None else repr(rule), score))
     return rows
 
 

@@ -129,8 +129,8 @@ def _steps(held: _Held, place: int, rate: float, age_us: float, since: int, stop
     """Return the values of a taxel whose reading has drifted: at once, and whenever that has become a tick more."""
     nearest = sorted(round(rate * (age_us + t)) for t in (0, stop - since))
     ticks = np.arange(nearest[0], nearest[1]) + 0.5
-    times = since + ticks / rate - age_us if len(ticks) else np.empty(0)
-    times = np.sort(np.ceil(times / _STAMP_US).astype(np.int64) * _STAMP_US)
+    exact = since + ticks / rate - age_us if len(ticks) else np.empty(0)
+    times = np.sort(np.ceil(exact / _STAMP_US).astype(np.int64) * _STAMP_US)
     t = np.concatenate([[since], times[(times > since) & (times <= stop)]]).astype(np.int64)
     value = held.at(place, t) + np.rint(rate * (age_us + t - since)).astype(np.int64)
     return _Added(t, np.full(len(t), place), value, np.full(len(t), rate > 0))
