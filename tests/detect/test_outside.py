@@ -77,11 +77,11 @@ def test_the_range_is_that_of_values_or_of_how_many_spikes_a_memory_holds() -> N
         SpikeTrains([1.0, 2.0, 3.0], [0, 2, 3, 3], 0.0, 10.0, [0.5, -2.0, 3.0], kind="graded"),
         SpikeTrains([1.0], [0, 0, 1, 1], 0.0, 10.0, [1.0], kind="graded"),
     ]
-    assert seen(graded, 5.0) == {"least": [-2.0, 0.0, 0.0], "most": [0.5, 3.0, 0.0]}
+    assert seen(graded, 5.0, graded=True) == {"least": [-2.0, 0.0, 0.0], "most": [0.5, 3.0, 0.0]}
     plain = [SpikeTrains.from_lists([[1.0, 2.0, 3.0, 9.0], [], [4.0]]), SpikeTrains.from_lists([[7.0], [], [1.0, 6.0]])]
-    assert seen(plain, 1.0) == {"most": [2, 0, 1]}
-    assert seen(plain, 2.0) == {"most": [3, 0, 1]}
-    assert seen(plain, 5.0) == {"most": [3, 0, 2]}
+    assert seen(plain, 1.0, graded=False) == {"most": [2, 0, 1]}
+    assert seen(plain, 2.0, graded=False) == {"most": [3, 0, 1]}
+    assert seen(plain, 5.0, graded=False) == {"most": [3, 0, 2]}
 
 
 def test_a_file_with_ranges_that_make_no_sense_is_refused() -> None:

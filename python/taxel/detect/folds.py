@@ -20,8 +20,9 @@ from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.loads import Clock, clock_of
 from taxel.detect.plain_score import PlainScore, floor_of, plain_score
 from taxel.detect.readout import Readout, run
+from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import Fitting, Recipe, Trained, encoded, learn, readout_of, rows_of
+from taxel.detect.training import Fitting, Trained, encoded, learn, readout_of, rows_of
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -156,7 +157,9 @@ def judge(
     report = _reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
-    patterns = encoded(examples, instance("recipe", recipe, Recipe), report)
+    whole = instance("recipe", recipe, Recipe)
+    recipe = whole._narrowed(recipe._labels(examples), search=search)
+    patterns = encoded(examples, recipe, report)
     array = array_of(examples)
     detections: dict[int, list[Detections]] = {}
     trained = []
@@ -167,7 +170,8 @@ def judge(
             inner = fold.inner or _split(examples, fold.train, INNER)
             plan = _chosen(examples, patterns, recipe, inner, window, clocks, report)
         with _quiet():
-            trained.append(learn([_of(part, patterns) for part in fold.train], plan, array, report))
+            made = learn([_of(part, patterns) for part in fold.train], plan, array, report)
+        trained.append(made._replace(recipe=replace(whole, neurons=plan.neurons)))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, clocks))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
@@ -239,7 +243,9 @@ def choose(
         k = whole("k", k, 2, 2**31)
         k = min(k, len(examples)) if len(examples) > 1 else k
     ways, _ = _folds(examples, k)
-    return _chosen(examples, encoded(examples, recipe, report), recipe, ways, window, clocks, report)
+    narrowed = recipe._narrowed(recipe._labels(examples), search=True)
+    chosen = _chosen(examples, encoded(examples, narrowed, report), narrowed, ways, window, clocks, report)
+    return replace(chosen, encoder=recipe.encoder)
 
 
 def _chosen(
@@ -292,7 +298,7 @@ def _marks(
                 continue
             if rows is None or not rows.fits(plan):
                 try:
-                    rows = Fitting(training, plan, label, lambda _: None)
+                    rows = Fitting(training, plan, label, array, lambda _: None)
                 except ProblemError:  # as where two labels lie within a longer refractory time
                     if m == 0:
                         raise
@@ -315,12 +321,14 @@ def _marks(
 def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Readout, part: Part) -> Sequence[Example]:
     """Return the examples as spike trains where a readout detects the same at the same times in them, but for `known`.
 
-    It does unless the grid of its neurons, which begins at a whole number of steps, is not that of the trains.
+    It does if it receives all of them, and the grid of its neurons, which begins at a whole number of steps, is theirs.
     """
     trains = patterns[part.example].source
     assert isinstance(trains, SpikeTrains)
-    steps = [trains.start / one.neuron.step_ms for one in readout.neurons.values()]
-    return patterns if all(abs(step - round(step)) < 1e-9 for step in steps) else examples
+    neurons = readout.neurons.values()
+    steps = [trains.start / one.neuron.step_ms for one in neurons]
+    on_grid = all(abs(step - round(step)) < 1e-9 for step in steps)
+    return patterns if on_grid and all(len(one.weights) == len(trains) for one in neurons) else examples
 
 
 def _quiet() -> Any:

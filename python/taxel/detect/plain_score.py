@@ -104,7 +104,8 @@ class PlainScore:
 
 def floor_of(encoder: Encoder) -> float:
     """Return the noise floor with which rules are tried beside an encoder."""
-    return float(getattr(encoder, "noise_floor", _FLOOR))
+    floors = [float(part.noise_floor) for part in encoder._each() if hasattr(part, "noise_floor")]
+    return floors[0] if floors else _FLOOR
 
 
 def plain_score(

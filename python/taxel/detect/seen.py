@@ -13,7 +13,7 @@ from taxel.spikes import SpikeTrains
 __all__ = ["seen"]
 
 
-def seen(patterns: Sequence[SpikeTrains], memory_ms: float) -> dict[str, Any]:
+def seen(patterns: Sequence[SpikeTrains], memory_ms: float, *, graded: bool) -> dict[str, Any]:
     """Return the least and the largest that each input has, as a readout's file holds them.
 
     Of graded spikes it is their values, with 0; of others, the largest number of spikes within the neuron's memory.
@@ -23,8 +23,10 @@ def seen(patterns: Sequence[SpikeTrains], memory_ms: float) -> dict[str, Any]:
     patterns : sequence of SpikeTrains
         As the neuron reads them: signed ones are split.
     memory_ms : float, ms
+    graded : bool
+        Whether the encoder that the neuron receives is graded; a part of a composite need not be what the whole is.
     """
-    if patterns[0].kind == "graded":
+    if graded:
         extremes = [_extremes(one) for one in patterns]
         least = np.minimum.reduce([low for low, _ in extremes])
         most = np.maximum.reduce([high for _, high in extremes])

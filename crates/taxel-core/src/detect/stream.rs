@@ -3,23 +3,23 @@
 use std::collections::VecDeque;
 
 use crate::detect::running_rule::RunningRule;
-use crate::detect::{Detection, FrameClock, Seen, TrainedNeuron};
+use crate::detect::{Detection, FrameClock};
 use crate::encode::{Stream, Zeroing};
 use crate::spikes::ms;
 use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
 
-mod inputs;
 mod labelled_rule;
 mod named_neuron;
 mod neurons;
+mod ranges;
 mod repairs;
 #[cfg(test)]
 mod tests;
 
-use inputs::Inputs;
 use labelled_rule::LabelledRule;
-use named_neuron::NamedNeuron;
-use neurons::Neurons;
+pub(super) use named_neuron::{Inputs, NamedNeuron};
+pub(super) use neurons::Neurons;
+pub(super) use ranges::Ranges;
 use repairs::Repairs;
 
 /// The number of events between two checks of [`Stop`].
@@ -57,18 +57,8 @@ enum Decides {
 }
 
 impl ReadoutStream {
-    pub(super) fn new(
-        encoder: Box<dyn Stream>,
-        array: Array,
-        clock: FrameClock,
-        threshold: f64,
-        delays_ms: Vec<f64>,
-        neurons: impl Iterator<Item = (String, TrainedNeuron, Option<Seen>)>,
-    ) -> Self {
-        let (latency_ms, kind) = (encoder.latency_ms(), encoder.kind());
-        let named = |(label, one, seen)| NamedNeuron::new(label, one, Inputs::new(seen, kind), threshold, latency_ms);
-        let neurons = neurons.map(named).collect();
-        Self::of(encoder, array, clock, Decides::Neurons(Neurons::new(neurons, delays_ms)))
+    pub(super) fn new(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, neurons: Neurons) -> Self {
+        Self::of(encoder, array, clock, Decides::Neurons(neurons))
     }
 
     /// A stream of a plain rule: `loads` emits the changes of its quantities.

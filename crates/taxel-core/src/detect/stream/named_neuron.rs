@@ -1,14 +1,45 @@
 //! A neuron of a readout in a stream: its label, its state, and its crossings so far.
 
-use super::inputs::Inputs;
+use super::ranges::Ranges;
 use crate::detect::TrainedNeuron;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
 use crate::{Result, Spike};
 
+/// Which of the encoder's trains a neuron receives.
+#[derive(Clone)]
+pub(in crate::detect) struct Inputs {
+    /// The number of the input that each train is, for all delays; `None`: each train is the input of its own number.
+    of_trains: Option<Vec<Option<u32>>>,
+}
+
+impl Inputs {
+    /// Those of the trains marked `received`, or all, each at so many delays.
+    pub fn new(received: Option<Vec<bool>>, delays: usize) -> Self {
+        let number = |received: Vec<bool>| {
+            let trains = received.len() * delays;
+            let inputs = received.into_iter().cycle().take(trains).scan(0, |next, received| {
+                let input = received.then_some(*next);
+                *next += u32::from(received);
+                Some(input)
+            });
+            inputs.collect()
+        };
+        Self { of_trains: received.map(number) }
+    }
+
+    fn of(&self, train: u32) -> Option<u32> {
+        match &self.of_trains {
+            Some(inputs) => inputs[train as usize],
+            None => Some(train),
+        }
+    }
+}
+
 /// A neuron with its label.
 #[derive(Clone)]
-pub(super) struct NamedNeuron {
+pub(in crate::detect) struct NamedNeuron {
     pub label: String,
+    inputs: Inputs,
     neuron: Neuron,
     weights: Vec<f64>,
     threshold: f64,
@@ -17,7 +48,7 @@ pub(super) struct NamedNeuron {
     /// Started at the first spike, so that a grid has the same points wherever the input begins.
     pub stream: Option<NeuronStream>,
     crossings: Vec<OutputSpike>,
-    pub inputs: Inputs,
+    pub ranges: Ranges,
     /// The time of the latest input that may rest on a repaired taxel, ms.
     repaired: Option<f64>,
     /// The time of the latest input outside its range in training, ms.
@@ -37,28 +68,36 @@ pub(super) struct Crossing {
 
 impl NamedNeuron {
     /// A trained neuron before its first spike.
-    pub fn new(label: String, one: TrainedNeuron, inputs: Inputs, threshold: f64, latency_ms: f64) -> Self {
+    pub fn new(label: &str, one: &TrainedNeuron, threshold: f64, latency_ms: f64, inputs: Inputs) -> Self {
         Self {
-            label,
+            label: label.to_owned(),
+            inputs,
             offset_ms: latency_ms + one.delay_ms,
-            neuron: one.neuron,
-            weights: one.weights,
+            neuron: one.neuron.clone(),
+            weights: one.weights.clone(),
             threshold,
             stream: None,
             crossings: vec![],
-            inputs,
+            ranges: Ranges::default(),
             repaired: None,
             outside: None,
         }
     }
 
-    /// Passes a spike, whose train is the number of an input, to the neuron, the number of which is `k`; adds to `out`
-    /// the crossings so far, if later ones rest on something else.
+    /// The neuron with the ranges that its inputs had in training.
+    pub fn with_ranges(self, ranges: Ranges) -> Self {
+        Self { ranges, ..self }
+    }
+
+    /// Passes a spike of an encoder's train to the neuron, the number of which is `k`, if it is one of its inputs; adds
+    /// to `out` the crossings so far, if later ones rest on something else.
     ///
     /// # Errors
     ///
     /// Those of [`NeuronStream::push`].
     pub fn push(&mut self, spike: Spike, repaired: bool, k: usize, out: &mut Vec<Crossing>) -> Result<()> {
+        let Some(input) = self.inputs.of(spike.train) else { return Ok(()) };
+        let spike = Spike { train: input, ..spike };
         let stream = match &mut self.stream {
             Some(stream) => stream,
             None => {
@@ -70,7 +109,7 @@ impl NamedNeuron {
             }
         };
         stream.push(spike, &mut self.crossings)?;
-        let outside = self.inputs.is_outside(spike, self.neuron.memory_ms());
+        let outside = self.ranges.is_outside(spike, self.neuron.memory_ms());
         if repaired || outside {
             // Crossings up to here cannot rest on this spike.
             self.drain_crossings(k, out);

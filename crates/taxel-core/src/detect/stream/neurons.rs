@@ -8,7 +8,7 @@ use crate::{Result, Spike, SpikeKind};
 
 /// Neurons with the delays at which they receive the encoder's trains.
 #[derive(Clone)]
-pub(super) struct Neurons {
+pub(in crate::detect) struct Neurons {
     neurons: Vec<NamedNeuron>,
     /// The delays at which each train enters the neurons, ms.
     delays_ms: Vec<f64>,
@@ -30,7 +30,7 @@ impl Neurons {
 
     /// The number of detections with an input outside its range in training; `None` if a range is not known.
     pub fn outside(&self) -> Option<u64> {
-        self.neurons.iter().all(|one| one.inputs.are_known()).then_some(self.outside)
+        self.neurons.iter().all(|one| one.ranges.are_known()).then_some(self.outside)
     }
 
     /// Assigns the encoder's spikes to the neurons' inputs, each with whether it may rest on a repaired event.

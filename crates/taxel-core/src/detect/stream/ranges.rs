@@ -6,14 +6,14 @@ use crate::detect::Seen;
 use crate::{Spike, SpikeKind};
 
 /// The range of each input in training, and the recent spikes of those that are counted.
-#[derive(Clone)]
-pub(super) struct Inputs {
+#[derive(Clone, Default)]
+pub(in crate::detect) struct Ranges {
     seen: Option<Seen>,
     /// The times of each input's recent spikes, ms; none of graded ones, whose values are compared.
     recent: Vec<VecDeque<f64>>,
 }
 
-impl Inputs {
+impl Ranges {
     /// The inputs of one neuron before any spike.
     pub fn new(seen: Option<Seen>, kind: SpikeKind) -> Self {
         let counted = seen.as_ref().filter(|_| kind != SpikeKind::Graded).map_or(0, |seen| seen.most.len());
