@@ -32,8 +32,10 @@ def test_the_first_line_says_held_out_and_the_next_ones_how_each_label_scored(tm
     assert (code, lines[0]) == (0, "held out: 5 blocks of time (window 50 ms)")
     counts = r"12 of 12 found, 0 missed, 0 false, known -[\d.]+ ms after the label \(median\)"
     assert re.fullmatch(f"contact, neuron: {counts}", lines[1]), lines[1]
-    assert re.fullmatch(f"lift, neuron: {counts}", lines[2]), lines[2]
-    for line, label in zip(lines[3:5], ("contact", "lift"), strict=True):
+    assert re.fullmatch(f"lift, neuron: {counts}", lines[3]), lines[3]
+    for line, label in zip(lines[2:5:2], ("contact", "lift"), strict=True):
+        assert re.fullmatch(rf"{label}, plain rule: {counts}; tuned on all: .* frames?", line), line
+    for line, label in zip(lines[5:7], ("contact", "lift"), strict=True):
         said = re.fullmatch(
             rf"{label}: labels moved to what the sensor felt: median (-\d\S*) ms, largest (-\d\S*) ms", line
         )

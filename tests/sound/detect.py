@@ -26,6 +26,10 @@ def judged(folds: Any) -> taxel.detect.Judged:
     return taxel.detect.judge([EXAMPLE, EXAMPLE], RECIPE, folds)
 
 
+SCORE = taxel.detect.score(FOUND, {"a": [10], "b": [25]})
+PLAIN = taxel.detect.PlainScore({"a": RULE, "b": None}, SCORE)
+
+
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
     "taxel.Readout": plain(
@@ -137,6 +141,8 @@ SOUND: dict[str, Sound] = {
         labels={"a": [9000]},
         tare=None,
     ),
+    "taxel.detect.PlainScore.better": method(PLAIN, "better", than=SCORE),
+    "taxel.detect.PlainScore.to_dict": method(PLAIN, "to_dict", than=SCORE),
     "taxel.detect.Alignment.felt": method(ALIGNMENT, "felt", example=0),
     "taxel.detect.TrainedNeuron": plain(
         lambda **given: taxel.Readout(LEVELS, {"a": taxel.detect.TrainedNeuron(**given)}, array=ARRAY),
@@ -150,6 +156,7 @@ SOUND: dict[str, Sound] = {
 #: For each type that only taxel constructs, a call that returns an instance.
 RESULTS: dict[str, Callable[[], Any]] = {
     "taxel.detect.Alignment": lambda: ALIGNMENT,
+    "taxel.detect.PlainScore": lambda: PLAIN,
     "taxel.detect.Judged": lambda: judged(2),
     "taxel.detect.Trained": lambda: judged(2).trained[0],
     "taxel.detect.Score": lambda: taxel.detect.score(FOUND, {"a": [10], "b": [25]}),

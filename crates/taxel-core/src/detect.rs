@@ -19,7 +19,7 @@ pub use readout::Readout;
 pub use running_rule::Decision;
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
-pub use trained::TrainedNeuron;
+pub use trained::{Seen, TrainedNeuron};
 
 use serde::{Deserialize, Serialize};
 

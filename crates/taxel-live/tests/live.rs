@@ -1,6 +1,7 @@
 //! From the emulated board's frames to recorded datagrams and detections: nothing is lost uncounted, and the recording
 //! gives what was received live.
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::path::PathBuf;
@@ -100,6 +101,7 @@ fn of(encoder: &str, one: TrainedNeuron) -> Readout {
         run_threshold: 1.0,
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), one)].into(),
+        seen: BTreeMap::new(),
     }
 }
 
@@ -202,7 +204,7 @@ fn detections_live_are_those_of_the_recording() {
     let output: Vec<Detection> = delivered.iter().map(|s| s.detection.clone()).collect();
     let (events, detections) = recorded(&path);
     assert_eq!(detections, output, "the recording has the detections that were output");
-    let mut again = Detector::from(readout(2.0))
+    let (mut again, _) = Detector::from(readout(2.0))
         .run_events(events.view(), 192.0, None, &[], Stop::never())
         .expect("a sound readout");
     // Nothing moved the time on after the last event, and what it would have led to was not output.
@@ -345,7 +347,7 @@ fn a_slow_sink_delays_neither_what_comes_nor_what_is_read_out() {
     drop(free);
     let summary = live.stop().expect("no error");
     assert_closed(&summary, &report);
-    let mut again = Detector::from(readout(2.0))
+    let (mut again, _) = Detector::from(readout(2.0))
         .run_events(expected.view(), 192.0, None, &[], Stop::never())
         .expect("a sound readout");
     again.retain(|d| Some(&d.t) < expected.t.last());
@@ -426,7 +428,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     assert_eq!((tare.start_us, tare.stop_us), (0, start));
     assert!(tare.rest.iter().all(|&rest| rest == Some(20.0)));
     assert_eq!(detections.len(), 5, "a press each 208 frames of 1000");
-    let again = Detector::from(readout)
+    let (again, _) = Detector::from(readout)
         .run_events(recorded(&path).0.view(), 192.0, Some(&tare), &[], Stop::never())
         .expect("a sound readout");
     assert_eq!(again, detections);

@@ -1,5 +1,6 @@
 //! A board that speaks version 2, received live: what was lost is known, and its promises say when a moment is over.
 
+use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -144,6 +145,7 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         run_threshold: 1.0,
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), one)].into(),
+        seen: BTreeMap::new(),
     };
     let readout = ReadoutSetup::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
     let live = Live::start(ANY, options(&array, registers, None), readout, vec![]).expect("a port");

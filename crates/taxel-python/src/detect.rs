@@ -7,6 +7,7 @@ use taxel_core::detect::{
     Reference, Spread, score as score_core,
 };
 use taxel_core::encode::{Quantity, Tare, Zeroing};
+use taxel_core::spikes::us;
 
 use crate::convert::{ArrayParts, EventsIn, FramesIn, array, slice, to_array, to_events, to_frames};
 use crate::enter::{Shared, enter};
@@ -162,7 +163,8 @@ fn parse_tare(tare: Option<&str>) -> PyResult<Option<Tare>> {
     tare.map(Tare::from_json).transpose().map_err(core)
 }
 
-/// The detections of a readout or a plain rule in a whole recording of events, with its zeroings: t in us, column, row, rest.
+/// The detections of a readout or a plain rule in a whole recording of events, with its zeroings: t in us, column, row,
+/// rest; and how many of them have an input outside its range in training.
 #[pyfunction]
 fn readout_run_events<'py>(
     py: Python<'py>,
@@ -172,17 +174,18 @@ fn readout_run_events<'py>(
     wire_version: u8,
     tare: Option<&str>,
     zeroings: Vec<(i64, u16, u16, f64)>,
-) -> PyResult<DetectionsOut<'py>> {
+) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
     let ((readout, tare), events) = (parse(readout, tare)?, to_events(events)?);
     let zeroings: Vec<_> =
         zeroings.into_iter().map(|(t, x, y, rest)| Zeroing { t, x, y, rest, before: None }).collect();
     let events = events.view()?;
     let frames = FrameTime::on_wire(frame_us, wire_version);
-    let found = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), &zeroings, stop))?;
-    Ok(from_detections(py, found))
+    let (found, outside) = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), &zeroings, stop))?;
+    Ok((from_detections(py, found), outside))
 }
 
-/// The detections of a readout or a plain rule in a whole recording of pictures.
+/// The detections of a readout or a plain rule in a whole recording of pictures, and how many of them have an input
+/// outside its range in training.
 #[pyfunction]
 fn readout_run_frames<'py>(
     py: Python<'py>,
@@ -190,11 +193,11 @@ fn readout_run_frames<'py>(
     frames: FramesIn<'py>,
     frame_us: Option<f64>,
     tare: Option<&str>,
-) -> PyResult<DetectionsOut<'py>> {
+) -> PyResult<(DetectionsOut<'py>, Option<u64>)> {
     let ((readout, tare), frames) = (parse(readout, tare)?, to_frames(frames)?);
     let frames = frames.view()?;
-    let found = enter(py, |stop| readout.run_frames(frames, frame_us, tare.as_ref(), stop))?;
-    Ok(from_detections(py, found))
+    let (found, outside) = enter(py, |stop| readout.run_frames(frames, frame_us, tare.as_ref(), stop))?;
+    Ok((from_detections(py, found), outside))
 }
 
 /// A readout or a plain rule at work.
@@ -240,6 +243,12 @@ impl ReadoutStream {
     #[getter]
     fn late(&self, py: Python<'_>) -> u64 {
         self.0.with(py, |readout| readout.late())
+    }
+
+    /// How many detections have an input outside its range in training; None if that is not known.
+    #[getter]
+    fn outside(&self, py: Python<'_>) -> Option<u64> {
+        self.0.with(py, |readout| readout.outside())
     }
 
     /// Each neuron's potential now, mV.
@@ -293,9 +302,11 @@ impl LoadCurve {
         enter(py, |stop| CoreCurve::of_frames(quantity, noise_floor, frames, frame_us, tare.as_ref(), stop)).map(Self)
     }
 
-    /// The quantity after each of its changes.
-    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        array(py, self.0.values().collect())
+    /// The times of its changes, us, and the quantity after each.
+    fn changes<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>) {
+        let changes = self.0.changes();
+        let times = changes.iter().map(|change| us(change.t).round() as i64).collect();
+        (array(py, times), array(py, changes.iter().map(|change| f64::from(change.value)).collect()))
     }
 
     /// The begins of loads, then their ends.

@@ -34,6 +34,12 @@ fn neuron_run<'py>(
     Ok((array(py, times), array(py, slopes)))
 }
 
+/// The time after which an input's effect is less than 1 % of its largest, ms.
+#[pyfunction]
+fn neuron_memory_ms(parameters: &str) -> PyResult<f64> {
+    Ok(to_neuron(parameters)?.memory_ms())
+}
+
 /// Weights of many neurons, in the precision that they are held in.
 #[derive(FromPyObject)]
 enum WeightsIn<'py> {
@@ -82,6 +88,7 @@ fn neuron_potential<'py>(
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(neuron_memory_ms, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_run, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_run_many, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_potential, module)?)

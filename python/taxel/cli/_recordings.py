@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: How long before the first label the rest ends, and how long it must last at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
+#: Units of pictures that read 0 at rest.
+_RESTS_AT_0 = ("N", "kPa")
 #: Share of the taxels with events that may lack a rest without a warning: a few have their first event late.
 _MOST_UNKNOWN = 0.1
 
@@ -109,6 +111,22 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
             f"{recording.path}: holds {what}, from which to take the taxels' rest; give --tare SECONDS or --tare FILE"
         )
     return _measured(recording, source, min(ends))
+
+
+def tare_if_any(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare | None:
+    """Return a recording's tare: 0 for pictures in N or kPa, else as `tare_before`, or None without such a time."""
+    from taxel.frames import Frames  # noqa: PLC0415  the command line starts quickly
+    from taxel.recorded import recorded  # noqa: PLC0415
+    from taxel.tare import Tare  # noqa: PLC0415
+
+    source = recorded(recording)
+    if isinstance(source, Frames) and source.unit in _RESTS_AT_0:
+        nothing = np.zeros((2, *source.array.shape))
+        return Tare.take(Frames(nothing, [0, 1], unit=source.unit, array=source.array), note="0, by the unit")
+    try:
+        return tare_before(labels, recording)
+    except ProblemError:
+        return None
 
 
 def _measured(recording: Recording, source: Events | Frames, stop_us: int) -> Tare:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from taxel._base.messages import counted
-from taxel.detect import Judged, Score, Trained
+from taxel.detect import Judged, PlainRule, Score, Trained
 from taxel.detect.advice import Advice
 from taxel.recording import Recording
 
@@ -56,6 +56,7 @@ class Result:
                 for one, each in zip(self.opened, self.scored.scores, strict=True)
             ],
             "score": self.scored.together.to_dict(),
+            "plain_rule": None if self.scored.plain is None else self.scored.plain.to_dict(self.scored.together),
             "helps": {label: one.helps for label, one in self.advice.items()},
         }
         if self.made.alignments:
@@ -75,8 +76,8 @@ class Result:
         if not self.why:
             lines = [f"held out: {self.scored.how} {window}"]
         for label in self.made.readout.labels:
-            lines += [_line(label, by, one) for by, one in self._scores(label)]
-        lines += [*self._advised(), *self._aligned()]
+            lines += self._scores(label)
+        lines += [*self._better(), *self._advised(), *self._aligned()]
         if recipe is not None:
             about = self.made.recipe.about
             lines.append(f"\nrecipe {recipe}" + (f": {about}" if about else ""))
@@ -93,9 +94,28 @@ class Result:
             lines.append(f"report: {report / 'report.html'}")
         return "\n".join(lines)
 
-    def _scores(self, label: str) -> list[tuple[str, Score]]:
-        """Return who detected the events of a label, and how that scored on the same labels: the neuron."""
-        return [("neuron", self.scored.together[label])]
+    def _scores(self, label: str) -> Iterator[str]:
+        """Yield how the neuron and the plain rule of a label scored on the same labels."""
+        yield _line(label, "neuron", self.scored.together[label])
+        plain = self.scored.plain
+        rule = None if plain is None else plain.rules[label]
+        if plain is None or plain.together is None:
+            yield f"no plain rule for {label}" + (f": {plain.lacks}" if plain is not None else "")
+        elif rule is None:
+            yield f"no plain rule for {label}: none is better than to detect nothing"
+        else:
+            yield f"{_line(label, 'plain rule', plain.together[label])}; tuned on all: {_short(rule)}"
+
+    def _better(self) -> Iterator[str]:
+        """Yield the labels of which the plain rule misses and invents fewer than the neuron, and what was not tried."""
+        plain = self.scored.plain
+        if plain is None or plain.together is None:
+            return
+        for label in plain.better(self.scored.together):
+            rule, neuron = (of[label].rank[0] for of in (plain.together, self.scored.together))
+            yield f"{label}: the plain rule is better: {rule} missed and false, the neuron {neuron}"
+        if plain.lacks:
+            yield plain.lacks
 
     def _advised(self) -> Iterator[str]:
         """Yield what may help each label of which many are missed or false."""
@@ -120,6 +140,11 @@ class Result:
                 of = counted(len(places), "label")
                 named = ", ".join(places[:_NAMED]) + more
                 yield f"{label}: nothing was felt within 50 ms of {of}, not learnt: {named}"
+
+
+def _short(rule: PlainRule) -> str:
+    """Return what a rule compares, without its labels."""
+    return repr(rule).removeprefix("PlainRule(").rpartition(": ")[0]
 
 
 def _line(label: str, by: str, one: Score) -> str:

@@ -62,7 +62,8 @@ def detect(
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
     from taxel._base.files import try_whole, write_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import Example, Outcome, load, run, score  # noqa: PLC0415
+    from taxel.detect import Example, Outcome, Readout, load, score  # noqa: PLC0415
+    from taxel.detect.readout import run_counting  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
 
     for place in (csv, None if report is None else new_report(report)):
@@ -78,11 +79,11 @@ def detect(
         for one, labelled in zip(opened, events, strict=True):
             update(f"reading {one.path}")
             rest = tare_of(tare, one)
-            detections = run(loaded, one, frame_us=frame_us, tare=rest)
+            detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest)
             # Labels that the readout does not have do not count as missed.
             true = None if labelled is None else {label: labelled.get(label, _NONE) for label in loaded.labels}
             scored = None if true is None else score(detections, true, window_ms)
-            outcomes.append(Outcome(str(one.path), Example(one, true or {}, rest), detections, scored))
+            outcomes.append(Outcome(str(one.path), Example(one, true or {}, rest), detections, scored, outside))
     truths = [one.example.labels for one in outcomes if one.score is not None]
     together = score_together([one.found for one in outcomes], truths, window_ms) if truths else None
     if csv is not None:
@@ -100,6 +101,8 @@ def detect(
         if recording.is_dir() or len(outcomes) > 1:
             typer.echo(f"{outcome.name}:")
         _print(outcome.found)
+        if isinstance(loaded, Readout):
+            typer.echo(outcome.outside_text)
     if together is not None:
         typer.echo(f"\nagainst {truth} (window {window_ms:g} ms):\n{together!r}")
     for name, path in places.items():
@@ -113,6 +116,7 @@ def _result(
     each: list[dict[str, Any]] = [
         {
             "recording": one.name,
+            "outside": one.outside,
             "detections": [
                 {
                     "label": d.label,

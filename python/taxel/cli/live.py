@@ -250,6 +250,8 @@ def _print_summary(summary: Summary, guard_frames: float) -> None:
     if counters["wrong"]:
         wrong = counted(counters["wrong"], "detection")
         typer.echo(f"{wrong} output too early: events arrived more than {guard_frames:g} frames late")
+    if counters["outside"] is not None:
+        typer.echo(f"{counted(counters['outside'], 'detection')} with an input outside what was seen in training")
     if counters["late"]:
         typer.echo(
             f"{counted(counters['late'], 'event')} out of order, or more than 0.1 s later than by the board's clock "

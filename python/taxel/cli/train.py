@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
@@ -23,15 +23,17 @@ from taxel.cli._recordings import (
     progress,
     references,
     tare_before,
+    tare_if_any,
     tare_of,
 )
 
 if TYPE_CHECKING:
     from taxel.cli._trained import Result
-    from taxel.detect import Example, Judged, Outcome, Readout, Recipe
+    from taxel.detect import Example, Judged, Outcome, PlainScore, Readout, Recipe
     from taxel.events import Events
     from taxel.frames import Frames
     from taxel.recording import Recording
+    from taxel.tare import Tare
 
 __all__ = ["train"]
 
@@ -129,7 +131,7 @@ def train(
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
         title, held_out = f"Training of {out}", () if result.why else result.scored.scores
-        more: dict[str, Any] = {"held_out": held_out, "alignments": result.made.alignments}
+        more: dict[str, Any] = {"held_out": held_out, "alignments": result.made.alignments, "scored": result.scored}
         write_listening(report, result.made.readout, outcomes, title=title, judged=result.how, **more)
     typer.echo(json.dumps(result.to_dict(out, recipe, report)) if as_json else result.page(out, recipe, report))
 
@@ -160,14 +162,18 @@ def _source(recording: Recording) -> Events | Frames:
 def _examples(
     opened: Sequence[Recording], labelled: Sequence[Mapping[str, Any]], tare: str | None, plan: Recipe
 ) -> list[Example]:
-    """Return recordings as examples; if the encoder needs a tare and none is given, it is taken from each recording."""
+    """Return recordings as examples; if no tare is given, it is taken from each recording.
+
+    Where the encoder needs none, only plain rules use it, and a recording from which it cannot be taken has none.
+    """
     from taxel.detect import Example  # noqa: PLC0415
 
-    needs_rest = tare is None and any(getattr(part, "tare", True) is None for part in plan.encoder._each())
-    return [
-        Example(one, events, tare_before(events, one) if needs_rest else tare_of(tare, one))
-        for one, events in zip(opened, labelled, strict=True)
-    ]
+    rests = [part.tare for part in plan.encoder._each() if hasattr(part, "tare")]
+    if tare is not None or any(rest is not None for rest in rests):
+        rest: Callable[..., Tare | None] = lambda _, one: tare_of(tare, one)  # noqa: E731
+    else:
+        rest = tare_before if rests else tare_if_any
+    return [Example(one, events, rest(events, one)) for one, events in zip(opened, labelled, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -208,21 +214,34 @@ class _Training:
         outcomes = self._outcomes(made.readout)
         a_point_s = None if self.search else (perf_counter() - begun) * INNER * (count + 1)
         own = _own(outcomes, self.window_ms)
+        if scored is None:
+            own = replace(own, plain=self._plain_score(plan, [one.example.labels for one in outcomes]))
         scored = own if scored is None else scored
         advice = advised(made, self.examples, scored.together, own.together, a_point_s)
         return Result(self.opened, made, scored, why, advice, self.window_ms, self.search), outcomes
 
+    def _plain_score(self, plan: Recipe, truths: Sequence[Mapping[str, Any]]) -> PlainScore:
+        """Return how plain rules do on the recordings that they were tuned on."""
+        from taxel.detect.examples import checked  # noqa: PLC0415
+        from taxel.detect.loads import clock_of  # noqa: PLC0415
+        from taxel.detect.plain_score import floor_of, plain_score  # noqa: PLC0415
+
+        clocks = [clock_of(one) for one in self.examples]
+        rest = checked(self.examples), list(truths[0]), clocks, floor_of(plan.encoder)
+        return plain_score(*rest, [], truths, self.window_ms, self.update)
+
     def _outcomes(self, readout: Readout) -> list[Outcome]:
         """Return the outcomes of the readout on the recordings that it was trained on."""
-        from taxel.detect import Example, Outcome, run, score  # noqa: PLC0415  the command line starts quickly
+        from taxel.detect import Example, Outcome, score  # noqa: PLC0415  the command line starts quickly
+        from taxel.detect.readout import run_counting  # noqa: PLC0415
 
         outcomes = []
         for one, example in zip(self.opened, self.examples, strict=True):
             self.update(f"scoring on {one.path}")
             truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
-            detections = run(readout, one, tare=example.tare)
+            detections, outside = run_counting(readout, one, tare=example.tare)
             own = score(detections, truth, self.window_ms)
-            outcomes.append(Outcome(str(one.path), Example(one, truth, example.tare), detections, own))
+            outcomes.append(Outcome(str(one.path), Example(one, truth, example.tare), detections, own, outside))
         return outcomes
 
 

@@ -6,6 +6,7 @@ from taxel.detect.examples import Example, Outcome
 from taxel.detect.folds import Fold, Judged, Part, choose, judge
 from taxel.detect.loading import load
 from taxel.detect.plain_rule import PlainRule
+from taxel.detect.plain_score import PlainScore
 from taxel.detect.readout import Learner, Readout, run
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, Spread, score
@@ -22,6 +23,7 @@ __all__ = [
     "Outcome",
     "Part",
     "PlainRule",
+    "PlainScore",
     "Readout",
     "ReadoutStream",
     "Recipe",

@@ -65,12 +65,24 @@ class Outcome(NamedTuple):
     found : Detections
     score : Score, optional
         None of an example without labels.
+    outside : int, 0 or more, optional
+        How many detections have an input outside the range that it had in training; None if that is not known.
     """
 
     name: str
     example: Example
     found: Detections
     score: Score | None = None
+    outside: int | None = None
+
+    @property
+    def outside_text(self) -> str:
+        """How many detections have an input outside the range that it had in training, in words."""
+        what = "with an input outside what was seen in training"
+        if self.outside is None:
+            return f"detections {what}: not known, as the readout's file does not hold it"
+        share = f" ({self.outside / len(self.found):.0%})" if len(self.found) else ""
+        return f"detections {what}: {self.outside} of {len(self.found)}{share}"
 
 
 def checked(examples: Sequence[Example]) -> list[Example]:

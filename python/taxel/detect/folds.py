@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from taxel._base.arguments import callback, finite, flag, instance, several, shown, whole, window
 from taxel._core import ProblemError
 from taxel.detect.examples import Example, array_of, checked
+from taxel.detect.loads import Clock, clock_of
+from taxel.detect.plain_score import PlainScore, floor_of, plain_score
 from taxel.detect.readout import Readout, run
 from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import Fitting, Trained, encoded, learn, readout_of
+from taxel.detect.training import Fitting, Trained, encoded, learn, readout_of, rows_of
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -95,12 +97,15 @@ class Judged:
         What was held out: recordings, blocks of time, or the given folds.
     trained : tuple of Trained
         One a fold.
+    plain : PlainScore, optional
+        How plain rules did that were tuned on the training part of each fold.
     """
 
     scores: tuple[Score, ...]
     together: Score
     how: str
     trained: tuple[Trained, ...] = ()
+    plain: PlainScore | None = None
 
 
 def judge(
@@ -113,7 +118,7 @@ def judge(
     frame_us: float | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Judged:
-    """Train once a fold, and score the detections in the data that the fold tests.
+    """Train once a fold, and score the detections in the data that the fold tests; and those of plain rules likewise.
 
     Parameters
     ----------
@@ -148,9 +153,7 @@ def judge(
     >>> judge(examples, recipe, [Fold([Part(0)], [Part(1)])]).together.found
     1
     """
-    examples, window = checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
-    if frame_us is not None:
-        finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
+    examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
     report = _reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
@@ -165,16 +168,29 @@ def judge(
         plan = recipe
         if search:
             inner = fold.inner or _split(examples, fold.train, INNER)
-            plan = _chosen(examples, patterns, recipe, inner, window, frame_us, report)
+            plan = _chosen(examples, patterns, recipe, inner, window, clocks, report)
         with _quiet():
             made = learn([_of(part, patterns) for part in fold.train], plan, array, report)
         trained.append(made._replace(recipe=replace(whole, neurons=plan.neurons)))
         for part in fold.test:
-            detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, frame_us))
+            detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, clocks))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
-    truths = _truths(examples, ways, recipe._labels(examples))
+    labels = recipe._labels(examples)
+    truths = _truths(examples, ways, labels)
     scores = tuple(score(*both, window) for both in zip(joined, truths, strict=True))
-    return Judged(scores, score_together(joined, truths, window), how, tuple(trained))
+    parts = [(fold.train, fold.test) for fold in ways]
+    plain = plain_score(examples, labels, clocks, floor_of(recipe.encoder), parts, truths, window, report)
+    return Judged(scores, score_together(joined, truths, window), how, tuple(trained), plain)
+
+
+def _sound_examples(
+    examples: Sequence[Example], window_ms: float, frame_us: float | None
+) -> tuple[list[Example], float, list[Clock]]:
+    """Return checked examples, the window of scores (ms), and the clock of each example."""
+    if frame_us is not None:
+        finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
+    clocks = [clock_of(one, frame_us) for one in examples] if isinstance(examples, Sequence) else []
+    return checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6), clocks
 
 
 def choose(
@@ -188,8 +204,8 @@ def choose(
 ) -> Recipe:
     """Return the recipe with, for each neuron, the point of those that it lists which is best on held-out data.
 
-    Best is the least `Score.rank`; of equals the first. Points that follow each other and differ in `lambdas` alone
-    are fitted to the same rows, each from the fit before.
+    Best is the least `Score.rank`; of equals the first. Points that differ only in what the rows of the learner do not
+    depend on, as `lambdas` and `kappa`, are fitted to the same rows, each from the fit before.
 
     Parameters
     ----------
@@ -221,16 +237,14 @@ def choose(
     {'contact': {'ub': 2.0}}
     """
     instance("recipe", recipe, Recipe)
-    examples, window = checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
-    if frame_us is not None:
-        finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
+    examples, window, clocks = _sound_examples(examples, window_ms, frame_us)
     report = _reporting(progress)
     if isinstance(k, int | np.integer):
         k = whole("k", k, 2, 2**31)
         k = min(k, len(examples)) if len(examples) > 1 else k
     ways, _ = _folds(examples, k)
     narrowed = recipe._narrowed(recipe._labels(examples), search=True)
-    chosen = _chosen(examples, encoded(examples, narrowed, report), narrowed, ways, window, frame_us, report)
+    chosen = _chosen(examples, encoded(examples, narrowed, report), narrowed, ways, window, clocks, report)
     return replace(chosen, encoder=recipe.encoder)
 
 
@@ -240,7 +254,7 @@ def _chosen(
     recipe: Recipe,
     folds: Sequence[Fold],
     window: float,
-    frame_us: float | None,
+    clocks: Sequence[Clock],
     report: Callable[[str], object],
 ) -> Recipe:
     """Return the recipe with the best point of each neuron; `patterns` are the examples as spike trains."""
@@ -250,9 +264,7 @@ def _chosen(
         best[label] = points[0]
         if len(points) > 1:
             plans = [replace(recipe, neurons={label: point}) for point in points]
-            marks = _marks(
-                _only(examples, label), _only(patterns, label), plans, label, folds, window, frame_us, report
-            )
+            marks = _marks(_only(examples, label), _only(patterns, label), plans, label, folds, window, clocks, report)
             best[label] = points[marks.index(min(marks))]
     return replace(recipe, neurons=best)
 
@@ -264,7 +276,7 @@ def _marks(
     label: str,
     folds: Sequence[Fold],
     window: float,
-    frame_us: float | None,
+    clocks: Sequence[Clock],
     report: Callable[[str], object],
 ) -> list[tuple[int, float]]:
     """Return the `Score.rank` over all folds of each of several recipes for one label.
@@ -274,10 +286,13 @@ def _marks(
     array = array_of(examples)
     detections: list[dict[int, list[Detections]]] = [{} for _ in plans]
     refused: set[int] = set()
+    needs = [rows_of(plan, label) for plan in plans]
+    in_turn = sorted(range(len(plans)), key=lambda m: needs.index(needs[m]))
     for n, fold in enumerate(folds):
         training = [_of(part, patterns) for part in fold.train]
         rows: Fitting | None = None
-        for m, plan in enumerate(plans):
+        for m in in_turn:
+            plan = plans[m]
             report(f"trying point {m + 1} of {len(plans)} for {label}, fold {n + 1} of {len(folds)}")
             if m in refused:
                 continue
@@ -292,7 +307,8 @@ def _marks(
             with _quiet():
                 readout = readout_of({label: rows.fit(plan)}, plan, array)
             for part in fold.test:
-                detections[m].setdefault(part.example, []).append(_detected(readout, examples, part, frame_us))
+                found = _detected(readout, _read(examples, patterns, readout, part), part, clocks)
+                detections[m].setdefault(part.example, []).append(found)
     truths = _truths(examples, folds, (label,))
     return [
         (sys.maxsize, np.inf)
@@ -302,14 +318,27 @@ def _marks(
     ]
 
 
+def _read(examples: Sequence[Example], patterns: Sequence[Example], readout: Readout, part: Part) -> Sequence[Example]:
+    """Return the examples as spike trains where a readout detects the same at the same times in them, but for `known`.
+
+    It does if it receives all of them, and the grid of its neurons, which begins at a whole number of steps, is theirs.
+    """
+    trains = patterns[part.example].source
+    assert isinstance(trains, SpikeTrains)
+    neurons = readout.neurons.values()
+    steps = [trains.start / one.neuron.step_ms for one in neurons]
+    on_grid = all(abs(step - round(step)) < 1e-9 for step in steps)
+    return patterns if on_grid and all(len(one.weights) == len(trains) for one in neurons) else examples
+
+
 def _quiet() -> Any:
     """Return a context without warnings of readouts that are only scored: their scores show what they miss."""
     return warnings.catch_warnings(action="ignore", category=UserWarning)
 
 
-def _detected(readout: Readout, examples: Sequence[Example], part: Part, frame_us: float | None) -> Detections:
-    source, _, tare = examples[part.example]
-    detections = run(readout, source, tare=tare, frame_us=frame_us)  # type: ignore[arg-type]
+def _detected(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
+    (source, _, tare), (frame_us, version) = examples[part.example], clocks[part.example]
+    detections = run(readout, source, tare=tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
     return detections[(detections.t >= part.start) & (detections.t < part.stop)]
 
 

@@ -31,11 +31,12 @@ class PlainRule(_Detector):
 
     Parameters
     ----------
-    quantity : {"area", "total"}
-        The number of loaded taxels, as `taxel.encode.ContactArea` counts them, or the sum of their values above rest in
-        the sensor's unit, as `taxel.encode.Moments` adds them, in single precision.
+    quantity : {"area", "total", "local_load"}
+        The number of loaded taxels, as `taxel.encode.ContactArea` counts them; the sum of their values above rest in
+        the sensor's unit, as `taxel.encode.Moments` adds them; or the largest sum over 3 x 3 taxels above a rest that
+        follows the sensor, in units of its noise, as of `taxel.encode.LocalLoad` ("largest"). In single precision.
     threshold : float, above 0
-        Number of taxels, or the sensor's unit.
+        Number of taxels, the sensor's unit, or units of noise.
     release : float, above 0, at most 1
         The part of the threshold below which the load ends. 1 with `age_ms`.
     frames : int, from 1 to 1 000 000
@@ -52,13 +53,15 @@ class PlainRule(_Detector):
 
     Raises
     ------
-    ProblemError : parameters that are invalid or do not fit together (names the parameter)
+    ProblemError : parameters that are invalid or do not fit together (names the parameter); when it runs by the local
+        load with a tare that has no noise of the taxels, as an older taxel saved it
 
     Notes
     -----
     A frame of events is the board's; its quantity is that after its last event, and its time the stamp with which the
     quantity passed the threshold. Silent frames count: taxels hold their values. Each picture of `Frames` is a frame.
-    Detections have no slope (NaN).
+    The local load also changes while nothing comes, with its rest: it is computed 10 ms after the last stamp too, and
+    from 80 ms on after each further eighth of the time since it. Detections have no slope (NaN).
 
     Examples
     --------
@@ -111,12 +114,12 @@ class PlainRule(_Detector):
 
     @property
     def quantity(self) -> str:
-        """What is compared with the threshold: "area" or "total"."""
+        """What is compared with the threshold: "area", "total" or "local_load"."""
         return str(self._parts["quantity"])
 
     @property
     def threshold(self) -> float:
-        """The threshold: number of taxels, or the sensor's unit."""
+        """The threshold: number of taxels, the sensor's unit, or units of noise."""
         return float(self._parts["threshold"])
 
     @property

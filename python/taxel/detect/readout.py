@@ -31,7 +31,7 @@ from taxel.wire import FRAME_US
 #: Detection goes on for so long after the last event, ms.
 SILENCE_MS = 1000.0
 
-__all__ = ["Learner", "Readout", "run"]
+__all__ = ["Learner", "Readout", "run", "run_counting"]
 
 
 class Learner(Protocol):
@@ -233,6 +233,10 @@ class Readout(_Detector):
         """The delays at each of which every train is an input, ms."""
         return np.array(self._parts.get("delays_ms", [0.0]), np.float64)
 
+    def _with_seen(self, seen: Mapping[str, Mapping[str, Any]]) -> Readout:
+        """Return the readout with the range of each neuron's inputs in its training data."""
+        return Readout._from_text(_core.check_readout(parameters(self._parts | {"seen": dict(seen)})))
+
     def to_nir(
         self, path: str | os.PathLike[str], *, spike_ms: float | None = None, overwrite: bool = False
     ) -> list[str]:
@@ -390,6 +394,21 @@ def run(
     >>> found.t, found.known
     (array([10479]), array([20000]))
     """
+    return run_counting(readout, source, frame_us=frame_us, tare=tare, wire_version=wire_version)[0]
+
+
+def run_counting(
+    readout: _Detector,
+    source: Recording | Events | Frames | SpikeTrains,
+    *,
+    frame_us: float | None = None,
+    tare: Tare | None = None,
+    wire_version: int | None = None,
+) -> tuple[Detections, int | None]:
+    """Return what `run` returns, and how many of it have an input outside the range that it had in training.
+
+    None where that is not known: of a plain rule, of a readout whose file does not hold the range, of spike trains.
+    """
     text = detector("readout", readout).to_json()
     period = None if frame_us is None else number("frame_us", frame_us, "us")
     version = None if wire_version is None else whole("wire_version", wire_version, 1, 2)
@@ -403,20 +422,21 @@ def run(
     if isinstance(source, SpikeTrains):
         if not isinstance(readout, Readout):
             raise ProblemError(f"source is {shown(source)}: a plain rule reads a recording, events or frames")
-        return _run_spikes(readout, source)
+        return _run_spikes(readout, source), None
     if isinstance(source, Events | Frames):
         for own in (readout.array, None if tare is None else tare.array):
             if own is not None:
                 own._warn_apart(source.array, "the recording")
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
-        columns = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
-        return Detections._from_parts(columns)
+        columns, outside = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
+        return Detections._from_parts(columns), outside
     if not isinstance(source, Frames):
         raise ProblemError(
             f"source is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
         )
-    return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, rest))
+    columns, outside = _core.readout_run_frames(text, source._parts(), period, rest)
+    return Detections._from_parts(columns), outside
 
 
 def _received(encoder: Encoder, one: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:

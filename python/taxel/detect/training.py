@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._base.arguments import callback, instance, parameters, shown
 from taxel._base.messages import counted
 from taxel._core import ProblemError
@@ -17,11 +18,20 @@ from taxel.detect.alignment import Alignment, ages_of, align
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.detect.recipe import Recipe
+from taxel.detect.seen import seen
 from taxel.encode import Composite
 from taxel.learn import ConeR
 from taxel.spikes import SpikeTrains, to_ms
 
 __all__ = ["Trained", "train"]
+
+
+#: Parameters of a learner that its rows do not depend on. Bounds could be among them, but that those of a train without
+#: a spike must contain 0.
+_NOT_OF_ROWS = (
+    "lambdas", "kappa", "divide_b_by", "divide_c_by", "divide_d_by", "sides_b", "sides_c", "norm", "tolerance",
+    "engine", "max_seconds",
+)  # fmt: skip
 
 
 class Trained(NamedTuple):
@@ -127,13 +137,14 @@ def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | Non
 
 def learn(patterns: Sequence[Example], recipe: Recipe, array: Array | None, report: Callable[[str], object]) -> Trained:
     """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
-    learners, alignments = {}, {}
+    learners, alignments, ranges = {}, {}, {}
     for label in _labels_to_learn(patterns, recipe):
         fitting = Fitting(patterns, recipe, label, array, report)
         learners[label] = fitting.fit(recipe)
+        ranges[label] = fitting.seen(learners[label])
         if fitting.alignment is not None:
             alignments[label] = fitting.alignment
-    return Trained(recipe, learners, readout_of(learners, recipe, array), alignments)
+    return Trained(recipe, learners, readout_of(learners, recipe, array)._with_seen(ranges), alignments)
 
 
 def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
@@ -149,7 +160,7 @@ def _labels_to_learn(examples: Sequence[Example], recipe: Recipe) -> tuple[str, 
 
 
 class Fitting:
-    """The rows of one label's learner on encoded examples, for a recipe and all others that differ in `lambdas` alone.
+    """The rows of one label's learner on encoded examples, for a recipe and all others that need the same.
 
     Raises
     ------
@@ -165,7 +176,7 @@ class Fitting:
         report: Callable[[str], object],
     ) -> None:
         self._label = label
-        self._needs = _rows_of(recipe, label)
+        self._needs = rows_of(recipe, label)
         learner, _ = recipe.learner_of(label)
         received = recipe._received(recipe._of(label))
         self._shift_ms = received.latency_ms + recipe._trained_delay_of(label)
@@ -174,6 +185,7 @@ class Fitting:
         if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         sources = [_inputs(k, one, recipe, label, array) for k, one in enumerate(examples)]
+        self._sources, self._graded = sources, received.kind == "graded"
         ages = ages_of(received, array)
         self.alignment = align(sources, label, given, received.latency_ms, ages) if recipe.align else None
         felt = given if self.alignment is None else [self.alignment.felt(k) for k in range(len(given))]
@@ -190,7 +202,11 @@ class Fitting:
 
     def fits(self, recipe: Recipe) -> bool:
         """Whether the learner that a recipe describes needs these rows."""
-        return self._needs == _rows_of(recipe, self._label)
+        return self._needs == rows_of(recipe, self._label)
+
+    def seen(self, cone: ConeR) -> dict[str, Any]:
+        """Return the range of the inputs of a fitted learner's neuron."""
+        return seen(self._sources, _core.neuron_memory_ms(cone.neuron_._json()), graded=self._graded)
 
     def fit(self, recipe: Recipe) -> ConeR:
         """Fit the learner that a recipe describes, beginning at the fit before, if any; warnings name events."""
@@ -223,10 +239,10 @@ def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     return events
 
 
-def _rows_of(recipe: Recipe, label: str) -> str:
+def rows_of(recipe: Recipe, label: str) -> str:
     """Return what the rows of a label's learner depend on, as text."""
     cone, delay_ms = recipe.learner_of(label)
-    values = {name: value for name, value in cone.get_params().items() if name not in ("lambdas", "neuron")}
+    values = {name: value for name, value in cone.get_params().items() if name not in ("neuron", *_NOT_OF_ROWS)}
     return parameters(values | {"delay_ms": delay_ms, "inputs": sorted(recipe.inputs_of(label))})
 
 

@@ -1,9 +1,9 @@
-"""The plain rule that fits labelled recordings best, by trying a grid of them on the load of each recording."""
+"""The plain rule that fits labelled recordings best, by trying a grid of them on the loads of each recording."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,32 +11,25 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.arguments import callback, number, several, text
 from taxel._core import ProblemError
-from taxel.detect.detector import tare_text
 from taxel.detect.examples import Example, checked
+from taxel.detect.loads import Found, Loads, Stretch, clock_of
 from taxel.detect.plain_rule import PlainRule
-from taxel.frames import Frames
-from taxel.recording import Recording
 from taxel.spikes import SpikeTrains, to_us
-from taxel.wire import FRAME_US
 
-__all__ = ["AGES_MS", "AREAS", "FRAMES", "QUANTILES", "RELEASES", "tune"]
+__all__ = ["AGES_MS", "AREAS", "FRAMES", "LOCAL_LOADS", "QUANTILES", "RELEASES", "best_rules", "tune"]
 
 #: Thresholds of the area, taxels.
 AREAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 #: Thresholds of the total: these quantiles of all its values above 0.
 QUANTILES = tuple(np.linspace(0.0, 0.95, 20).tolist())
+#: Thresholds of the local load, units of noise.
+LOCAL_LOADS = (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0)
 #: Parts of the threshold below which a load ends.
 RELEASES = (0.5, 1.0)
 #: How many frames in a row decide.
 FRAMES = (1, 2, 5, 10, 20)
 #: Ages at which kinds are decided, ms.
 AGES_MS = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 16.0, 20.0, 30.0, 50.0)
-
-#: So far apart, us, no detection of one example pairs with a label of another when all are scored together.
-_APART_US = 10**12
-
-#: Times and times when they were known (us), of all examples on one clock, and quantities.
-_Found: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
 
 class _Fit(NamedTuple):
@@ -67,8 +60,9 @@ def tune(
 
     Nearest at the median of `known`, before the label as after it: what is known earlier responds to something else.
 
-    Tried are all thresholds of the area (`AREAS`) and of the total (`QUANTILES` of its values above 0), with all
-    numbers of frames (`FRAMES`) and releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
+    Tried are all thresholds of the area (`AREAS`), of the total (`QUANTILES` of its values above 0) and of the local
+    load (`LOCAL_LOADS`; not where a tare has no noise of the taxels), with all numbers of frames (`FRAMES`) and
+    releases (`RELEASES`), at the onset and at the end of a load. Two labels are kinds
     where exactly two are nearer to onsets than to ends, or where there are only two: then thresholds of the area at
     each of `AGES_MS` are tried too, on a logarithmic scale, and hold for both where they are better for both together.
 
@@ -97,8 +91,8 @@ def tune(
 
     Notes
     -----
-    Of equal rules the first counts: area before total, low thresholds before high, few frames before many. A rule that
-    misses and invents as many as there are labels is no better than none.
+    Of equal rules the first counts: area before total before local load, low thresholds before high, few frames before
+    many. A rule that misses and invents as many as there are labels is no better than none.
 
     Examples
     --------
@@ -109,7 +103,7 @@ def tune(
     >>> rules["touch"], rules["removal"]
     (PlainRule(area >= 1, release 0.5, 1 frame: onset touch), PlainRule(area >= 1, release 0.5, 1 frame: end removal))
     """
-    clocks = [_clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
+    clocks = [clock_of(example) for example in examples] if isinstance(examples, Sequence) else []
     sound = checked(examples)
     report = (lambda _: None) if progress is None else callback("progress", progress)
     names = sorted({name for one in sound for name in one.labels}) if labels is None else several("labels", labels)
@@ -117,95 +111,70 @@ def tune(
     width_ms = number("window_ms", window_ms, "ms")
     if not 0.0 <= width_ms <= 3_600_000.0:
         raise ProblemError(f"window_ms is {width_ms:g}: must lie between 0 and 3600000")
-    width_us = round(float(to_us(width_ms)))
     floor = number("noise_floor", noise_floor)
     if any(isinstance(one.source, SpikeTrains) for one in sound):
         return dict.fromkeys(names)
-    truth = {
-        name: np.concatenate(
-            [np.sort(one.labels.get(name, np.empty(0, np.int64))) + k * _APART_US for k, one in enumerate(sound)]
-        )
-        for name in names
-    }
-    curves = {}
-    for quantity in ("area", "total"):
-        report(f"plain rules by {quantity}")
-        curves[quantity] = [_curve(quantity, floor, one, *c) for one, c in zip(sound, clocks, strict=True)]
-    best = _at_edges(curves, truth, width_us, floor)
+    loads = Loads(sound, clocks, floor, report)
+    return best_rules(loads, names, loads.every, width_ms)
+
+
+def best_rules(
+    loads: Loads, names: Sequence[str], parts: Sequence[Stretch], window_ms: float
+) -> dict[str, PlainRule | None]:
+    """Return for each label the best rule on parts of the examples, as `tune` does on all of them."""
+    width_us = round(float(to_us(window_ms)))
+    windows = loads.windows(parts)
+    truth = {name: loads.truth(name, parts) for name in names}
+    best = _at_edges(loads, parts, truth, width_us)
     onsets = [name for name, (onset, end) in best.items() if onset.fit.error_ms < end.fit.error_ms]
     single = {name: min(pair, key=lambda one: one.fit[:2]) for name, pair in best.items()}
-    kinds = onsets if len(onsets) == 2 else names if len(names) == 2 else []
+    kinds = onsets if len(onsets) == 2 else list(names) if len(names) == 2 else []
     if kinds:
-        report("plain rules for kinds")
-        found = _for_kinds(curves["area"], kinds, truth, width_us, floor)
+        touches = {age: loads.at_age(age).between(windows) for age in AGES_MS}
+        found = _for_kinds(touches, kinds, truth, width_us, loads.noise_floor)
         if found is not None and sum(fit.wrong for fit, _ in found) < sum(single[name].fit.wrong for name in kinds):
             single |= dict(zip(kinds, found, strict=True))
     return {name: one.rule if one.fit.wrong < len(truth[name]) else None for name, one in single.items()}
 
 
-def _clock_of(example: object) -> tuple[float | None, int]:
-    """Return how long a frame lasts (us; None: as the source says) and the wire's version, as `run` finds them."""
-    source = example[0] if isinstance(example, tuple) and example else None
-    if isinstance(source, Recording) and source.registers is not None:
-        return source.registers.frame_us, source.registers.wire_version
-    return None, 1
-
-
-def _curve(
-    quantity: str, noise_floor: float, example: Example, frame_us: float | None, wire_version: int
-) -> _core.LoadCurve:
-    """Return a quantity over an example."""
-    source, tare = example.source, tare_text(example.tare)
-    if isinstance(source, Frames):
-        return _core.LoadCurve.of_frames(quantity, noise_floor, source._parts(), frame_us, tare)
-    period = FRAME_US if frame_us is None else frame_us
-    return _core.LoadCurve.of_events(quantity, noise_floor, source._parts(), period, wire_version, tare)  # type: ignore[union-attr]
-
-
-def _points(curves: dict[str, list[_core.LoadCurve]]) -> Iterator[tuple[str, float, float, int]]:
+def _points(loads: Loads, parts: Sequence[Stretch]) -> Iterator[tuple[str, float, float, int]]:
     """Yield the grid: quantity, threshold, release, frames; those that delay least first."""
-    totals = np.concatenate([curve.values() for curve in curves["total"]])
+    totals = loads.values("total", parts)
     totals = totals[totals > 0.0]
     by_total = np.unique(np.quantile(totals, QUANTILES)).tolist() if len(totals) else []
-    thresholds = {"area": list(AREAS), "total": by_total}
-    for quantity, levels in thresholds.items():
-        for threshold in levels:
+    thresholds = {"area": AREAS, "total": by_total, "local_load": LOCAL_LOADS}
+    for quantity in loads.quantities:
+        for threshold in thresholds[quantity]:
             for frames in FRAMES:
                 for release in RELEASES:
                     yield quantity, threshold, release, frames
 
 
-def _together(found: Sequence[_Found]) -> _Found:
-    """Return what was found in several examples, on one clock."""
-    t = [one[0] + k * _APART_US for k, one in enumerate(found)]
-    known = [one[1] + k * _APART_US for k, one in enumerate(found)]
-    return np.concatenate(t), np.concatenate(known), np.concatenate([one[2] for one in found])
-
-
 def _at_edges(
-    curves: dict[str, list[_core.LoadCurve]], truth: dict[str, NDArray[np.int64]], width_us: int, floor: float
+    loads: Loads, parts: Sequence[Stretch], truth: Mapping[str, NDArray[np.int64]], width_us: int
 ) -> dict[str, tuple[_Best, _Best]]:
     """Return for each label the best rule at onsets and the best at ends."""
     worst = _Fit(2**62, np.inf, np.inf)
     fits = {name: [worst, worst] for name in truth}
     points: dict[str, list[tuple[str, float, float, int]]] = {name: [("area", 1.0, 1.0, 1)] * 2 for name in truth}
-    for quantity, threshold, release, frames in _points(curves):
-        sides = zip(*(curve.edges(threshold, release, frames) for curve in curves[quantity]), strict=True)
-        for edge, found in enumerate(map(_together, sides)):
+    windows = loads.windows(parts)
+    for point in _points(loads, parts):
+        for edge, every in enumerate(loads.edges(*point)):
+            found = every.between(windows)
             for name, true in truth.items():
                 fit = _fit(found, true, width_us, fits[name][edge].wrong)
                 if fit is not None and fit[:2] < fits[name][edge][:2]:
                     fits[name][edge] = fit
-                    points[name][edge] = (quantity, threshold, release, frames)
+                    points[name][edge] = point
 
     def rule(name: str, edge: int) -> _Best:
         labels = [name, None] if edge == 0 else [None, name]
-        return _Best(fits[name][edge], PlainRule(*points[name][edge], labels=labels, noise_floor=floor))
+        return _Best(fits[name][edge], PlainRule(*points[name][edge], labels=labels, noise_floor=loads.noise_floor))
 
     return {name: (rule(name, 0), rule(name, 1)) for name in truth}
 
 
-def _fit(found: _Found, true: NDArray[np.int64], width_us: int, most: int = 2**62) -> _Fit | None:
+def _fit(found: Found, true: NDArray[np.int64], width_us: int, most: int = 2**62) -> _Fit | None:
     """Return how detections fit labels; None where more are wrong than `most`, which their number alone may show."""
     t, known, _ = found
     if abs(len(t) - len(true)) > most:
@@ -223,9 +192,9 @@ def _fit(found: _Found, true: NDArray[np.int64], width_us: int, most: int = 2**6
 
 
 def _for_kinds(
-    curves: Sequence[_core.LoadCurve],
+    touches: Mapping[float, Found],
     kinds: Sequence[str],
-    truth: dict[str, NDArray[np.int64]],
+    truth: Mapping[str, NDArray[np.int64]],
     width_us: int,
     floor: float,
 ) -> list[_Best] | None:
@@ -234,9 +203,7 @@ def _for_kinds(
     order = np.argsort(every, kind="stable")
     is_second = (np.arange(len(every)) >= len(truth[kinds[0]]))[order]
     chosen: tuple[tuple[int, float], list[_Best]] | None = None
-    for age in AGES_MS:
-        found = _together([curve.at_age(age) for curve in curves])
-        t, known, areas = found
+    for age, (t, known, areas) in touches.items():
         parts = ([""] * len(t), t, known, np.full(len(t), np.nan), np.zeros(len(t), bool))
         tallies = _core.score(parts, [""] * len(every), every[order], np.full(len(every), width_us, np.int64))
         pairs = tallies[0][1:3] if tallies else (np.empty(0, np.int64), np.empty(0, np.int64))
@@ -247,7 +214,7 @@ def _for_kinds(
         below, above = reversed(kinds) if flipped else kinds
         fits = {}
         for name, mine in ((below, areas < threshold), (above, areas >= threshold)):
-            fits[name] = _fit((t[mine], known[mine], areas[mine]), truth[name], width_us)
+            fits[name] = _fit(Found(t[mine], known[mine], areas[mine]), truth[name], width_us)
         rule = PlainRule("area", threshold, age_ms=age, labels=(below, above), noise_floor=floor)
         best = [_Best(fit, rule) for name in kinds if (fit := fits[name]) is not None]
         rank = (sum(one.fit.wrong for one in best), max(one.fit.delay_ms for one in best))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect import Alignment, Outcome, PlainRule, Readout, Score
+from taxel.detect import Alignment, Judged, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
 from taxel.detect.examples import array_of
 from taxel.encode import Composite, Encoder
@@ -62,6 +62,7 @@ def write_listening(
     judged: str = "",
     held_out: Sequence[Score] = (),
     alignments: Mapping[str, Alignment] | None = None,
+    scored: Judged | None = None,
 ) -> Path:
     """Write the detections of a readout in recordings as a page with pictures, ``report.html`` in a new folder.
 
@@ -79,6 +80,8 @@ def write_listening(
         How readouts trained without each recording, or without parts of it, did on it.
     alignments : mapping of str to Alignment, optional
         By how much labels were moved to what the sensor felt before they were learnt; examples are those of `listened`.
+    scored : Judged, optional
+        The scores of a training, and those of the plain rules beside it.
 
     Returns
     -------
@@ -121,9 +124,24 @@ def write_listening(
         ],
         worst=[(listened[m.recording].name, m) for label in readout.labels for m in moments[label] if m.badness > 0],
         viewed=[quote(one.name) for one in listened if one.name.endswith(_VIEWED)][:_MOST_VIEWED],
+        beside=_beside(readout.labels, scored),
+        outside=[one for one in listened if isinstance(readout, Readout)],
         scored=any(one.score is not None for one in listened),
     )
     return write_whole(place / "report.html", lambda file: file.write(text.encode()))
+
+
+def _beside(labels: Sequence[str], scored: Judged | None) -> list[tuple[str, str, Score | None]]:
+    """Return label, detector and score of neurons and of the plain rules beside them; None where there is no rule."""
+    if scored is None or scored.plain is None:
+        return []
+    rows: list[tuple[str, str, Score | None]] = []
+    for label in labels:
+        rule, together = scored.plain.rules[label], scored.plain.together
+        rows.append((label, "neuron", scored.together[label]))
+        score = None if rule is None or together is None else together[label]
+        rows.append((label, "none" if rule is None else repr(rule), score))
+    return rows
 
 
 def _of_neuron(

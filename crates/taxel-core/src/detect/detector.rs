@@ -87,7 +87,7 @@ impl Detector {
     }
 
     /// The detections of a whole recording of events with taxels that a person zeroed, continued by a second of
-    /// silence.
+    /// silence, and how many of them have an input outside its range in training ([`ReadoutStream::outside`]).
     ///
     /// # Errors
     ///
@@ -100,7 +100,7 @@ impl Detector {
         tare: Option<&Tare>,
         zeroings: &[Zeroing],
         stop: Stop<'_>,
-    ) -> Result<Vec<Detection>> {
+    ) -> Result<(Vec<Detection>, Option<u64>)> {
         let frames = frames.into();
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
         let mut stream = self.stream(events.array, frames, tare)?;
@@ -108,11 +108,12 @@ impl Detector {
         events.check_order()?;
         let mut found = stream.push_recording(events, stop)?;
         stream.advance(last.saturating_add(self.silence_us(frames)), &mut found)?;
-        Ok(found)
+        Ok((found, stream.outside()))
     }
 
-    /// The detections of a whole recording of pictures, continued for a second with the last picture. Frames last
-    /// `frame_us`, or by default the median distance between pictures.
+    /// The detections of a whole recording of pictures, continued for a second with the last picture, and how many of
+    /// them have an input outside its range in training. Frames last `frame_us`, or by default the median distance
+    /// between pictures.
     ///
     /// # Errors
     ///
@@ -123,7 +124,7 @@ impl Detector {
         frame_us: Option<f64>,
         tare: Option<&Tare>,
         stop: Stop<'_>,
-    ) -> Result<Vec<Detection>> {
+    ) -> Result<(Vec<Detection>, Option<u64>)> {
         let frame_us = match frame_us {
             Some(given) => given,
             None => usual_distance(frames.t)?,
@@ -132,7 +133,7 @@ impl Detector {
         let mut stream = self.stream(frames.array, frame_us, tare)?;
         let mut found = stream.push_frames(frames, stop)?;
         stream.advance(last.saturating_add(self.silence_us(frame_us.into())), &mut found)?;
-        Ok(found)
+        Ok((found, stream.outside()))
     }
 }
 

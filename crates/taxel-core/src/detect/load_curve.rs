@@ -10,6 +10,9 @@ use crate::{EventsView, FramesView, Result, Spike, Stop, problem};
 /// The number of events, or of pictures, between two checks of [`Stop`].
 const PIECE: usize = 16_384;
 
+/// How long after the silence that follows a recording a quantity is computed, us: so far its frames or age may reach.
+const LONGEST_REACH_US: i64 = 10_000_000;
+
 /// The changes of a quantity in a recording.
 pub struct LoadCurve {
     quantity: Quantity,
@@ -46,8 +49,8 @@ impl LoadCurve {
             stop.check()?;
             stream.push_events(piece, &mut changes)?;
         }
-        stream.finish(&mut changes);
-        let last = events.t.iter().copied().max().unwrap_or(0);
+        let last = events.t.iter().copied().chain(events.markers.iter().map(|marker| marker.t)).max().unwrap_or(0);
+        stream.advance(last + SILENCE_US + LONGEST_REACH_US, &mut changes);
         Ok(Self { quantity, changes, pictures: vec![], clock, period_us: frames.period_us, last })
     }
 
@@ -79,16 +82,24 @@ impl LoadCurve {
         Ok(Self { quantity, changes, pictures: frames.t.to_vec(), clock, period_us, last })
     }
 
-    /// The quantity after each of its changes.
-    pub fn values(&self) -> impl Iterator<Item = f64> {
-        self.changes.iter().map(|change| f64::from(change.value))
+    /// The quantity's changes: their times, ms, and what it is after each.
+    #[must_use]
+    pub fn changes(&self) -> &[Spike] {
+        &self.changes
     }
 
     /// The begins and ends of loads, as of a [`PlainRule`](crate::detect::PlainRule) with these numbers.
     #[must_use]
     pub fn edges(&self, threshold: f64, release: f64, frames: u32) -> Vec<Decision> {
         let (end, frames) = (release * threshold, i64::from(frames));
-        self.run(Limits { begin: threshold, end, frames, touch_train: 0, threshold, age_us: None })
+        let limits = Limits { begin: threshold, end, frames, touch_train: 0, threshold, age_us: None };
+        // Begins and ends depend only on which limits the quantity has passed, and it changes far more often than that.
+        let mut last = limits.passed(0.0);
+        let passing = self.changes.iter().filter(|change| {
+            let before = std::mem::replace(&mut last, limits.passed(f64::from(change.value)));
+            before != last
+        });
+        self.run(limits, passing)
     }
 
     /// The area at an age of every touch, as it is compared with a [`PlainRule`](crate::detect::PlainRule)'s threshold.
@@ -100,12 +111,14 @@ impl LoadCurve {
         if self.quantity != Quantity::Area {
             return Err(problem!("ages are those of touches, which begin by area: this is another quantity"));
         }
-        Ok(self.run(Limits::at_age(0, f64::INFINITY, age_ms)))
+        Ok(self.run(Limits::at_age(0, f64::INFINITY, age_ms), self.changes.iter()))
     }
 
-    fn run(&self, limits: Limits) -> Vec<Decision> {
+    fn run<'a>(&self, limits: Limits, changes: impl Iterator<Item = &'a Spike>) -> Vec<Decision> {
         let (mut rule, mut clock, mut out) = (RunningRule::new(limits), self.clock, vec![]);
-        let mut changes = self.changes.iter().peekable();
+        let reach = (limits.frames as f64 * self.period_us).ceil() as i64 + limits.age_us.unwrap_or(0);
+        let end = self.last + SILENCE_US + reach;
+        let mut changes = changes.take_while(|change| us(change.t) < end as f64).peekable();
         for &t in &self.pictures {
             rule.advance(t, &clock, &mut out);
             clock.picture(t);
@@ -116,8 +129,7 @@ impl LoadCurve {
         for &change in changes {
             rule.change(change, false, &clock, &mut out);
         }
-        let reach = (limits.frames as f64 * self.period_us).ceil() as i64 + limits.age_us.unwrap_or(0);
-        rule.advance(self.last + SILENCE_US + reach, &clock, &mut out);
+        rule.advance(end, &clock, &mut out);
         out
     }
 }

@@ -34,7 +34,7 @@ const LATEST_AGE_MS: f64 = 60_000.0;
 pub struct PlainRule {
     /// What is compared with the threshold.
     pub quantity: Quantity,
-    /// The threshold, above 0: taxels, or the sensor's unit.
+    /// The threshold, above 0: taxels, units of noise, or the sensor's unit.
     pub threshold: f64,
     /// The part of the threshold below which the load ends, above 0, at most 1; 1 with an age.
     #[serde(default = "whole")]

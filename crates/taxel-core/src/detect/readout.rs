@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::above_0;
-use crate::detect::stream::{Inputs, NamedNeuron, Neurons};
-use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainedNeuron};
+use crate::detect::stream::{Inputs, NamedNeuron, Neurons, Ranges};
+use crate::detect::{FrameClock, FrameTime, ReadoutStream, Seen, TrainedNeuron};
 use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
@@ -44,6 +44,9 @@ pub struct Readout {
     pub delays_ms: Vec<f64>,
     /// The neurons by label.
     pub neurons: BTreeMap<String, TrainedNeuron>,
+    /// The range of each neuron's inputs in its training data, by label; empty if it is not known.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub seen: BTreeMap<String, Seen>,
 }
 
 fn one() -> f64 {
@@ -100,8 +103,16 @@ impl Readout {
             if let Some(array) = &self.array {
                 self.check_weights(label, one, array)?;
             }
+            match self.seen.get(label) {
+                Some(seen) => seen.check(one.weights.len()).map_err(|error| error.of(label))?,
+                None if self.seen.is_empty() => {}
+                None => return Err(problem!("{label}: seen has no ranges of its inputs, as other neurons have")),
+            }
         }
-        Ok(())
+        match self.seen.keys().find(|&label| !self.neurons.contains_key(label)) {
+            Some(label) => Err(problem!("seen: {label} is not among the neurons")),
+            None => Ok(()),
+        }
     }
 
     fn check_delays(&self) -> Result<()> {
@@ -178,14 +189,9 @@ impl Readout {
                 Encoder::Composite(own) if !one.inputs.is_empty() => Some(own.of_parts(&one.inputs, array)?),
                 _ => None,
             };
-            let latency_ms = self.encoder_of(one)?.latency_ms();
-            Ok(NamedNeuron::new(
-                label,
-                one,
-                self.run_threshold,
-                latency_ms,
-                Inputs::new(received, self.delays_ms.len()),
-            ))
+            let (encoder, inputs) = (self.encoder_of(one)?, Inputs::new(received, self.delays_ms.len()));
+            let named = NamedNeuron::new(label, one, self.run_threshold, encoder.latency_ms(), inputs);
+            Ok(named.with_ranges(Ranges::new(self.seen.get(label).cloned(), encoder.kind())))
         });
         let neurons = Neurons::new(neurons.collect::<Result<_>>()?, self.delays_ms.clone());
         Ok(ReadoutStream::new(encoder.stream(array)?, array.clone(), FrameClock::new(frames)?, neurons))

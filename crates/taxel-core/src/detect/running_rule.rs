@@ -33,6 +33,11 @@ impl Limits {
         let age_us = Some(us(age_ms).round() as i64);
         Self { begin: Self::TOUCHED, end: Self::TOUCHED, frames: 1, touch_train, threshold, age_us }
     }
+
+    /// Which limits a quantity of this value has passed.
+    pub(super) fn passed(&self, load: f64) -> [bool; 2] {
+        [load >= self.begin, load < self.end]
+    }
 }
 
 /// What a rule found.
@@ -173,6 +178,6 @@ impl RunningRule {
 
     /// Whether the quantity has passed the limit at which the state changes.
     fn passes(&self) -> bool {
-        if self.loaded { self.load < self.limits.end } else { self.load >= self.limits.begin }
+        self.limits.passed(self.load)[usize::from(self.loaded)]
     }
 }

@@ -11,6 +11,7 @@ use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
 mod labelled_rule;
 mod named_neuron;
 mod neurons;
+mod ranges;
 mod repairs;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ mod tests;
 use labelled_rule::LabelledRule;
 pub(super) use named_neuron::{Inputs, NamedNeuron};
 pub(super) use neurons::Neurons;
+pub(super) use ranges::Ranges;
 use repairs::Repairs;
 
 /// The number of events between two checks of [`Stop`].
@@ -159,6 +161,16 @@ impl ReadoutStream {
     #[must_use]
     pub fn late(&self) -> u64 {
         self.late
+    }
+
+    /// The number of detections with an input outside the range that it had in training; `None` if that range is not
+    /// known.
+    #[must_use]
+    pub fn outside(&self) -> Option<u64> {
+        match &self.decides {
+            Decides::Neurons(neurons) => neurons.outside(),
+            Decides::Rule(_) => None,
+        }
     }
 
     /// The time up to which all detections are final, us; `None` before any input.

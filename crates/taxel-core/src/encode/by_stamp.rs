@@ -1,4 +1,7 @@
 //! A stream of what is computed from the loaded taxels once per stamp, after its last event, or once per picture.
+//!
+//! Reading: what changes without events, as a rest that is tracked does, is computed between stamps too: 10 ms after the
+//! last one, and from 80 ms on after each further eighth of the time since it.
 
 use super::blocks::{BLOCK, Block, Next, blocks, in_blocks};
 use super::channels::Channels;
@@ -9,10 +12,24 @@ use crate::held::Held;
 use crate::spikes::ms;
 use crate::{Array, EventsView, Result, Spike, SpikeKind, problem};
 
+/// The time after the last stamp at which a measure that drifts is computed again, us.
+const AGAIN_US: i64 = 10_000;
+
+/// The part of the time since the last stamp after which it is computed again, once that is longer.
+const AGAIN_PART: i64 = 8;
+
 /// What is computed at the end of each stamp.
 pub(super) trait Measure: Clone + Send + 'static {
     /// The number of its spike trains.
     fn trains(&self) -> usize;
+
+    /// Whether it changes while the values hold, so that it is computed between stamps too.
+    fn drifts(&self) -> bool {
+        false
+    }
+
+    /// Sets the rest of a place from now on.
+    fn set_rest(&mut self, _place: usize, _rest: f64) {}
 
     /// Ends the stamp, or the picture, at `t` us: emits its spikes, given the loaded taxels and all current values.
     fn emit(&mut self, t: i64, loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>);
@@ -27,6 +44,12 @@ pub(super) struct ByStamp<M> {
     changed: Vec<bool>,
     channels: Channels,
     source: Source,
+    /// Whether a value or a rest changed that was not computed with.
+    fresh: bool,
+    /// The last stamp that was computed, us.
+    stamp: i64,
+    /// The time after it at which a measure that drifts is computed next, us; `None` before the first stamp.
+    again: Option<i64>,
 }
 
 impl<M: Measure> ByStamp<M> {
@@ -39,11 +62,29 @@ impl<M: Measure> ByStamp<M> {
             // Channels are all places here; `loaded` defines which taxels exist.
             channels: Channels::new(&Array { exists: None, ..array.clone() }),
             source: Source::Unknown,
+            fresh: false,
+            stamp: 0,
+            again: None,
         }
     }
 
     fn emit(&mut self, t: i64, out: &mut Vec<Spike>) {
         self.measure.emit(t, &self.loaded, in_blocks(self.held.values()), out);
+    }
+
+    /// Computes what is due before `t` us, given the latest stamp.
+    fn pass(&mut self, stamp: i64, t: i64, out: &mut Vec<Spike>) {
+        if t <= stamp {
+            return;
+        }
+        if std::mem::take(&mut self.fresh) {
+            self.emit(stamp, out);
+            (self.stamp, self.again) = (stamp, self.measure.drifts().then_some(stamp + AGAIN_US));
+        }
+        while let Some(at) = self.again.filter(|&at| at < t) {
+            self.emit(at, out);
+            self.again = Some(at + AGAIN_US.max((at - self.stamp) / AGAIN_PART));
+        }
     }
 }
 
@@ -76,9 +117,10 @@ impl<M: Measure> Stream for ByStamp<M> {
         let Some(mut present) = self.source.events(events.t)? else { return Ok(()) };
         for k in 0..events.len() {
             if events.t[k] > present {
-                self.emit(present, out);
+                self.pass(present, events.t[k], out);
                 present = events.t[k];
             }
+            self.fresh = true;
             if intensity.present[k] {
                 let place = events.array.index(events.x[k], events.y[k]);
                 let value = f32::from(intensity.ticks[k]);
@@ -92,6 +134,8 @@ impl<M: Measure> Stream for ByStamp<M> {
     fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {
         self.advance(t, out);
         self.loaded.set_rest(place, rest);
+        self.measure.set_rest(place, rest);
+        self.fresh = true;
         match self.source {
             // Marks the block as changed, so that it is computed with the new rest in the next frame.
             Source::Frames { .. } => self.changed[place / BLOCK] = true,
@@ -121,10 +165,8 @@ impl<M: Measure> Stream for ByStamp<M> {
             Source::Frames { open } => *open = t.max(*open),
             Source::Events { present, .. } => {
                 let stamp = *present;
-                if t > stamp {
-                    *present = t;
-                    self.emit(stamp, out);
-                }
+                *present = t.max(stamp);
+                self.pass(stamp, t, out);
             }
         }
     }

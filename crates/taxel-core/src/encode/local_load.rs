@@ -135,7 +135,7 @@ impl LocalLoad {
         Ok(quantities(&spikes_of_frames(&mut stream, frames, stop)?.0))
     }
 
-    /// The largest local sum alone, of an array's pictures.
+    /// The largest local sum alone, of an array's pictures: the quantity of plain rules.
     ///
     /// # Errors
     ///
@@ -205,6 +205,13 @@ impl LargestSum {
         let mut largest = 0.0;
         self.0.take(t, Values::Picture(picture), |sums| largest = sums.largest[0]);
         largest
+    }
+
+    /// Sets the rest of the taxel at `place`, row by row, from now on.
+    pub fn set_rest(&mut self, place: usize, rest: f64) {
+        if let Some(channel) = self.0.channel(place) {
+            self.0.set_rest(channel, rest);
+        }
     }
 }
 

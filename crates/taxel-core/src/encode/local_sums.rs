@@ -82,6 +82,12 @@ impl Grid {
         run.cell + channel - run.channel
     }
 
+    /// The number of the existing taxel with this index in the array.
+    fn channel(&self, place: usize) -> Option<usize> {
+        let run = self.runs.iter().find(|run| (run.place..run.place + run.len).contains(&place))?;
+        Some(run.channel + place - run.place)
+    }
+
     /// Copies values into the cells of the existing taxels.
     fn spread(&self, values: Values<'_>, cells: &mut [f32]) {
         for run in &self.runs {
@@ -350,6 +356,11 @@ impl LocalSums {
         for side in &mut self.sides {
             each(side.take(t, &self.values, &self.grid, &self.noise));
         }
+    }
+
+    /// The number of the existing taxel with this index in the array.
+    pub(super) fn channel(&self, place: usize) -> Option<usize> {
+        self.grid.channel(place)
     }
 
     /// Sets the rest of the existing taxel with this number.

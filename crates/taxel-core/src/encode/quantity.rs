@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::blocks::Block;
 use super::by_stamp::{ByStamp, Measure};
 use super::loaded::Loaded;
+use super::local_load::{LargestSum, LocalLoad};
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::spikes::ms;
@@ -18,6 +19,9 @@ pub enum Quantity {
     Area,
     /// The sum of their values above rest, in the sensor's unit, as of [`Moments`](super::Moments).
     Total,
+    /// The largest sum over 3 x 3 taxels above a tracked rest, in units of its noise, as of
+    /// [`LocalLoad`](super::LocalLoad).
+    LocalLoad,
 }
 
 impl Quantity {
@@ -26,18 +30,13 @@ impl Quantity {
     ///
     /// # Errors
     ///
-    /// `Problem` without a tare, or with one of another array.
+    /// `Problem` without a tare, or with one of another array; for the local load, with one without the taxels' noise.
     pub fn stream(several: &[Self], array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Box<dyn Stream>> {
-        let loads = Loads { quantities: several.to_vec(), values: vec![0.0; several.len()] };
-        Ok(Box::new(ByStamp::new(loads, Loaded::new("plain rule", array, tare, noise_floor)?, array)))
-    }
-
-    /// The value in single precision, which holds every number of taxels exactly.
-    fn of(self, loaded: &Loaded, held: &[Block]) -> f32 {
-        match self {
-            Self::Area => loaded.area() as f32,
-            Self::Total => loaded.sums(held).total as f32,
-        }
+        let loaded = Loaded::new("plain rule", array, tare, noise_floor)?;
+        let local = LocalLoad { noise_floor, tare: tare.cloned(), ..LocalLoad::default() };
+        let local = several.contains(&Self::LocalLoad).then(|| local.largest(array)).transpose()?;
+        let loads = Loads { quantities: several.to_vec(), values: vec![0.0; several.len()], local };
+        Ok(Box::new(ByStamp::new(loads, loaded, array)))
     }
 }
 
@@ -46,6 +45,8 @@ impl Quantity {
 struct Loads {
     quantities: Vec<Quantity>,
     values: Vec<f32>,
+    /// Computes the local load, if it is among the quantities.
+    local: Option<LargestSum>,
 }
 
 impl Measure for Loads {
@@ -53,9 +54,25 @@ impl Measure for Loads {
         self.quantities.len()
     }
 
+    fn drifts(&self) -> bool {
+        self.local.is_some()
+    }
+
+    fn set_rest(&mut self, place: usize, rest: f64) {
+        if let Some(local) = &mut self.local {
+            local.set_rest(place, rest);
+        }
+    }
+
     fn emit(&mut self, t: i64, loaded: &Loaded, held: &[Block], out: &mut Vec<Spike>) {
+        let local = self.local.as_mut().map_or(0.0, |sums| sums.take(t, held.as_flattened()));
         for (train, (quantity, last)) in (0..).zip(self.quantities.iter().zip(&mut self.values)) {
-            let value = quantity.of(loaded, held);
+            // In single precision, which holds every number of taxels exactly.
+            let value = match quantity {
+                Quantity::Area => loaded.area() as f32,
+                Quantity::Total => loaded.sums(held).total as f32,
+                Quantity::LocalLoad => local as f32,
+            };
             if value != *last {
                 *last = value;
                 out.push(Spike { t: ms(t), train, value });

@@ -74,6 +74,11 @@ impl Ahead {
         self.wrong
     }
 
+    /// As [`ReadoutStream::outside`], of the detections that are certain.
+    pub(super) fn outside(&self) -> Option<u64> {
+        self.certain.outside()
+    }
+
     /// Compares certain detections with those that were output ahead of them.
     fn settle(&mut self, out: &mut Vec<Detection>) {
         for detection in self.found.drain(..) {
@@ -95,6 +100,8 @@ fn same(a: &Detection, b: &Detection) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use taxel_core::detect::{Readout, TrainedNeuron};
     use taxel_core::encode::Encoder;
     use taxel_core::neuron::{Neuron, Time};
@@ -114,6 +121,7 @@ mod tests {
             run_threshold: 1.0,
             delays_ms: vec![0.0],
             neurons: [("touch".to_owned(), one)].into(),
+            seen: BTreeMap::new(),
         };
         Ahead::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))
     }

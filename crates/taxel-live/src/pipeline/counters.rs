@@ -52,6 +52,8 @@ pub struct Counters {
     /// Detections among these that were output during a silence which an event then interrupted, because it arrived
     /// later than the guard time; the detections of the recording were output after them.
     pub wrong: u64,
+    /// Detections with an input outside the range that it had in training; `None` if that range is not known.
+    pub outside: Option<u64>,
     /// Detections that [`Live::next`](super::Live::next) did not read in time; the sinks received them.
     pub detections_dropped: u64,
     /// Counts of each destination: `sent + lost + waiting = detections`.
@@ -122,6 +124,7 @@ impl Counters {
             late: self.late - earlier.late,
             detections: self.detections - earlier.detections,
             wrong: self.wrong - earlier.wrong,
+            outside: self.outside.map(|now| now - earlier.outside.unwrap_or(0)),
             detections_dropped: self.detections_dropped - earlier.detections_dropped,
             markers: self.markers - earlier.markers,
             seconds: self.seconds - earlier.seconds,

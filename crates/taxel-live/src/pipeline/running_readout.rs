@@ -144,6 +144,7 @@ impl RunningReadout {
             counters.read_out += self.events.len() as u64;
             if let Mode::Reading(readout) = &self.mode {
                 (counters.late, counters.wrong) = (readout.late(), readout.wrong());
+                counters.outside = readout.outside();
             }
         }
         Ok(())

@@ -26,6 +26,7 @@ fn readout() -> Readout {
         run_threshold: 0.9,
         delays_ms: vec![0.0],
         neurons: [("contact".to_owned(), one(0.2, 3.0)), ("lift".to_owned(), one(0.5, -0.1))].into(),
+        seen: BTreeMap::new(),
     }
 }
 
@@ -180,6 +181,7 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
             Detector::from(readout.clone())
                 .run_events(events.view(), 192.0, Some(&tare), zeroings, Stop::never())
                 .unwrap()
+                .0
         };
         let said = run(&events, &zeroings);
         assert_eq!(said, run(&low, &[]), "seed {seed}, {name}");

@@ -1,5 +1,6 @@
 //! A neuron of a readout in a stream: its label, its state, and its crossings so far.
 
+use super::ranges::Ranges;
 use crate::detect::TrainedNeuron;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
 use crate::{Result, Spike};
@@ -46,9 +47,23 @@ pub(in crate::detect) struct NamedNeuron {
     pub offset_ms: f64,
     /// Started at the first spike, so that a grid has the same points wherever the input begins.
     pub stream: Option<NeuronStream>,
-    pub crossings: Vec<OutputSpike>,
+    crossings: Vec<OutputSpike>,
+    pub ranges: Ranges,
     /// The time of the latest input that may rest on a repaired taxel, ms.
-    pub repaired: Option<f64>,
+    repaired: Option<f64>,
+    /// The time of the latest input outside its range in training, ms.
+    outside: Option<f64>,
+}
+
+/// A crossing of a neuron, and what it rests on.
+pub(super) struct Crossing {
+    pub spike: OutputSpike,
+    /// The neuron's number.
+    pub neuron: usize,
+    /// Whether it may rest on repaired taxels.
+    pub repaired: bool,
+    /// Whether it may rest on an input outside its range in training.
+    pub outside: bool,
 }
 
 impl NamedNeuron {
@@ -63,17 +78,26 @@ impl NamedNeuron {
             threshold,
             stream: None,
             crossings: vec![],
+            ranges: Ranges::default(),
             repaired: None,
+            outside: None,
         }
     }
 
-    /// Passes a spike of an encoder's train to the neuron; returns whether it is one of its inputs.
+    /// The neuron with the ranges that its inputs had in training.
+    pub fn with_ranges(self, ranges: Ranges) -> Self {
+        Self { ranges, ..self }
+    }
+
+    /// Passes a spike of an encoder's train to the neuron, the number of which is `k`, if it is one of its inputs; adds
+    /// to `out` the crossings so far, if later ones rest on something else.
     ///
     /// # Errors
     ///
     /// Those of [`NeuronStream::push`].
-    pub fn push(&mut self, spike: Spike) -> Result<bool> {
-        let Some(input) = self.inputs.of(spike.train) else { return Ok(false) };
+    pub fn push(&mut self, spike: Spike, repaired: bool, k: usize, out: &mut Vec<Crossing>) -> Result<()> {
+        let Some(input) = self.inputs.of(spike.train) else { return Ok(()) };
+        let spike = Spike { train: input, ..spike };
         let stream = match &mut self.stream {
             Some(stream) => stream,
             None => {
@@ -84,14 +108,33 @@ impl NamedNeuron {
                 self.stream.insert(self.neuron.stream(&self.weights, self.threshold, start.min(spike.t))?)
             }
         };
-        stream.push(Spike { train: input, ..spike }, &mut self.crossings)?;
-        Ok(true)
+        stream.push(spike, &mut self.crossings)?;
+        let outside = self.ranges.is_outside(spike, self.neuron.memory_ms());
+        if repaired || outside {
+            // Crossings up to here cannot rest on this spike.
+            self.drain_crossings(k, out);
+            self.repaired = if repaired { Some(spike.t) } else { self.repaired };
+            self.outside = if outside { Some(spike.t) } else { self.outside };
+        }
+        Ok(())
     }
 
-    /// Moves the crossings so far to `out`, each with the neuron's number and whether it may rest on repaired taxels.
-    pub fn drain_crossings(&mut self, k: usize, out: &mut Vec<(OutputSpike, usize, bool)>) {
-        let repaired = self.repaired;
-        let rests = |t: f64| repaired.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
-        out.extend(self.crossings.drain(..).map(|crossing| (crossing, k, rests(crossing.t))));
+    /// Advances to `until_ms`, before which every spike is known; adds the crossings to `out`.
+    pub fn advance(&mut self, until_ms: f64, k: usize, out: &mut Vec<Crossing>) {
+        if let Some(stream) = &mut self.stream {
+            stream.advance(until_ms, &mut self.crossings);
+        }
+        self.drain_crossings(k, out);
+    }
+
+    /// Moves the crossings so far to `out`.
+    fn drain_crossings(&mut self, k: usize, out: &mut Vec<Crossing>) {
+        let rests = |on: Option<f64>, t: f64| on.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
+        out.extend(self.crossings.drain(..).map(|spike| Crossing {
+            repaired: rests(self.repaired, spike.t),
+            outside: rests(self.outside, spike.t),
+            spike,
+            neuron: k,
+        }));
     }
 }

@@ -1,8 +1,8 @@
 //! The neurons of a readout in a stream, and the spikes that wait for them.
 
-use super::named_neuron::NamedNeuron;
+use super::named_neuron::{Crossing, NamedNeuron};
 use crate::detect::{Detection, FrameClock};
-use crate::neuron::{NeuronStream, OutputSpike};
+use crate::neuron::NeuronStream;
 use crate::spikes::us;
 use crate::{Result, Spike, SpikeKind};
 
@@ -14,16 +14,23 @@ pub(in crate::detect) struct Neurons {
     delays_ms: Vec<f64>,
     /// Spikes assigned to inputs that wait for possibly earlier spikes, and whether each may rest on a repaired event.
     waiting: Vec<(Spike, bool)>,
+    /// The number of detections with an input outside its range in training.
+    outside: u64,
 }
 
 impl Neurons {
     pub fn new(neurons: Vec<NamedNeuron>, delays_ms: Vec<f64>) -> Self {
-        Self { neurons, delays_ms, waiting: vec![] }
+        Self { neurons, delays_ms, waiting: vec![], outside: 0 }
     }
 
     /// The label and present potential of each neuron, mV.
     pub fn potentials(&self) -> impl Iterator<Item = (&str, f64)> {
         self.neurons.iter().map(|one| (one.label.as_str(), one.stream.as_ref().map_or(0.0, NeuronStream::potential)))
+    }
+
+    /// The number of detections with an input outside its range in training; `None` if a range is not known.
+    pub fn outside(&self) -> Option<u64> {
+        self.neurons.iter().all(|one| one.ranges.are_known()).then_some(self.outside)
     }
 
     /// Assigns the encoder's spikes to the neurons' inputs, each with whether it may rest on a repaired event.
@@ -48,27 +55,21 @@ impl Neurons {
     pub fn settle(&mut self, until_ms: f64, clock: &FrameClock, out: &mut Vec<Detection>) -> Result<()> {
         self.waiting.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         let certain = self.waiting.partition_point(|(spike, _)| spike.t < until_ms);
-        let mut crossings: Vec<(OutputSpike, usize, bool)> = Vec::new();
+        let mut crossings: Vec<Crossing> = Vec::new();
         for (k, one) in self.neurons.iter_mut().enumerate() {
             for (spike, repaired) in &self.waiting[..certain] {
-                if one.push(*spike)? && *repaired {
-                    // Crossings up to here cannot rest on the repaired taxel.
-                    one.drain_crossings(k, &mut crossings);
-                    one.repaired = Some(spike.t);
-                }
+                one.push(*spike, *repaired, k, &mut crossings)?;
             }
-            if let Some(stream) = &mut one.stream {
-                stream.advance(until_ms, &mut one.crossings);
-            }
-            one.drain_crossings(k, &mut crossings);
+            one.advance(until_ms, k, &mut crossings);
         }
         self.waiting.drain(..certain);
-        crossings.sort_by(|a, b| a.0.t.total_cmp(&b.0.t));
-        out.extend(crossings.into_iter().map(|(OutputSpike { t, slope, .. }, k, repaired)| Detection {
-            label: self.neurons[k].label.clone(),
-            t: us(t - self.neurons[k].offset_ms).round() as i64,
-            known: clock.end_of(t),
-            slope,
+        crossings.sort_by(|a, b| a.spike.t.total_cmp(&b.spike.t));
+        self.outside += crossings.iter().filter(|crossing| crossing.outside).count() as u64;
+        out.extend(crossings.into_iter().map(|Crossing { spike, neuron, repaired, .. }| Detection {
+            label: self.neurons[neuron].label.clone(),
+            t: us(spike.t - self.neurons[neuron].offset_ms).round() as i64,
+            known: clock.end_of(spike.t),
+            slope: spike.slope,
             repaired,
         }));
         Ok(())

@@ -1,0 +1,157 @@
+"""The loads of examples on one clock, each computed once, on which plain rules are tried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel.detect.detector import tare_text
+from taxel.detect.examples import Example
+from taxel.detect.scoring import APART_US
+from taxel.frames import Frames
+from taxel.recording import Recording
+from taxel.spikes import SpikeTrains
+from taxel.wire import FRAME_US
+
+__all__ = ["Clock", "Found", "Loads", "Stretch", "clock_of"]
+
+#: How long a frame lasts (us; None: as the source says), and the wire's version.
+Clock: TypeAlias = tuple[float | None, int]
+#: An example, by its place, and from when to when, us; as `taxel.detect.Part`.
+Stretch: TypeAlias = tuple[int, float, float]
+
+
+class Found(NamedTuple):
+    """What a rule found: times and when they were known (us, on one clock, ascending), and the quantity then."""
+
+    t: NDArray[np.int64]
+    known: NDArray[np.int64]
+    value: NDArray[np.float64]
+
+    def between(self, windows: Iterable[tuple[int, int]]) -> Self:
+        """Return what was found in windows, which ascend."""
+        places = [np.arange(*np.searchsorted(self.t, window)) for window in windows]
+        inside = np.concatenate(places) if places else np.empty(0, np.int64)
+        return type(self)(self.t[inside], self.known[inside], self.value[inside])
+
+
+def clock_of(example: object, frame_us: float | None = None) -> Clock:
+    """Return the clock of an example as `taxel.detect.run` finds it; frames last as given, if they are."""
+    source = example[0] if isinstance(example, tuple) and example else None
+    if isinstance(source, Recording) and source.registers is not None:
+        return source.registers.frame_us if frame_us is None else frame_us, source.registers.wire_version
+    return frame_us, 1
+
+
+class Loads:
+    """Hold the quantities of (checked) examples, and what rules found by them.
+
+    The examples lie one after the other on one clock, so far apart that nothing of one pairs with another.
+    """
+
+    def __init__(
+        self,
+        examples: Sequence[Example],
+        clocks: Sequence[Clock],
+        noise_floor: float,
+        report: Callable[[str], object],
+    ) -> None:
+        self.noise_floor = noise_floor
+        self.names = sorted({name for one in examples for name in one.labels})
+        self._labels = [{name: np.sort(times) for name, times in one.labels.items()} for one in examples]
+        self.every: list[Stretch] = [(k, -np.inf, np.inf) for k in range(len(examples))]
+        self._shift = [k * APART_US - _first(one) for k, one in enumerate(examples)]
+        self._curves: dict[str, list[_core.LoadCurve]] = {}
+        self._changes: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]] = {}
+        self._edges: dict[tuple[str, float, float, int], tuple[Found, Found]] = {}
+        self._ages: dict[float, Found] = {}
+        for quantity in ("area", "total", "local_load")[: 2 if lacks_noise(examples) else 3]:
+            report(f"plain rules by {quantity.replace('_', ' ')}")
+            self._curves[quantity] = [
+                _curve(quantity, noise_floor, one, *clock) for one, clock in zip(examples, clocks, strict=True)
+            ]
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The names of the quantities; without the local load where a tare has no noise of the taxels."""
+        return tuple(self._curves)
+
+    def edges(self, quantity: str, threshold: float, release: float, frames: int) -> tuple[Found, Found]:
+        """Return the begins and the ends of loads."""
+        point = quantity, threshold, release, frames
+        if point not in self._edges:
+            sides = zip(*(one.edges(threshold, release, frames) for one in self._curves[quantity]), strict=True)
+            begins, ends = map(self._together, sides)
+            self._edges[point] = begins, ends
+        return self._edges[point]
+
+    def at_age(self, age_ms: float) -> Found:
+        """Return the area at an age of every touch."""
+        if age_ms not in self._ages:
+            self._ages[age_ms] = self._together([one.at_age(age_ms) for one in self._curves["area"]])
+        return self._ages[age_ms]
+
+    def values(self, quantity: str, parts: Iterable[Stretch]) -> NDArray[np.float64]:
+        """Return what a quantity is after each of its changes in parts of the examples."""
+        if quantity not in self._changes:
+            self._changes[quantity] = [curve.changes() for curve in self._curves[quantity]]
+        inside = [np.empty(0)]
+        for k, start, stop in parts:
+            t, values = self._changes[quantity][k]
+            inside.append(values[(t >= start) & (t < stop)])
+        return np.concatenate(inside)
+
+    def truth(self, name: str, parts: Sequence[Stretch]) -> NDArray[np.int64]:
+        """Return the labels of a name in parts of the examples, us on the one clock."""
+        every = [self._labels[k].get(name, np.empty(0, np.int64)) + shift for k, shift in enumerate(self._shift)]
+        times = np.concatenate(every)
+        return Found(times, times, np.zeros(len(times))).between(self.windows(parts)).t
+
+    def windows(self, parts: Iterable[Stretch]) -> list[tuple[int, int]]:
+        """Return from when to when parts of the examples last on the one clock, us, ascending."""
+        half = APART_US // 2
+
+        def edge(k: int, t: float) -> int:
+            return k * APART_US + int(np.ceil(np.clip(t + self._shift[k] - k * APART_US, -half, half)))
+
+        return sorted((edge(k, start), edge(k, stop)) for k, start, stop in parts)
+
+    def off(self, found: Found, k: int) -> Found:
+        """Return what was found by the clock of example k."""
+        return found._replace(t=found.t - self._shift[k], known=found.known - self._shift[k])
+
+    def _together(self, found: Iterable[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]]) -> Found:
+        t, known, values = zip(*found, strict=True)
+
+        def shifted(times: Iterable[NDArray[np.int64]]) -> NDArray[np.int64]:
+            return np.concatenate([one + by for one, by in zip(times, self._shift, strict=True)])
+
+        return Found(shifted(t), shifted(known), np.concatenate(values))
+
+
+def lacks_noise(examples: Sequence[Example]) -> bool:
+    """Whether the tare of an example has no noise of the taxels, as the local load needs it."""
+    return any(one.tare is None or bool(np.isnan(one.tare.noise).all()) for one in examples)
+
+
+def _first(example: Example) -> int:
+    """Return the time of an example's first event or picture, us."""
+    source = example.source
+    assert not isinstance(source, SpikeTrains)
+    t = source.t  # type: ignore[union-attr]
+    return int(t[0]) if len(t) else 0
+
+
+def _curve(
+    quantity: str, noise_floor: float, example: Example, frame_us: float | None, wire_version: int
+) -> _core.LoadCurve:
+    """Return a quantity over an example."""
+    source, tare = example.source, tare_text(example.tare)
+    if isinstance(source, Frames):
+        return _core.LoadCurve.of_frames(quantity, noise_floor, source._parts(), frame_us, tare)
+    period = FRAME_US if frame_us is None else frame_us
+    return _core.LoadCurve.of_events(quantity, noise_floor, source._parts(), period, wire_version, tare)  # type: ignore[union-attr]

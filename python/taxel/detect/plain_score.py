@@ -1,0 +1,172 @@
+"""The plain rules beside a readout: tuned on the same training data, scored on the same labels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import instance
+from taxel.detect.examples import Example
+from taxel.detect.loads import Clock, Loads, Stretch
+from taxel.detect.plain_rule import PlainRule
+from taxel.detect.scoring import Score, score_together
+from taxel.detect.tuning import best_rules
+from taxel.detections import Detections
+from taxel.encode import Encoder
+from taxel.spikes import SpikeTrains
+
+__all__ = ["PlainScore", "floor_of", "plain_score"]
+
+#: The noise floor of rules where the encoder has none: that of the board's fast presets.
+_FLOOR = 3.0
+
+
+@dataclass(frozen=True)
+class PlainScore:
+    """Scores of plain rules on the labels that readouts were scored on.
+
+    Attributes
+    ----------
+    rules : mapping of str to PlainRule or None
+        The rule of each label, tuned on all examples; None where none is better than to detect nothing.
+    together : Score or None
+        Of the rules that were tuned on the training part of each fold; where a fold has no rule for a label, all its
+        labels are missed. None where no quantity can be computed.
+    lacks : str
+        What kept quantities from being tried, and why; empty where all were.
+    """
+
+    rules: Mapping[str, PlainRule | None]
+    together: Score | None
+    lacks: str = ""
+
+    def better(self, than: Score) -> tuple[str, ...]:
+        """Return the labels of which the rule has fewer missed and false than another score.
+
+        Parameters
+        ----------
+        than : Score
+            Of a readout, on the same labels.
+
+        Returns
+        -------
+        tuple of str
+
+        Raises
+        ------
+        ProblemError : no Score
+
+        Examples
+        --------
+        >>> from taxel.detect import score
+        >>> true = {"contact": [1000]}
+        >>> plain = PlainScore({"contact": PlainRule("area", 2)}, score(Detections(["contact"], [1100], [1200]), true))
+        >>> plain.better(score(Detections([], [], []), true))
+        ('contact',)
+        """
+        neuron = instance("than", than, Score)
+        mine = {} if self.together is None else self.together.by_label
+        return tuple(
+            label
+            for label, one in neuron.by_label.items()
+            if self.rules.get(label) is not None and mine[label].rank[0] < one.rank[0]
+        )
+
+    def to_dict(self, than: Score) -> dict[str, Any]:
+        """Return the rules, their score, and the labels of which they are better, as plain values.
+
+        Parameters
+        ----------
+        than : Score
+            As of `better`.
+
+        Returns
+        -------
+        dict
+
+        Raises
+        ------
+        ProblemError : no Score
+        """
+        return {
+            "rules": {label: None if rule is None else dict(rule._parts) for label, rule in self.rules.items()},
+            "score": None if self.together is None else self.together.to_dict(),
+            "better": list(self.better(than)),
+            "lacks": self.lacks,
+        }
+
+
+def floor_of(encoder: Encoder) -> float:
+    """Return the noise floor with which rules are tried beside an encoder."""
+    floors = [float(part.noise_floor) for part in encoder._each() if hasattr(part, "noise_floor")]
+    return floors[0] if floors else _FLOOR
+
+
+def plain_score(
+    examples: Sequence[Example],
+    labels: Sequence[str],
+    clocks: Sequence[Clock],
+    noise_floor: float,
+    ways: Sequence[tuple[Sequence[Stretch], Sequence[Stretch]]],
+    truths: Sequence[Mapping[str, NDArray[np.int64]]],
+    window_ms: float,
+    report: Callable[[str], object],
+) -> PlainScore:
+    """Tune rules on the training parts of each of `ways`, and score them on its tested parts.
+
+    Parameters
+    ----------
+    examples : sequence of Example, checked
+    labels : sequence of str
+    clocks : sequence of (float or None, int)
+        Of each example.
+    noise_floor : float
+    ways : sequence of (parts, parts)
+        What is trained on, and what is tested; none: all examples are both.
+    truths : sequence of mapping of str to int64, us
+        The labels of each example that is tested, in order.
+    window_ms : float
+    report : function of str
+    """
+    lacking = [k for k, one in enumerate(examples) if one.tare is None or isinstance(one.source, SpikeTrains)]
+    if lacking:
+        why = f"example {lacking[0]} has no tare" if len(examples) > 1 else "there is no tare"
+        return PlainScore(dict.fromkeys(labels), None, f"{why} to measure a load from")
+    loads = Loads(examples, clocks, noise_floor, report)
+    lacks = "" if "local_load" in loads.quantities else "no rule by local load: the tare has no noise of the taxels"
+    report("tuning plain rules")
+    rules = best_rules(loads, labels, loads.every, window_ms)
+    detections: dict[int, list[Detections]] = {}
+    for n, (train, test) in enumerate(ways or [(loads.every, loads.every)]):
+        if ways:
+            report(f"tuning plain rules, fold {n + 1} of {len(ways)}")
+        mine = best_rules(loads, labels, train, window_ms) if ways else rules
+        for part in test:
+            detections.setdefault(part[0], []).append(_detected(loads, mine, part))
+    joined = [reduce(add, detections[place]) for place in sorted(detections)]
+    return PlainScore(rules, score_together(joined, truths, window_ms), lacks)
+
+
+def _detected(loads: Loads, rules: Mapping[str, PlainRule | None], part: Stretch) -> Detections:
+    """Return what the rule of each label detects of it in a part of an example."""
+    detections = Detections([], [], [])
+    for label, rule in rules.items():
+        if rule is None:
+            continue
+        which = rule._parts["labels"].index(label)
+        if rule.age_ms is None:
+            every = loads.edges(rule.quantity, rule.threshold, rule.release, rule.frames)[which]
+        else:
+            every = loads.at_age(rule.age_ms)
+        found = loads.off(every.between(loads.windows([part])), part[0])
+        if rule.age_ms is not None:
+            mine = (found.value >= rule.threshold) == bool(which)
+            found = found._replace(t=found.t[mine], known=found.known[mine])
+        detections += Detections([label] * len(found.t), found.t, found.known)
+    return detections

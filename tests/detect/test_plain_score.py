@@ -1,0 +1,100 @@
+"""The plain rules beside a readout: as tuned and run one by one; the labels of which they are better."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shell import call
+from test_plain_rule import played
+
+import taxel
+from taxel.detect import Example, Fold, Part, Recipe, judge, run, score, tune
+from taxel.encode import ContactArea
+
+RECIPE = Recipe(
+    ContactArea(),
+    {"tau": 0.5, "refractory": 15.0, "after_spike": "reset", "lb": 0.0, "ub": 3.0, "delay_ms": 0.1, "step_ms": 0.1},
+    align=True,
+)
+
+
+@pytest.fixture(scope="module")
+def examples() -> list[Example]:
+    """Labels 100 us after the first event that they cause."""
+    drawn = [played(seed, touches=6) for seed in range(3)]
+    return [one._replace(labels={name: t + 400 for name, t in one.labels.items()}) for one in drawn]
+
+
+def test_rules_are_tuned_on_the_training_part_of_each_fold_and_scored_on_its_tested_part(examples) -> None:
+    judged = judge(examples, RECIPE, 3)
+    missed = false = 0
+    for k, held_out in enumerate(examples):
+        rules = tune([one for n, one in enumerate(examples) if n != k], noise_floor=3.0)
+        for name, rule in rules.items():
+            counts = score(run(rule, held_out.source, tare=held_out.tare), {name: held_out.labels[name]})
+            missed, false = missed + counts.missed, false + counts.false
+    assert (judged.plain.together.missed, judged.plain.together.false) == (missed, false)
+    assert judged.plain.together.events == judged.together.events == 36
+    assert judged.plain.rules == tune(examples, noise_floor=3.0)
+    assert judged.plain.lacks == ""
+
+
+def test_a_rule_is_scored_in_the_stretch_that_its_fold_tests(examples) -> None:
+    one, middle = examples[0], float(examples[0].labels["hit"][3] - 5_000)
+    halves = [Part(0, stop=middle), Part(0, start=middle)]
+    judged = judge([one], RECIPE, [Fold([halves[0]], [halves[1]]), Fold([halves[1]], [halves[0]])])
+    assert judged.plain.together["hit"].events == 6
+    assert judged.plain.together["hit"].missed == 0
+    # What is tested in one fold only is counted there only.
+    last = judge([one], RECIPE, [Fold([halves[0]], [halves[1]])])
+    assert last.plain.together["hit"].events == 3
+
+
+def test_the_labels_of_which_the_rule_is_better_are_named(examples) -> None:
+    judged = judge(examples, RECIPE, 3)
+    nothing = score(taxel.Detections([], [], []), {"hit": [1000], "gone": judged.plain.together["gone"].errors_ms * 0})
+    assert set(judged.plain.better(nothing)) <= {"hit", "gone"}
+    assert judged.plain.better(judged.plain.together) == ()
+    assert judged.plain.to_dict(judged.together)["rules"]["hit"]["quantity"] == "area"
+
+
+def test_without_a_tare_there_is_no_rule_and_without_its_noise_none_by_local_load(examples) -> None:
+    trains = [one._replace(source=ContactArea(tare=one.tare).encode(one.source)) for one in examples]
+    judged = judge([one._replace(tare=None) for one in trains], RECIPE, 3)
+    assert judged.plain.together is None
+    assert judged.plain.rules == {"gone": None, "hit": None}
+    assert judged.plain.lacks == "example 0 has no tare to measure a load from"
+    assert judged.plain.better(judged.together) == ()
+    older = json.loads(examples[0].tare.to_json())
+    del older["noise"]
+    judged = judge([one._replace(tare=taxel.Tare.from_json(json.dumps(older))) for one in examples], RECIPE, 3)
+    assert judged.plain.lacks == "no rule by local load: the tare has no noise of the taxels"
+    assert judged.plain.rules["hit"] is not None
+
+
+def test_training_says_which_is_better_and_why_there_is_no_rule(examples, tmp_path: Path, capsys) -> None:
+    one = examples[0]
+    taxel.convert(one.source, tmp_path / "one.npz")
+    one.tare.save(tmp_path / "tare.json")
+    rows = [f"{label},{t}" for label, times in one.labels.items() for t in times]
+    # A label that nothing follows.
+    rows += [f"odd,{t}" for t in np.arange(6) * 61_000 + 45_000]
+    (tmp_path / "labels.csv").write_text("\n".join(["label,t_us", *rows]) + "\n")
+    arguments = ("train", tmp_path / "one.npz", "--labels", tmp_path / "labels.csv", "--tare", tmp_path / "tare.json")
+    arguments += ("--encoder", "contact_area", "--window-ms", "2", "--set", "learner.tau=0.5", "--overwrite")
+    for folds in ((), ("--folds", "0")):
+        report = ("--report", tmp_path / f"r{len(folds)}")
+        code, out, _ = call(capsys, *arguments, *folds, "-o", tmp_path / "r.json", *report)
+        assert code == 0, out
+        assert "no plain rule for odd: none is better than to detect nothing" in out
+        assert "hit, plain rule: 6 of 6 found, 0 missed, 0 false, known" in out
+        page = (tmp_path / f"r{len(folds)}" / "report.html").read_text()
+        assert "Neuron and plain rule, on the same labels" in page
+        assert "no plain rule for odd" in page
+    result = json.loads(call(capsys, *arguments, "-o", tmp_path / "r.json", "--json")[1])
+    assert result["plain_rule"]["rules"]["odd"] is None
+    assert result["plain_rule"]["score"]["by_label"]["hit"]["found"] == 6
+    better = result["plain_rule"]["better"]
+    for label in better:
+        assert f"{label}: the plain rule is better" in call(capsys, *arguments, "-o", tmp_path / "r.json")[1]
