@@ -404,6 +404,10 @@ def run(
         if not isinstance(readout, Readout):
             raise ProblemError(f"source is {shown(source)}: a plain rule reads a recording, events or frames")
         return _run_spikes(readout, source)
+    if isinstance(source, Events | Frames):
+        for own in (readout.array, None if tare is None else tare.array):
+            if own is not None:
+                own._warn_apart(source.array, "the recording")
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
         columns = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)

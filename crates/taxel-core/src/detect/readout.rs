@@ -156,7 +156,7 @@ impl Readout {
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
         self.check()?;
         if let Some(mine) = &self.array
-            && (mine.rows, mine.columns, &mine.exists) != (array.rows, array.columns, &array.exists)
+            && !mine.fits(array)
         {
             return Err(problem!(
                 "array {} of {} x {} taxels: the readout was trained on {}, {} x {}{}",
@@ -166,7 +166,7 @@ impl Readout {
                 mine.name,
                 mine.rows,
                 mine.columns,
-                if mine.exists == array.exists { "" } else { ", of which others exist" }
+                if (mine.rows, mine.columns) == (array.rows, array.columns) { ", of which others exist" } else { "" }
             ));
         }
         for (label, one) in &self.neurons {
