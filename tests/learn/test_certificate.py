@@ -10,7 +10,7 @@ from making import made
 from stated import examples
 
 from taxel import Neuron, ProblemError, SpikeTrains
-from taxel.learn import Certificate, ConeX, Row, check_certificate
+from taxel.learn import Certificate, ConeX, ConeXProblem, Row, check_certificate
 
 
 def refuted(seed=0, **options):
@@ -190,3 +190,17 @@ def test_the_same_inputs_asked_to_fire_and_to_be_silent_are_refuted_for_any_marg
         cone = made(ConeX, lb=-3, ub=3, **options).fit(patterns, targets)
         assert cone.status_ != "infeasible" or "with the same inputs" not in str(cone.certificate_)
     assert by_them_alone > 1
+
+
+def test_what_cancels_in_a_coefficient_is_no_proof() -> None:
+    """Values of 1e8 hide one of 1e-8, with which weights within the bounds reach the threshold."""
+    values = [[1e8, 1e-8, -1e8], [1.0]]
+    trains = SpikeTrains.from_lists([[10.0, 10.0, 10.0], [30.0]], stop=60.0, values=values, kind="graded")
+    for most, proven in ((1e9, False), (1e-3, True)):
+        cone = ConeX(neuron=Neuron(tau=10.0), lb=-most, ub=most)
+        problem = ConeXProblem(cone, [trains], [[20.0]])
+        assert problem.target(0, 0)[0][0] == 0.0
+        proof = Certificate([Row("target", 0, 0)], np.array([-1.0]), 0.3, False, "")
+        assert check_certificate(problem, proof) == proven
+    plain = SpikeTrains.from_lists([[10.0], [30.0]], stop=60.0, values=[[1e-8], [1.0]], kind="graded")
+    assert Neuron(tau=10.0).potential([1e9, 0.0], plain, [20.0])[0] > 0.3

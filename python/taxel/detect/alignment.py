@@ -127,7 +127,8 @@ def _onsets(pattern: SpikeTrains, ages: Ages) -> NDArray[np.float64]:
     apart = np.diff(pooled)
     begins = np.ones(len(pooled), np.bool_)
     begins[1:] = (apart > 1.5 * apart.min(initial=np.inf)) | (np.diff(age) < 0)
-    return pooled[begins & (age == 0)] - ages.least_ms
+    onsets: NDArray[np.float64] = pooled[begins & (age == 0)] - ages.least_ms
+    return onsets
 
 
 def align(

@@ -52,6 +52,8 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
     flag("margin", margin)
     g, size, demanded, silent = np.zeros(len(problem.lb)), 0.0, 0.0, False
     most = np.maximum(np.abs(problem.lb), np.abs(problem.ub))
+    # Values of both signs may cancel in a coefficient, whose rounding is then that of the spikes' own sizes.
+    sizes, spikes = problem._without_signs()
     for row, multiplier in zip(certificate.rows, certificate.multipliers, strict=True):
         if multiplier < 0 and row.kind != "target":
             return False
@@ -59,8 +61,9 @@ def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin
         g = g + multiplier * coefficients
         demanded += multiplier * limit
         silent |= row.kind == "silence" and multiplier > 0
-        size += abs(multiplier) * (np.abs(coefficients) @ most + abs(limit))
+        whole = coefficients if sizes is problem else sizes.row(row, margin=margin)[0]
+        size += abs(multiplier) * (np.maximum(np.abs(coefficients), np.abs(whole)) @ most + abs(limit))
     least = np.minimum(problem.lb * g, problem.ub * g).sum()
-    rounding = (len(certificate.rows) + len(most)) * np.finfo(float).eps * size
+    rounding = (len(certificate.rows) + len(most) + spikes) * np.finfo(float).eps * size
     cancels = silent and not margin and min(problem.margin) > 0 and demanded == 0 and not g.any()
     return bool(cancels or least - demanded > rounding)

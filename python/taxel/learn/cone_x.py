@@ -359,6 +359,22 @@ class ConeXProblem:
             self.margin = Margin(*margin)
         return self
 
+    def _without_signs(self) -> tuple[Self, int]:
+        """Return the same problem with values without sign, and how many spikes the fullest train has.
+
+        In a coefficient of this problem, which is a sum over spikes, nothing cancels: rounding makes one of the given
+        problem wrong by no more than that size, times the number of spikes and the precision. It is the given problem,
+        and 0 spikes, where no value is below 0.
+        """
+        text, parts = self._stated
+        if not any(values is not None and (values < 0).any() for _, _, values, kind, *_ in parts if kind == "graded"):
+            return self, 0
+        sizes = copy.copy(self)
+        sizes._stated = text, [(t, o, None if v is None else np.abs(v), *rest) for t, o, v, *rest in parts]
+        sizes._lay_out()
+        fullest = max(int(np.diff(offsets).max(initial=0)) for _, offsets, *_ in parts)
+        return sizes._with_margin(self.margin), fullest
+
     def __getstate__(self) -> dict[str, Any]:
         return {"_stated": self._stated, "targets": self.targets, "margin": self.margin}
 

@@ -253,7 +253,7 @@ def _moved(aligned: Alignment | None) -> Figure | None:
 def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
     encoder = readout.encoder if outcome.example.tare is None else readout.encoder.with_tare(outcome.example.tare)
     source = outcome.example.source
-    return source if isinstance(source, SpikeTrains) else encoder.encode(source)  # type: ignore[arg-type]
+    return source if isinstance(source, SpikeTrains) else encoder.encode(source)
 
 
 def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
