@@ -169,7 +169,7 @@ def live(typed: _Typed) -> None:
             send=typed.send or (),
         ) as pipeline:
             if trained is not None and registers is None and board is None:
-                assumed = pipeline._options.registers
+                assumed = Registers(array=trained.array)
                 console.print(
                     f"the readout assumes frames of {assumed.frame_us:g} us, as of a board at reset; state others by "
                     "--preset, or by --rate-hz and --bits",
