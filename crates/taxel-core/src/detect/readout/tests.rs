@@ -8,7 +8,7 @@ use crate::detect::Detector;
 use crate::detect::detector::SILENCE_US;
 use crate::encode::{ContactArea, Zeroing};
 use crate::neuron::Neuron;
-use crate::{Events, Intensities, Stop};
+use crate::{Error, Events, Intensities, Stop};
 
 fn readout() -> Readout {
     let neuron = Neuron { tau: 0.5, time: Time::Grid, step_ms: 0.192, ..Neuron::default() };

@@ -56,7 +56,7 @@ pub(in crate::detect) struct NamedNeuron {
 }
 
 /// A crossing of a neuron, and what it rests on.
-pub(super) struct Crossing {
+pub(in crate::detect) struct Crossing {
     pub spike: OutputSpike,
     /// The neuron's number.
     pub neuron: usize,

@@ -4,6 +4,7 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 
 use super::*;
+use crate::detect::TrainedNeuron;
 use crate::neuron::{AfterSpike, Neuron, Time};
 use crate::{Events, Intensities, SpikeKind};
 
