@@ -169,9 +169,9 @@ def live(typed: _Typed) -> None:
             send=typed.send or (),
         ) as pipeline:
             if trained is not None and registers is None and board is None:
-                assumed = pipeline._options.registers
+                frame_us = Registers(array=pipeline.array).frame_us
                 console.print(
-                    f"the readout assumes frames of {assumed.frame_us:g} us, as of a board at reset; state others by "
+                    f"the readout assumes frames of {frame_us:g} us, as of a board at reset; state others by "
                     "--preset, or by --rate-hz and --bits",
                     soft_wrap=True,
                 )
