@@ -1,4 +1,4 @@
-"""The window of columns beside the time shown, what is first shown of a recording, and readouts that a client chooses."""
+"""The window of columns beside the time shown, what a recording opens on, and readouts that a client chooses."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(capsys):
 def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
     readout = train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
     readout.save(tmp_path / "touch.readout.json")
-    events, truth = touches(11)
+    events, _ = touches(11)
     taxel.convert(events, tmp_path / "played.mcap")
     with (
         Live(0, host="127.0.0.1", array=events.array) as live,
@@ -168,6 +168,7 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         assert [one["label"] for one in found] == ["contact", "lift"] * 6
         assert page.ask("train")["reason"].count("names no event")
         page.ask("live")
+        address = live.address
         # The board: first something must be held that can be its rest.
         assert "no value has arrived" in page.ask("read_out", readout="touch.readout.json")["reason"]
         say(live, *(word(4000, x, y, 50) for x in range(8) for y in range(8)))
@@ -177,4 +178,4 @@ def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
         hello = page.since_asked("hello")
         assert hello["readout"] == ["contact", "lift"]
         assert panel.live is not live
-        assert panel.live.address == live.address
+        assert panel.live.address == address
