@@ -13,7 +13,10 @@ use super::live_source::LiveSource;
 pub(super) fn array(array: &Array) -> Value {
     let digit = |&exists: &bool| if exists { '1' } else { '0' };
     let exists = array.exists.as_ref().map(|all| all.iter().map(digit).collect::<String>());
-    json!({ "rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm, "name": array.name, "exists": exists })
+    // Pitch and places are as in files.
+    let mut sensor = json!(Array { exists: None, ..array.clone() });
+    sensor["exists"] = json!(exists);
+    sensor
 }
 
 /// A taxel that was zeroed.

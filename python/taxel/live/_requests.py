@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._base.files import whole_file
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -176,7 +177,7 @@ class RequestHandler:
 
     def health(
         self,
-        array: tuple[int, int, float, str, list[bool] | None],
+        array: _core._Array,
         events: NDArray[np.uint32],
         moved: NDArray[np.uint32],
         values: tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]] | None,
