@@ -588,7 +588,7 @@ class PanelRequests(Protocol):
     def addresses(self) -> list[tuple[str, str]]: ...
     def health(
         self,
-        array: tuple[int, int, float, str, list[bool] | None],
+        array: _Array,
         events: NDArray[np.uint32],
         moved: NDArray[np.uint32],
         values: tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]] | None,
