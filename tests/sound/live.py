@@ -109,6 +109,7 @@ LEFT_OUT: dict[str, str] = {
     "taxel.live.Live.zero": "waits for events, each time anew; tried in tests/live/test_zero.py",
     "taxel.live.Panel.delta_intensity": "needs a panel each time, 0.25 s; tried in tests/panel/test_server.py",
     "taxel.live.Panel.listen": "needs a panel each time, 0.25 s; tried in tests/panel/test_board.py",
+    "taxel.live.Panel.read_out": "needs a panel each time, 0.25 s; tried in tests/panel/test_windows.py",
     "taxel.live.Bridge": "needs a wheel of its own; tried in tests/bridge",
     "taxel.live.Remote": "needs a wheel of its own; tried in tests/bridge",
     "taxel.live.PanelClient": "connects to a panel; tried in tests/live/test_client.py",

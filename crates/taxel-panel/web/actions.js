@@ -124,7 +124,8 @@ function pictureOf(player, { values }, maps) {
     ["centre-lane", values.showCentre, "Centre"],
   ])) {
     const canvas = part(id, HTMLElement).querySelector("canvas");
-    if (on && canvas) lanes.push({ title, canvas, inset: 0 });
+    // The lane of a watched taxel is hidden while none is watched.
+    if (on && canvas?.clientWidth) lanes.push({ title, canvas, inset: 0 });
   }
   const source = player.transport.source ?? "live";
   const at = ((player.t_us ?? 0) / 1e6).toFixed(3);

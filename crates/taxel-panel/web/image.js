@@ -22,8 +22,12 @@ const heightOf = ({ canvas, inset }) => (canvas.clientHeight * WIDE) / (canvas.c
  * @returns {Promise<void>}
  */
 export async function savePicture({ title, file, lanes }) {
+  const maps = [
+    { name: "pressure", caption: "Pressure above rest", ends: ["0", part("pressure-top", HTMLElement).textContent ?? ""] },
+    { name: "change", caption: "Change", ends: [part("change-least", HTMLElement).textContent ?? "", part("change-top", HTMLElement).textContent ?? ""] },
+  ].filter(({ name }) => part(`${name}-map`, HTMLCanvasElement).clientWidth > 0);
   const side = (WIDE - 2 * EDGE - BETWEEN) / 2;
-  const map = part("pressure-map", HTMLCanvasElement);
+  const map = part(`${maps[0].name}-map`, HTMLCanvasElement);
   const high = (side * map.clientHeight) / map.clientWidth;
   const top = EDGE + 40;
   const canvas = document.createElement("canvas");
@@ -39,10 +43,7 @@ export async function savePicture({ title, file, lanes }) {
   context.fillRect(0, 0, canvas.width, canvas.height);
   text(title, EDGE, EDGE + 16, 20);
   context.imageSmoothingEnabled = false;
-  [
-    { name: "pressure", caption: "Pressure above rest", ends: ["0", part("pressure-top", HTMLElement).textContent ?? ""] },
-    { name: "change", caption: "Change", ends: [part("change-least", HTMLElement).textContent ?? "", part("change-top", HTMLElement).textContent ?? ""] },
-  ].forEach(({ name, caption, ends }, i) => {
+  maps.forEach(({ name, caption, ends }, i) => {
     const x = EDGE + i * (side + BETWEEN);
     text(caption, x, top + 14, 15);
     context.drawImage(part(`${name}-map`, HTMLCanvasElement), x, top + 24, side, high);

@@ -83,6 +83,8 @@ let recordings = null;
 let mapsDue = false;
 let lanesDue = true;
 let marksDue = true;
+/** Only the line at the picture's time is to be drawn again. */
+let timeDue = true;
 /** Pictures drawn in the last second. */
 let drawn = 0;
 
@@ -151,7 +153,10 @@ function receivePicture(buffer) {
   maps.take(picture);
   player.t_us = picture.t_us;
   if (picture.following && player.transport.state !== "following" && player.transport.source === null) move({ ...player.transport, source: null, state: "following" });
-  mapsDue = lanesDue = marksDue = true;
+  mapsDue = timeDue = true;
+  // Of a window that does not follow the newest, the columns change only where the server sends all of them, or where it moves.
+  if (picture.following || picture.restart) lanesDue = true;
+  if (picture.following) marksDue = true;
 }
 
 // ------------------------------------------------------------------------------------------------ messages
@@ -382,10 +387,11 @@ function frame(now_ms) {
     [drawnAt, frames] = [now_ms, 0];
   }
   const moving = player.transport.state !== "paused";
-  if (timeline && lanesDue && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
-    lanesDue = false;
+  if (timeline && (lanesDue || timeDue) && now_ms - lanesAt >= (reducedMotion.matches && moving ? REDUCED_MS : LANES_MS)) {
     lanesAt = now_ms;
-    drawLanes(timeline);
+    if (lanesDue) drawLanes(timeline);
+    else cursor.draw();
+    lanesDue = timeDue = false;
   }
   if (now_ms - textAt >= TEXT_MS) {
     textAt = now_ms;

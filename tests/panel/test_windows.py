@@ -1,0 +1,181 @@
+"""The window of columns beside the time shown, what a recording opens on, and readouts that a client chooses."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from panel.protocol import SOON, Client, head, heard, say, section, word
+from tests.detect.test_readout import recipe, tare, touches
+
+import taxel
+from taxel.cli import main
+from taxel.detect import Example, train
+from taxel.live import Live, Panel, Source
+
+
+@pytest.fixture
+def steps(tmp_path):
+    """Three touches of growing force on a taxel that rests at 40 ticks, half a second each, from 2, 5 and 8 s on."""
+    t, ticks = [0], [40]
+    for start, force in ((2, 30), (5, 60), (8, 90)):
+        t += [start * 1_000_000, start * 1_000_000 + 500_000]
+        ticks += [40 + force, 40]
+    events = taxel.Events(
+        np.array(t),
+        0 * np.array(t) + 3,
+        0 * np.array(t) + 2,
+        np.array(ticks) > 40,
+        intensity=ticks,
+        array=taxel.Array(8, 8),
+    )
+    taxel.convert(events, tmp_path / "steps.mcap")
+    return tmp_path / "steps.mcap"
+
+
+def picture_at(page, t_us):
+    """The next picture of this time."""
+    while head(page.until("picture"))[0]["t_us"] != t_us:
+        pass
+    return page.pictures[-1]
+
+
+def columns_of(pictures):
+    """Sum of ticks above rest by column of time, from the last restart on."""
+    sums = {}
+    for picture in pictures:
+        about = head(picture)[0]
+        if about["flags"] & 4:
+            sums = {}
+        one = section(picture, 3, "<u4").reshape(-1, 4)[:, 0]
+        sums |= {about["first"] + k: int(force) for k, force in enumerate(one)}
+    return sums
+
+
+@pytest.mark.parametrize("column_us", [1000, 4000, 8000, 64_000, 4_096_000])
+def test_the_window_ends_where_it_is_asked_to_and_the_time_moves_in_it(steps, column_us):
+    with Panel(steps) as panel, Client(panel) as page:
+        page.send(type="credit", n=2)
+        page.ask("open", name="steps.mcap")
+        page.ask("watch", taxel=[3, 2])
+        end = 8_300_000
+        assert page.ask("zoom", column_us=column_us, end_us=end)["type"] == "done"
+        page.ask("seek", t_us=2_100_000)
+        picture_at(page, 2_100_000)
+        begin = len(page.pictures)
+        for t_us in (5_200_000, 400_000, 8_250_000):
+            page.ask("seek", t_us=t_us)
+            picture = picture_at(page, t_us)
+            held = section(picture, 0, "<u2").reshape(8, 8)[2, 3]
+            assert held == {5_200_000: 100, 400_000: 40, 8_250_000: 130}[t_us]
+        assert not any(head(picture)[0]["flags"] & 4 for picture in page.pictures[begin:]), "columns are sent once"
+        sums = columns_of(page.pictures)
+        assert max(sums) == end // column_us
+        assert min(sums) == max(0, end // column_us - 1249)
+        for column, force in sums.items():
+            last = min((column + 1) * column_us - 1, end)
+            inside = next((f for s, f in ((2, 30), (5, 60), (8, 90)) if 0 <= last - 1_000_000 * s < 500_000), 0)
+            assert force == inside, column
+        assert page.ask("zoom", column_us=column_us, end_us="soon")["field"] == "end_us"
+
+
+def test_a_view_that_plays_beyond_its_window_takes_it_along(steps):
+    with Panel(steps) as panel, Client(panel) as page:
+        page.send(type="credit", n=2)
+        page.ask("open", name="steps.mcap")
+        page.ask("zoom", column_us=1000, end_us=1_950_000)
+        page.ask("seek", t_us=1_900_000)
+        page.ask("play", speed=2.0)
+        until = time.monotonic() + SOON
+        while head(page.until("picture"))[0]["t_us"] < 2_300_000:
+            assert time.monotonic() < until
+        page.ask("pause")
+        sums = columns_of(page.pictures)
+        assert [sums[column] for column in (1998, 2001, 2200)] == [0, 30, 30]
+
+
+def test_a_recording_says_where_its_first_touch_is_and_how_strong_touches_are(steps):
+    with Panel(steps) as panel, Client(panel) as page:
+        page.ask("open", name="steps.mcap")
+        opened = next(m for m in page.said if m["type"] == "opened")
+        # The end of the column in which its force is greatest.
+        assert opened["touch_us"] == 2_003_999
+        page.ask("overview")
+        overview = next(m for m in page.said if m["type"] == "overview")
+        force = np.array(overview["force"])
+        at = (np.array([2.2, 3, 5.2, 8.2]) * 1e6 - overview["start_us"]) // overview["step_us"]
+        assert force[at.astype(int)].tolist() == [30, 0, 60, 90]
+
+
+def test_what_is_not_known_of_registers_is_not_shown_as_a_rate(tmp_path):
+    array = taxel.Array(4, 4)
+    held = Source(array, 500.0, bits=12, to="127.0.0.1:9").registers
+    for registers, rate in ((None, None), (held, 500.0), ("5.2 kHz", 5208.3)):
+        given = {} if registers == "5.2 kHz" else {"array": array}
+        with (
+            Live(0, host="127.0.0.1", registers=registers, **given) as live,
+            Panel(live, folder=tmp_path) as panel,
+            Client(panel) as page,
+        ):
+            assert page.until("registers")["stated"] is (registers is not None)
+            shown = page.until("counters")
+            assert shown["frames_per_s"] == (None if rate is None else pytest.approx(rate, rel=1e-3))
+            assert (shown["arrival"]["state"], shown["arrival"]["since_ns"]) == ("nothing", None)
+
+
+def test_a_sensor_of_ones_own_is_stated_by_rate_and_bits_alone(capsys):
+    how = [
+        "live",
+        "--panel",
+        "--port",
+        "0",
+        "--host",
+        "127.0.0.1",
+        "--seconds",
+        "0.1",
+        "--array",
+        "4x4",
+        "--bits",
+        "12",
+    ]
+    for more, reason in (
+        ([], "--rate-hz and --bits belong together"),
+        (["--rate-hz", "500", "--preset", "2 kHz"], "--rate-hz and --preset"),
+        (["--rate-hz", "500", "--from", "zenoh:127.0.0.1:7447/left"], "--rate-hz and --from"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main([*how, *more])
+        assert ended.value.code == 2
+        assert reason in capsys.readouterr().err
+
+
+def test_a_readout_of_the_folder_reads_a_recording_and_the_board(tmp_path):
+    readout = train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
+    readout.save(tmp_path / "touch.readout.json")
+    events, _ = touches(11)
+    taxel.convert(events, tmp_path / "played.mcap")
+    with (
+        Live(0, host="127.0.0.1", array=events.array) as live,
+        Panel(live, folder=tmp_path) as panel,
+        Client(panel) as page,
+    ):
+        assert page.until("recordings")["readouts"] == ["touch.readout.json"]
+        page.ask("open", name="played.mcap")
+        assert page.ask("read_out", readout="none.json")["type"] == "refused"
+        assert page.ask("read_out", readout="touch.readout.json")["type"] == "done"
+        found = next(m for m in page.said if m["type"] == "detections")["detections"]
+        assert [one["label"] for one in found] == ["contact", "lift"] * 6
+        assert page.ask("train")["reason"].count("names no event")
+        page.ask("live")
+        address = live.address
+        # The board: first something must be held that can be its rest.
+        assert "no value has arrived" in page.ask("read_out", readout="touch.readout.json")["reason"]
+        say(live, *(word(4000, x, y, 50) for x in range(8) for y in range(8)))
+        heard(live, 64)
+        time.sleep(0.2)
+        assert page.ask("read_out", readout="touch.readout.json")["type"] == "done"
+        hello = page.since_asked("hello")
+        assert hello["readout"] == ["contact", "lift"]
+        assert panel.live is not live
+        assert panel.live.address == address
