@@ -20,6 +20,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["held"],
             &["rest"],
             &["baseline", "circuit"],
+            &["tracked_rest"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],

@@ -120,11 +120,12 @@ fn rest(hub: &Hub, request: &Request<'_>) -> Answer {
     match request.get("how").and_then(Value::as_str) {
         Some("now") if state.held().iter().all(|&held| held == UNKNOWN) => Err("no events have arrived yet".into()),
         Some("now") => {
-            state.rest_now();
+            let held = state.held().to_vec();
+            state.set_rest(held);
             Ok(())
         }
         Some("lowest") => {
-            state.rest_lowest();
+            state.track_rest();
             Ok(())
         }
         _ => Err(Refusal::of("how", "must be now or lowest")),

@@ -3,7 +3,8 @@
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
-use taxel_core::rest::{Rest, touched_from};
+use taxel_core::rest::{Rest, Value, touched_from};
+use taxel_core::tracked_rest::TrackedRest;
 use taxel_core::{Error, problem};
 
 use crate::convert::{ArrayParts, EventsIn, EventsOut, array, from_events, slice, to_array, to_events};
@@ -96,6 +97,58 @@ fn above_rest<'py>(
     Ok(array(py, found))
 }
 
+/// The rest of pictures that nobody tared: `columns` of the array, its noise floor, and the rest of each taxel to begin
+/// with (NaN where unknown).
+#[pyclass(frozen, name = "TrackedRest", module = "taxel._core")]
+struct PyTrackedRest(Shared<TrackedRest>);
+
+#[pymethods]
+impl PyTrackedRest {
+    #[new]
+    fn new(columns: usize, noise_floor: f64, begins: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
+        let begins = slice("begins", &begins)?.iter().map(|&rest| if rest.is_nan() { f64::NO_REST } else { rest });
+        Ok(Self(Shared::new(TrackedRest::new(columns, noise_floor, begins.collect()))))
+    }
+
+    /// Reads pictures at `t` us, one after the other in `values` (NaN where a taxel has none); returns them above the
+    /// rest, 0 below it.
+    fn above<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, i64>,
+        values: PyReadonlyArray1<'py, f32>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let (t, values) = (slice("t", &t)?, slice("values", &values)?);
+        let above = self.0.enter(py, |rest, stop| {
+            let taxels = rest.begins().len();
+            if taxels == 0 || values.len() != t.len() * taxels {
+                let (n, pictures) = (values.len(), t.len());
+                return Err(problem!("{n} values for {pictures} pictures of {taxels} taxels"));
+            }
+            let mut above = Vec::with_capacity(values.len());
+            for (&t, picture) in t.iter().zip(values.chunks_exact(taxels)) {
+                stop.check()?;
+                above.extend(rest.take(t, picture.iter().copied()).iter().map(|above| above.max(0.0)));
+            }
+            Ok(above)
+        })?;
+        Ok(array(py, above))
+    }
+
+    /// The first quiet stretch, us.
+    #[getter]
+    fn quiet(&self, py: Python<'_>) -> Option<(i64, i64)> {
+        self.0.with(py, |rest| rest.quiet())
+    }
+
+    /// The rest of each taxel in its first quiet stretch, or in a later one far below it; NaN for one without any.
+    #[getter]
+    fn begins<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let known = |&rest: &f64| if rest == f64::NO_REST { f64::NAN } else { rest };
+        array(py, self.0.with(py, |rest| rest.begins().iter().map(known).collect()))
+    }
+}
+
 /// What a touched taxel reads above rest at least, for a board's noise floor.
 #[pyfunction]
 fn touched_above(noise_floor: f64) -> f64 {
@@ -105,6 +158,7 @@ fn touched_above(noise_floor: f64) -> f64 {
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("UNKNOWN", UNKNOWN)?;
     module.add_class::<HeldValues>()?;
+    module.add_class::<PyTrackedRest>()?;
     module.add_function(wrap_pyfunction!(held_as_events, module)?)?;
     module.add_function(wrap_pyfunction!(above_rest, module)?)?;
     module.add_function(wrap_pyfunction!(touched_above, module)?)

@@ -15,6 +15,7 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption, geometry, of_array
+from taxel.cli._recordings import TARE_HELP, tare_of
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
@@ -40,6 +41,7 @@ def info(
         Path | None,
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
+    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: that of a quiet stretch.")] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
     ] = False,
@@ -66,15 +68,16 @@ def info(
         if isinstance(opened, list):
             if picture is not None or table is not None:
                 raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")
-            every = [summary(recording, series(recording)) for recording in opened]
+            every = [summary(recording, series(recording, tare_of(tare, recording))) for recording in opened]
             typer.echo(json.dumps(every) if as_json else "\n".join(_page(facts) for facts in every))
             return
         if len(opened.sources) > 1:
-            several = _sources(opened, drawn=picture is not None or table is not None)
+            several = _sources(opened, tare, drawn=picture is not None or table is not None)
             typer.echo(json.dumps(several) if as_json else _pages(several))
             return
         recording = opened
-        pressed = series(recording)
+        rest = tare_of(tare, recording)
+        pressed = series(recording, rest)
         facts = summary(recording, pressed)
         facts["array_assumed"] &= array is None
     if table is not None:
@@ -97,15 +100,15 @@ def info(
         else:
             grid = figure.add_gridspec(2, 1, height_ratios=(2, 3))
             overview(recording, figure.add_subfigure(grid[0]))
-            above = above_rest(recording)
+            above = above_rest(recording, rest)
             assert above is not None  # there are series
-            pressure(*above, figure=figure.add_subfigure(grid[1]))
+            pressure(*above[:2], figure=figure.add_subfigure(grid[1]))
         write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
         facts["picture"] = str(picture)
     typer.echo(json.dumps(facts) if as_json else _page(facts))
 
 
-def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
+def _sources(recording: Recording, tare: str | None, *, drawn: bool) -> dict[str, Any]:
     """Return the facts of each source of a file, with offset and drift of their clocks against the first one's."""
     from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
     from taxel.recording.summary import summary  # noqa: PLC0415
@@ -118,7 +121,7 @@ def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
     first = next(iter(recording.sources.values()))
     sources: dict[str, Any] = {}
     for name, source in recording.sources.items():
-        facts = summary(source, None if source.is_stream else series(source))
+        facts = summary(source, None if source.is_stream else series(source, tare_of(tare, source)))
         clock, ours = source.clock, first.clock
         if source.is_stream:
             facts["columns"] = source.columns
@@ -197,6 +200,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "calibration", facts["calibration"]
     pressed = facts["pressure"]
     if pressed is not None:
+        yield "rest", facts["rest"]["text"]
         # In a calibration a taxel's area is the pitch squared; in other files taxels may have any size.
         newtons = array["pitch_mm"] ** 2 * N_PER_KPA_MM2
         force = facts["calibration"] is not None and pressed["unit"] == "kPa"

@@ -64,6 +64,7 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         }
     calibration = recording.calibration
     facts["calibration"] = None if calibration is None else calibration.described()
+    facts["rest"] = None if pressed is None else {**pressed.rest.described(), "text": str(pressed.rest)}
     facts["pressure"] = None if pressed is None else _pressure(pressed)
     return facts | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
