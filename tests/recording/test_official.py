@@ -60,7 +60,7 @@ def test_the_picture_is_a_standard_raw_image_and_a_note_a_standard_log(tmp_path:
     assert set(picture) >= RAW_IMAGE
     assert (picture["width"], picture["height"], picture["encoding"], picture["step"]) == (64, 64, "mono8", 64)
     assert base64.b64decode(picture["data"]) == bytes([255, 128]) + bytes(4094)
-    assert (picture["rest"], picture["full_ticks"]) == ("lowest so far", 60.0)
+    assert (picture["rest"], picture["full_ticks"]) == ("first values", 60.0)
     schema, message = messages["/notes"]
     assert schema.name == "foxglove.Log"
     assert set(json.loads(message.data)) >= LOG

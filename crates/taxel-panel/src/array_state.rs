@@ -38,6 +38,17 @@ pub struct Keyframe {
     pub tracked: Option<Box<TrackedRest>>,
 }
 
+/// Where the rest comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RestSource {
+    /// A tare, or the values held at a moment.
+    Given,
+    /// A quiet stretch, from which it is tracked.
+    Quiet,
+    /// There was no quiet stretch so far: the taxels' first values, from which it is tracked.
+    None,
+}
+
 impl Keyframe {
     /// A sensor of which nothing is known.
     #[must_use]
@@ -350,13 +361,13 @@ impl ArrayState {
         self.sum_above_rest();
     }
 
-    /// Where the rest comes from: `given`, `quiet`, or `none` as long as there was no quiet stretch.
+    /// Where the rest comes from.
     #[must_use]
-    pub fn rest_source(&self) -> &'static str {
+    pub fn rest_source(&self) -> RestSource {
         match &self.tracked {
-            None => "given",
-            Some(tracked) if tracked.quiet().is_some() => "quiet",
-            Some(_) => "none",
+            None => RestSource::Given,
+            Some(tracked) if tracked.quiet().is_some() => RestSource::Quiet,
+            Some(_) => RestSource::None,
         }
     }
 
@@ -538,9 +549,9 @@ mod tests {
     fn the_rest_is_given_found_in_a_quiet_stretch_or_none() {
         let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
         (0..4).for_each(|taxel| state.apply_one(&change(0, taxel, 48)));
-        assert_eq!(state.rest_source(), "none");
+        assert_eq!(state.rest_source(), RestSource::None);
         state.advance(1_000_000);
-        assert_eq!((state.rest_source(), state.rest()), ("quiet", &[48; 4][..]));
+        assert_eq!((state.rest_source(), state.rest()), (RestSource::Quiet, &[48; 4][..]));
         // A value below the rest, once, is not the rest.
         state.apply_one(&change(1_010_000, 0, 20));
         state.apply_one(&change(1_050_000, 0, 48));
@@ -552,7 +563,7 @@ mod tests {
         assert_eq!(state.rest(), [51; 4]);
         state.set_rest(vec![40, 40, 40, UNKNOWN]);
         state.advance(19_000_000);
-        assert_eq!((state.rest_source(), state.rest()), ("given", &[40, 40, 40, UNKNOWN][..]));
+        assert_eq!((state.rest_source(), state.rest()), (RestSource::Given, &[40, 40, 40, UNKNOWN][..]));
     }
 
     #[test]

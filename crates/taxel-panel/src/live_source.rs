@@ -75,7 +75,7 @@ impl LiveSource {
         let bytes = TimeColumns::bytes_for(array.rows.into(), REACH_US / COLUMN_US);
         Ok(Self {
             state: Mutex::new(ArrayState::new(array.columns, noise_floor.into(), &blank, COLUMN_US, bytes)),
-            activity: Mutex::new(Activity::new(array.len())),
+            activity: Mutex::new(Activity::new(&array)),
             index: LiveIndex::new(array, noise_floor.into()),
             events: Mutex::new(events),
             handle,

@@ -3,7 +3,6 @@
 use serde_json::{Map, Value, json};
 use taxel_core::Array;
 use taxel_core::encode::Zeroing;
-use taxel_live::locked::lock;
 use taxel_live::pipeline::{Counters, OutputDetection};
 use taxel_live::recording::now_ns;
 
@@ -73,7 +72,6 @@ pub(super) fn counters(
         "wire_version": now.wire_version,
         "marked_start": now.marked_start,
         "taring": now.taring,
-        "rest": lock(&live.state).rest_source(),
         "detections": now.detections,
         "reach_us": live.index.range(),
         "reach_bytes": live.index.bytes(),

@@ -226,10 +226,11 @@ async fn health(hub: &Hub, name: Option<&str>) -> Answer<Value> {
     };
     let taxels = array.exists.as_ref().map_or(array.len(), |exists| exists.iter().filter(|&&one| one).count());
     let with_events = activity.events.iter().filter(|&&n| n > 0).count();
-    let UnhealthyTaxels { dead, stuck, noisy } = hub.ask(move |handler| handler.health(&array, &activity)).await?;
+    let UnhealthyTaxels { dead, stuck, noisy, untold } =
+        hub.ask(move |handler| handler.health(&array, &activity)).await?;
     Ok(json!({
         "type": "health", "source": name, "taxels": taxels, "heard": with_events, "dead": dead, "stuck": stuck,
-        "noisy": noisy,
+        "noisy": noisy, "untold": untold,
     }))
 }
 

@@ -4,10 +4,13 @@ use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
 use taxel_core::rest::{Rest, Value, touched_from};
+use taxel_core::touch_counts::{BIN_US, Counts, TouchCounts};
 use taxel_core::tracked_rest::TrackedRest;
 use taxel_core::{Error, problem};
 
-use crate::convert::{ArrayParts, EventsIn, EventsOut, array, from_events, slice, to_array, to_events};
+use crate::convert::{
+    ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array, to_events, to_frames,
+};
 use crate::enter::{Shared, enter};
 use crate::errors::core;
 
@@ -149,6 +152,63 @@ impl PyTrackedRest {
     }
 }
 
+/// Counts of touches as rows of five numbers by taxel: touches, missed, pressed, changed, by itself.
+pub(crate) fn by_taxel(counts: &[Counts]) -> Vec<u32> {
+    counts.iter().flat_map(|c| [c.touches, c.missed, c.pressed, c.changed, c.by_itself]).collect()
+}
+
+/// The counts of touches of events, by taxel.
+#[pyfunction]
+fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+    let events = to_events(events)?;
+    let events = events.view()?;
+    let counts = enter(py, |stop| {
+        events.check()?;
+        let mut counts = TouchCounts::new(events.array, f64::NO_REST);
+        for k in 0..events.len() {
+            if k % 4096 == 0 {
+                stop.check()?;
+            }
+            let ticks = events.intensity.map_or(UNKNOWN, |of| if of.present[k] { of.ticks[k] } else { UNKNOWN });
+            let own = events.repaired.is_none_or(|repaired| !repaired[k]);
+            counts.event(events.t[k], events.array.index(events.x[k], events.y[k]), ticks, events.p[k], own);
+        }
+        if let Some(&last) = events.t.last() {
+            counts.advance(last.saturating_add(2 * BIN_US));
+        }
+        Ok::<_, Error>(by_taxel(counts.counts()))
+    })?;
+    Ok(array(py, counts))
+}
+
+/// The counts of touches of pictures in ticks, by taxel; `rest` of all of them, NaN where it is to be tracked.
+#[pyfunction]
+fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> PyResult<Bound<'py, PyArray1<u32>>> {
+    let frames = to_frames(frames)?;
+    let frames = frames.view()?;
+    let counts = enter(py, |stop| {
+        let taxels = frames.array.len();
+        let mut counts = TouchCounts::new(frames.array, if rest.is_nan() { f64::NO_REST } else { rest });
+        let mut before = vec![f32::NAN; taxels];
+        for (&t, picture) in frames.t.iter().zip(frames.values.chunks_exact(taxels)) {
+            stop.check()?;
+            for (taxel, (&value, before)) in picture.iter().zip(&mut before).enumerate() {
+                if !value.is_nan() && value != *before {
+                    // The first value is no change.
+                    counts.value(t, taxel, value, !before.is_nan());
+                    *before = value;
+                }
+            }
+            counts.advance(t);
+        }
+        if let Some(&last) = frames.t.last() {
+            counts.advance(last.saturating_add(2 * BIN_US));
+        }
+        Ok::<_, Error>(by_taxel(counts.counts()))
+    })?;
+    Ok(array(py, counts))
+}
+
 /// What a touched taxel reads above rest at least, for a board's noise floor.
 #[pyfunction]
 fn touched_above(noise_floor: f64) -> f64 {
@@ -161,5 +221,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyTrackedRest>()?;
     module.add_function(wrap_pyfunction!(held_as_events, module)?)?;
     module.add_function(wrap_pyfunction!(above_rest, module)?)?;
+    module.add_function(wrap_pyfunction!(touches_of_events, module)?)?;
+    module.add_function(wrap_pyfunction!(touches_of_frames, module)?)?;
     module.add_function(wrap_pyfunction!(touched_above, module)?)
 }

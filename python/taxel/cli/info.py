@@ -218,8 +218,10 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if facts["detections"]:
         yield "detections", ", ".join(f"{label} {n}" for label, n in facts["detections"].items())
     for name, places in facts["taxels"].items():
-        shown = ", ".join(f"({x}, {y})" for x, y in places[:8]) + " ..." * (len(places) > 8)
-        yield f"{name} taxels", f"{len(places)}" + f": {shown}" * bool(places)
+        shown = ", ".join(f"({y}, {x})" for x, y in places[:8]) + " ..." * (len(places) > 8)
+        yield f"{name} taxels", f"{len(places)}" + f", at (row, column) {shown}" * bool(places)
+    if facts["taxels_untold"]:
+        yield "other taxels", f"{facts['taxels_untold']} not touched enough to say whether they work"
 
 
 def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -234,6 +236,8 @@ def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         late = facts["delay_us"]
         delays = f"delays {late['median']:.0f} us median, {late['p99']:.0f} us 99 %"
         yield "clock", f"drift {facts['drift_ppm']:+.1f} ppm; {delays}"
+        if facts["clock_doubt"] is not None:
+            yield "", facts["clock_doubt"]
 
 
 def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

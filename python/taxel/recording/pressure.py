@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._core import ProblemError
 from taxel.encode import ContactArea
-from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import UNKNOWN
 from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
-from taxel.recording.rest import FORCE_UNITS, RANGE_TICKS, Picture, Rest, found, loaded_above, tracked
+from taxel.recording.rest import FORCE_UNITS, Picture, Rest, found, loaded_above, ticks_by_unit, tracked
 from taxel.tare import Tare
 
 __all__ = ["Series", "above_rest", "readings", "series"]
@@ -232,14 +231,15 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
         of, values = recording.calibration, rest.values.reshape(frames.array.shape)
         return Frames(of._values(frames.values, values), frames.t, unit=of.unit, array=frames.array), 0.0, rest
     if recording.has_events:
-        drawn, values = _Drawn.of(recording), np.zeros((len(frames), frames.array.rows * frames.array.columns), np.float32)
+        drawn = _Drawn.of(recording)
+        values = np.zeros((len(frames), frames.array.rows * frames.array.columns), np.float32)
         for first, over in drawn.above(replace(rest, values=rest.values.reshape(-1)[drawn.taxels])):
             values[first : first + len(over), drawn.taxels] = over
     elif rest.source in ("unit", "none"):
         return frames, 0.0, rest
     else:
         pictures = [(frames.t, frames.values.reshape(len(frames), -1))]
-        [(_, values)] = _above(rest, pictures, frames.array.columns, _scale(frames))
+        [(_, values)] = _above(rest, pictures, frames.array.columns, ticks_by_unit(frames))
     shape = len(frames), *frames.array.shape
     return Frames(values.reshape(shape), frames.t, unit=frames.unit, array=frames.array), floor, rest
 
@@ -256,7 +256,7 @@ def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float]
     if not recording.has_events:
         frames = recording.frames()
         rest = _rest_of_pictures(recording, frames, tare)
-        return frames, rest, loaded_above(_scale(frames)) if rest.source == "quiet" else 0.0
+        return frames, rest, loaded_above(ticks_by_unit(frames)) if rest.source == "quiet" else 0.0
     events = recording.events
     if events.present is None or not events.present.any():
         return None
@@ -280,22 +280,15 @@ def _rest_of_pictures(recording: Recording, frames: Frames, tare: Tare | None) -
     if frames.unit in FORCE_UNITS:
         return Rest("unit", np.zeros(taxels))
     pictures = [(frames.t, frames.values.reshape(len(frames), -1))]
-    return found(lambda: pictures, taxels, frames.array.columns, _scale(frames))
+    return found(lambda: pictures, taxels, frames.array.columns, ticks_by_unit(frames))
 
 
 def _given(recording: Recording, tare: Tare | None) -> Rest | None:
     """Return the rest that somebody measured; NaN where a taxel has none."""
     if tare is not None:
         if tare.array.shape != recording.array.shape:
-            (rows, columns), (of_rows, of_columns) = tare.array.shape, recording.array.shape
-            raise ProblemError(f"the tare is of {rows} x {columns} taxels, {recording.path} of {of_rows} x {of_columns}")
+            given, own = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
+            raise ProblemError(f"the tare is of {given} taxels, {recording.path} of {own}")
         return Rest("tare", tare.rest.reshape(-1))
     of = recording.calibration
     return None if of is None or of.rest is None else Rest("calibration", of.rest.reshape(-1))
-
-
-def _scale(frames: Frames) -> float:
-    """Return the ticks by the unit of pictures: the range of their values counts as that of a board's ramp."""
-    values = frames.values[np.isfinite(frames.values)] if len(frames) else frames.values
-    span = float(np.ptp(values)) if values.size else 0.0
-    return RANGE_TICKS / span if span else 1.0

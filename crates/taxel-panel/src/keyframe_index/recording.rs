@@ -114,7 +114,7 @@ impl RecordingIndex {
                 return Err(problem!("{name}: the panel shows .mcap and .lsa; taxel convert makes a .mcap").into());
             }
         };
-        let taxels = header.array.len();
+        let header_array = header.array.clone();
         let mut index = Self {
             path: path.to_owned(),
             source,
@@ -125,7 +125,7 @@ impl RecordingIndex {
             bytes,
             events: 0,
             event_rate: (0, COLUMN_US, vec![]),
-            activity: Activity::new(taxels),
+            activity: Activity::new(&header_array),
             remarks: Remarks::default(),
             verdict,
             unfinished,
@@ -290,7 +290,7 @@ impl RecordingIndex {
         let mut contents = Contents {
             first: None,
             event_rate: EventRate::default(),
-            activity: Activity::new(taxels),
+            activity: Activity::new(&self.header.array),
             remarks: Remarks::default(),
         };
         for k in 0..self.blocks() {
