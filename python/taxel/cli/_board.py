@@ -182,7 +182,10 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
     drift = ""
     if now["offset"] is not None:
         ppm = now["offset"]["drift_ppm"]
-        drift = f", drift {ppm:+.1f} ppm" + " (wrong: the sender does not keep pace with its clock)" * bool(doubt(ppm, 0.0))
+        drift = f", drift {ppm:+.1f} ppm"
+        drift += " (wrong: the sender does not keep pace with its clock)" * bool(doubt(ppm, 0.0))
+            doubt(ppm, 0.0)
+        )
     table = Table.grid(padding=(0, 2))
     for name, total, per_second in (
         ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),

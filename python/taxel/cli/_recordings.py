@@ -14,7 +14,6 @@ import typer
 
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.cli._array import geometry, of_array
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -219,13 +218,6 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
             typer.echo(f"taxel: warning: {warning.message}", err=True)
 
 
-def open_recording(path: Path, array: str | None = None) -> Recording:
-    """Open a file with the sensor of ``--array``."""
-    from taxel import recording  # noqa: PLC0415  the command line starts quickly
-
-    return of_array(recording.open_recording(path, array=None if array is None else geometry(array)), array)
-
-
 def of_source(recording: Recording, name: str | None) -> Recording:
     """Return the source that ``--source`` names; without a name the recording itself."""
     if name is None:
@@ -234,11 +226,3 @@ def of_source(recording: Recording, name: str | None) -> Recording:
     if name not in sources:
         raise ProblemError(f"--source {name}: {recording.path} holds {', '.join(sources)}")
     return sources[name]
-
-
-def open_all(paths: Sequence[Path], array: str | None = None) -> list[Recording]:
-    """Open recordings one after the other; of a folder, or of another maker's file, all trials in it."""
-    from taxel.recording.opening import open_any  # noqa: PLC0415  the command line starts quickly
-
-    opened = (open_any(path, array=None if array is None else geometry(array)) for path in paths)
-    return [of_array(one, array) for each in opened for one in (each if isinstance(each, list) else [each])]

@@ -10,17 +10,18 @@ import typer
 from rich.console import Console
 
 from taxel.cli._app import app
-from taxel.cli._array import FileArrayOption
-from taxel.cli._recordings import of_source, open_recording
+from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._recordings import of_source
 
 __all__ = ["convert"]
 
 
 @app.command()
+@with_file_options
 def convert(
     source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
     target: Annotated[Path, typer.Argument(help="The new file; its extension gives the format.")],
-    array: FileArrayOption = None,
+    files: FileOptions,
     frames: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Write frames at this rate (.npz, .csv, .h5) instead of events."),
@@ -42,7 +43,7 @@ def convert(
     try_whole(target, overwrite=overwrite)
     # The status line is shown on a terminal only, and removed at the end.
     with Console(stderr=True).status(f"{source} to {target}"):
-        recording = of_source(open_recording(source, array), part)
+        recording = of_source(files.one(source), part)
         lost = taxel.convert(recording, target, frames_hz=frames, compression=compression, overwrite=overwrite)
     if as_json:
         typer.echo(json.dumps({"source": str(source), "target": str(target), "lost": lost}))

@@ -213,7 +213,8 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
     # A channel has no neighbours that would show what it should do.
     noisy &= min(array.shape) > 1
     dead &= ~stuck
-    untold = exists & ~dead & ~stuck & ~noisy & (of.touches < TOUCHED_FROM) & (of.pressed == 0) & (activity < WORKS_FROM)
+    works = (of.touches >= TOUCHED_FROM) | (of.pressed > 0) | (activity >= WORKS_FROM)
+    untold = exists & ~dead & ~stuck & ~noisy & ~works
     return Health(array, activity, dead, stuck, noisy, untold)
 
 

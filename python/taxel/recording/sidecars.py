@@ -28,7 +28,7 @@ def with_sidecars(of: Contents) -> Contents:
 
 def _of_one(of: Contents, *, first: bool) -> Contents:
     changed = {}
-    if first and of.kind in ENDINGS.values() and beside(of.path).is_file():
+    if first and of.kind in (*ENDINGS.values(), "ros") and beside(of.path).is_file():
         changed["notes"] = once(lambda: of.notes + _labels(of.path))
     calibration = once(lambda: calibration_beside(of.path, of), lambda: has_calibration(of.path))
     return of.but(calibration=calibration, **changed)
