@@ -184,8 +184,6 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         ppm = now["offset"]["drift_ppm"]
         drift = f", drift {ppm:+.1f} ppm"
         drift += " (wrong: the sender does not keep pace with its clock)" * bool(doubt(ppm, 0.0))
-            doubt(ppm, 0.0)
-        )
     table = Table.grid(padding=(0, 2))
     for name, total, per_second in (
         ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),
