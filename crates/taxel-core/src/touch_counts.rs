@@ -2,8 +2,8 @@
 //! stuck and noisy taxels from sound ones.
 //!
 //! Reading: time is counted in bins of 50 ms. A taxel is touched while three in four of its up to 8 neighbours are
-//! [`TOUCH`] above their rest, until all but one in four are back. It changes by itself in a bin in which it has more
-//! than [`BY_ITSELF`] times the changes of all but one of the up to 24 taxels around it.
+//! [`TOUCH`] above their rest, until all but one in four are back. It changes by itself in a bin in which it has
+//! [`OFTEN`] changes or more, and more than [`BY_ITSELF`] times the changes of all but one of the up to 24 taxels around it.
 
 use crate::Array;
 use crate::held::UNKNOWN;
@@ -20,6 +20,9 @@ pub const TOUCH: f32 = 8.0;
 
 /// See the module.
 pub const BY_ITSELF: u32 = 8;
+
+/// A taxel changes by itself so often in a bin: the value of a sound one that lies between two ticks changes about once.
+pub const OFTEN: u32 = 3;
 
 /// Noise floor of the board's fast presets, ticks.
 const NOISE_FLOOR: f64 = 3.0;
@@ -178,7 +181,7 @@ impl TouchCounts {
                 (most, second) = if others > most { (others, most) } else { (most, second.max(others)) };
             }
             self.counts[taxel].changed += 1;
-            self.counts[taxel].by_itself += u32::from(changes > BY_ITSELF * second);
+            self.counts[taxel].by_itself += u32::from(changes >= OFTEN && changes > BY_ITSELF * second);
         }
     }
 }

@@ -181,6 +181,9 @@ fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bo
     Ok(array(py, counts))
 }
 
+/// The change of a picture's value that counts, ticks: above the noise floor of the board's fast presets.
+const NOISE_FLOOR: f32 = 3.0;
+
 /// The counts of touches of pictures in ticks, by taxel; `rest` of all of them, NaN where it is to be tracked.
 #[pyfunction]
 fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> PyResult<Bound<'py, PyArray1<u32>>> {
@@ -193,8 +196,8 @@ fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> 
         for (&t, picture) in frames.t.iter().zip(frames.values.chunks_exact(taxels)) {
             stop.check()?;
             for (taxel, (&value, before)) in picture.iter().zip(&mut before).enumerate() {
-                if !value.is_nan() && value != *before {
-                    // The first value is no change.
+                // As a board reads it; the first value is no change.
+                if before.is_nan() && !value.is_nan() || (value - *before).abs() > NOISE_FLOOR {
                     counts.value(t, taxel, value, !before.is_nan());
                     *before = value;
                 }

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["Health", "TaxelStatistics", "Touches", "by_taxel", "health", "judged"]
 
 #: Reading: a taxel is dead, or stuck, if its place was touched at least this number of times (`_core`, *touch counts*)
-#: and it never changed meanwhile ...
-TOUCHED_FROM = 3
+#: and it never changed meanwhile, if it has this number of neighbours: beyond the edge of an insole nothing presses ...
+TOUCHED_FROM, NEIGHBOURS_FROM = 3, 5
 #: ... or if it is known to hold 0 while the least value of its neighbours (median) was at least this number of ticks
 #: and this share of the largest value of the array ...
 REST_FROM, REST_SHARE = 10, 0.2
@@ -116,13 +116,13 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     -----
     *Reading* (the thesis defines none). A place is touched while three in four of its up to 8 neighbours are 8 ticks
     above their rest, until all but one in four are back; in pictures 150 ticks are the range of the values. Dead: three
-    touches or more and no change in any of them; or no event and known to hold 0, while the median of the least values
-    of its neighbours is 10 ticks or more and a fifth of the array's largest value; or no event in noise so strong that,
-    over half of the array or more, the taxels with 1 to 9 events are at most a tenth as many as the silent ones. Stuck:
-    like a dead one, but known to hold a value other than 0; or 3 events or more, all with one intensity, while its
-    neighbours show more than one. Noisy: in 10 bins of 50 ms or more, half of all in which it changes, it has more than
-    8 times the changes of all but one of the 24 taxels around it, and at most 45 % of its changes go on in the
-    direction of the one before.
+    touches or more and no change in any of them, with 5 neighbours or more; or no event and known to hold 0, while the
+    median of the least values of its neighbours is 10 ticks or more and a fifth of the array's largest value; or no
+    event in noise so strong that, over half of the array or more, the taxels with 1 to 9 events are at most a tenth as
+    many as the silent ones. Stuck: like a dead one, but known to hold a value other than 0; or 3 events or more, all
+    with one intensity, while its neighbours show more than one. Noisy: in 10 bins of 50 ms or more, half of all in
+    which it changes, it has 3 changes or more, and more than 8 times those of all but one of the 24 taxels around it;
+    and at most 45 % of its changes go on in the direction of the one before.
 
     Examples
     --------
@@ -190,10 +190,11 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
     activity, of = statistics.activity, statistics.touches
     silent = exists & (activity == 0)
-    dead = exists & (of.touches >= TOUCHED_FROM) & (of.missed == of.touches)
+    enough = (of.touches >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
+    dead = exists & enough & (of.missed == of.touches)
     if loud:
         # A median reaches a bound only if a neighbour reaches it, so all other taxels are skipped.
-        among = _reaches(activity, exists, _beside(exists & (activity >= LOUD_FROM)) & exists, LOUD_FROM)
+        among = _reaches(activity, exists, (_neighbours(exists & (activity >= LOUD_FROM)) > 0) & exists, LOUD_FROM)
         quiet = np.count_nonzero(among & (activity > 0) & (activity < LOUD_FROM))
         alone = quiet <= QUIET_SHARE * np.count_nonzero(among & silent)
         if alone and 2 * np.count_nonzero(among) > np.count_nonzero(exists):
@@ -202,18 +203,20 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
     if statistics.least is not None and statistics.greatest is not None:
         least = max(REST_FROM, REST_SHARE * int(statistics.greatest.max(initial=0)))
         known = exists & (statistics.least >= 0)
-        at_zero = silent & (statistics.greatest == 0) & _beside(known & (statistics.least >= least))
+        at_zero = silent & (statistics.greatest == 0) & (_neighbours(known & (statistics.least >= least)) > 0)
         dead |= _reaches(statistics.least, known, at_zero, least)
         stuck = dead & (statistics.greatest > 0)
     if statistics.values is not None:
         still = exists & (activity >= STUCK_FROM) & (statistics.values == 1)
         stuck |= _reaches(statistics.values, exists & (activity > 0), still, 1, above=True)
     noisy = exists & (of.by_itself >= NOISY_FROM) & (of.by_itself >= NOISY_SHARE * of.changed)
-    noisy &= ~stuck & (statistics.moved <= NOISY_ON * activity)
+    noisy &= (
+        ~stuck & (statistics.moved <= NOISY_ON * activity) & (activity >= (NOISY_TIMES if loud else 1) * of.changed)
+    )
     # A channel has no neighbours that would show what it should do.
     noisy &= min(array.shape) > 1
     dead &= ~stuck
-    works = (of.touches >= TOUCHED_FROM) | (of.pressed > 0) | (activity >= WORKS_FROM)
+    works = enough | (of.pressed > 0) | (activity >= WORKS_FROM)
     untold = exists & ~dead & ~stuck & ~noisy & ~works
     return Health(array, activity, dead, stuck, noisy, untold)
 
@@ -254,14 +257,14 @@ def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[ND
     return activity, moved
 
 
-def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which taxels have a taxel of a mask among their up to 8 neighbours."""
+def _neighbours(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return how many of the up to 8 neighbours of each taxel a mask has."""
     rows, columns = mask.shape
     padded = np.pad(mask, 1)
-    reached = np.zeros(mask.shape, bool)
+    number = np.zeros(mask.shape, np.uint8)
     for i, j in _offsets(1):
-        reached |= padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
-    return reached
+        number += padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
+    return number
 
 
 def _reaches(
