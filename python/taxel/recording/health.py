@@ -210,9 +210,7 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
         still = exists & (activity >= STUCK_FROM) & (statistics.values == 1)
         stuck |= _reaches(statistics.values, exists & (activity > 0), still, 1, above=True)
     noisy = exists & (of.by_itself >= NOISY_FROM) & (of.by_itself >= NOISY_SHARE * of.changed)
-    noisy &= (
-        ~stuck & (statistics.moved <= NOISY_ON * activity) & (activity >= (NOISY_TIMES if loud else 1) * of.changed)
-    )
+    noisy &= ~stuck & (statistics.moved <= NOISY_ON * activity)
     # A channel has no neighbours that would show what it should do.
     noisy &= min(array.shape) > 1
     dead &= ~stuck
