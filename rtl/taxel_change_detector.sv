@@ -2,6 +2,9 @@
 //
 // The counts of a read are loaded at once and taken one a clock, channel after channel. What `PREVIOUS_SAMPLE` and `INTENSITY`
 // choose is as `previous` and `intensity` of the emulated board. The initial frame sets every taxel's value to 0.
+//
+// Before the first events of a frame of version 2 come, its predecessor's end is queued; where a line's values are due to be
+// repeated then, they are copied, ahead of the events that change them.
 module taxel_change_detector
   import taxel_types::*;
 #(
@@ -10,7 +13,9 @@ module taxel_change_detector
     parameter int CHANNELS = 16,
     parameter int STEPS = 4,
     parameter bit PREVIOUS_SAMPLE = 1'b0,  // compare with the last value sampled, else with the last one sent
-    parameter bit DIFFERENCE = 1'b0        // an event's value is how far it moved, else where it is
+    parameter bit DIFFERENCE = 1'b0,       // an event's value is how far it moved, else where it is
+    parameter bit REPEATS = 1'b1,          // lines' values are repeated
+    parameter bit HOLDS = 1'b0             // events may wait for those of the next frame
 ) (
     input  logic                      clk,
     input  logic                      reset,
@@ -27,7 +32,18 @@ module taxel_change_detector
     output logic                      sent,          // a taxel's event found room
     output logic                      lost,          // an event or a marker found none
     output logic                      frame_over,    // all events of a frame but the first one were found
-    output logic                      not_returned   // a comparator had tripped when its ramp began
+    output logic                      not_returned,  // a comparator had tripped when its ramp began
+    output logic                      counted_first, // a count of the initial frame, in the order of the scan
+    output logic [15:0]               count_first,   // 65535: not returned
+    // What is repeated: the packer reads it by rows, and says when it has.
+    input  totals_t                   totals,
+    output totals_t                   repeated_totals,
+    output logic                      states_ready,
+    output logic [6:0]                repeated_line,
+    input  logic [6:0]                row_repeated,
+    output logic [15:0]               value_repeated,
+    input  logic                      states_sent,
+    input  logic                      totals_sent
 );
 
   localparam int STEP_BITS = $clog2(STEPS);
@@ -46,11 +62,13 @@ module taxel_change_detector
   read_t ended, now;
   trip_t [CHANNELS-1:0] counts;
   logic [CHANNEL_BITS-1:0] channel;
-  logic counting, busy;
+  logic counting, busy, of_frame, flushes, first_read, after_sent;
   logic [2:0] markers;
   logic [MARKERS-1:0] starts;
 
-  assign busy = counting && markers == 0;
+  assign busy = counting && !of_frame && markers == 0 && !flushes;
+  assign first_read = ended.frame_first && !ended.initial_frame;
+  assign after_sent = first_read && !ended.ended.initial_frame;  // of a frame that was sent
 
   always_ff @(posedge clk) begin
     if (step_end) ended <= read;
@@ -58,19 +76,25 @@ module taxel_change_detector
       now      <= ended;
       counting <= 1'b1;
       channel  <= '0;
-      markers  <= ended.frame_first && !ended.initial_frame ? ended.markers : 3'd0;
+      of_frame <= after_sent && ended.ended.format.version_2;
+      markers  <= first_read ? ended.markers : 3'd0;
       starts   <= ended.starts;
+      flushes  <= HOLDS && after_sent && ended.ended.format.version_2 && ended.ended.changed;
       for (int c = 0; c < CHANNELS; c++) counts[c] <= '{tripped: tripped[c], first: first[c], at: at[c]};
+    end else if (of_frame) begin
+      of_frame <= 1'b0;
     end else if (markers != 0) begin
       markers <= markers - 3'd1;
       starts  <= starts >> 1;
+    end else if (flushes) begin
+      flushes <= 1'b0;
     end else if (counting) begin
       counts  <= counts >> $bits(trip_t);
       channel <= channel + CHANNEL_BITS'(1);
       if (channel == CHANNEL_BITS'(CHANNELS - 1)) counting <= 1'b0;
     end
     if (reset) begin
-      counting <= 1'b0;
+      {counting, of_frame, flushes} <= '0;
       markers  <= '0;
     end
   end
@@ -79,7 +103,7 @@ module taxel_change_detector
   typedef struct packed {
     logic valid;
     logic last;    // of its frame
-    logic marker;
+    entry_kind_t kind;
     logic start;
     logic exists;
     logic not_returned;
@@ -107,8 +131,8 @@ module taxel_change_detector
 
   always_ff @(posedge clk) begin
     // Which tick it was: the sample before the one that had tripped.
-    counted.valid        <= busy || markers != 0;
-    counted.marker       <= markers != 0;
+    counted.valid        <= busy || of_frame || markers != 0 || flushes;
+    counted.kind         <= of_frame ? ENTRY_FRAME : markers != 0 ? ENTRY_MARKER : flushes ? ENTRY_FLUSH : ENTRY_EVENT;
     counted.start        <= starts[0];
     counted.last         <= busy && now.frame_last && channel == CHANNEL_BITS'(CHANNELS - 1);
     counted.exists       <= busy && 32'(row) < ROWS;
@@ -141,28 +165,109 @@ module taxel_change_detector
     if (reset) {counted.valid, valued.valid, fetched.valid, compared.valid, judged.valid} <= '0;
   end
 
+  logic other;  // than a taxel's
+  assign other = judged.valid && judged.kind != ENTRY_EVENT;
   assign changed = judged.valid && judged.exists && !judged.not_returned && !of_judged.initial_frame && beyond;
-  assign push = (changed || (judged.valid && judged.marker)) && !full;
+  assign push = (changed || other) && !full;
   assign sent = changed && !full;
   assign frame_over = judged.valid && judged.last && !of_judged.initial_frame;
-  assign lost = (changed || (judged.valid && judged.marker)) && full;
+  assign lost = (changed || (other && judged.kind == ENTRY_MARKER)) && full;
   assign not_returned = judged.valid && judged.exists && judged.not_returned && !of_judged.initial_frame;
   assign store = judged.valid && judged.exists
       && (of_judged.initial_frame || (PREVIOUS_SAMPLE ? !judged.not_returned : changed && !full));
   assign stored = of_judged.initial_frame ? 16'd0 : judged.value;
 
+  assign counted_first = fetched.valid && fetched.exists && of_fetched.initial_frame;
+  assign count_first   = fetched.not_returned ? 16'hFFFF : fetched.value;
+
+  logic lost_before;  // since the last entry
+  logic states_now, totals_now;
+
   always_comb begin
     found = '0;
-    found.marker = judged.marker;
+    found.kind   = judged.kind;
+    found.format = judged.kind == ENTRY_EVENT ? of_judged.format : of_judged.ended.format;
     found.frame  = frame;
-    found.stamp  = of_judged.stamp;
-    if (judged.marker) begin
-      found.more = judged.start;
-    end else begin
-      found.x     = 6'(of_judged.line);
-      found.y     = 6'(judged.address);
-      found.more  = polarity;
-      found.value = DIFFERENCE ? moved_by : judged.value;
+    found.lost   = lost_before;
+    found.at     = found.format.version_2 ? of_judged.micros : micros_t'(of_judged.stamp);
+    case (judged.kind)
+      ENTRY_EVENT: begin
+        found.x     = of_judged.line;
+        found.y     = 7'(judged.address[ROW_BITS-1:0]);
+        found.more  = polarity;
+        found.value = DIFFERENCE ? moved_by : judged.value;
+      end
+      ENTRY_FRAME: begin
+        {found.x, found.y, found.more, found.value} = of_judged.ended.micros;
+        found.states = states_now;
+        found.totals = totals_now;
+      end
+      default: found.more = judged.start;
+    endcase
+  end
+
+  // What is due to be repeated goes with the next frame's end that finds room, where what was repeated last has been sent. The
+  // copy of a line begins before that is known, two clocks ahead of the frame's first event, and stays ahead of all.
+  logic line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, ends;
+  logic [6:0] line_next, line_now;
+  logic [ROW_BITS-1:0] place, row_copied, row_written;
+  logic [15:0] again[2**ADDRESS_BITS];  // the same values, for the copy to read
+  logic [15:0] line_values[2**ROW_BITS];
+  logic [15:0] copied_value;
+
+  // In the order of the scan: channel by channel.
+  if (STEPS == 1) begin : g_row_of_one
+    assign row_copied = place;
+  end else begin : g_row_of_more
+    assign row_copied = {place[CHANNEL_BITS-1:0], place[ROW_BITS-1:CHANNEL_BITS]};
+  end
+
+  assign ends       = push && judged.kind == ENTRY_FRAME;
+  assign states_now = copies;
+  assign totals_now = totals_pending && !totals_busy;
+  assign states_ready = states_busy && !copying && !copied;
+
+  always_ff @(posedge clk) begin
+    if (read_done && after_sent) begin
+      line_pending   <= line_pending || (REPEATS && ended.ended.line_due);
+      totals_pending <= totals_pending || ended.ended.totals_due;
+    end
+    if (fetched.valid && fetched.kind == ENTRY_FRAME && line_pending && !states_busy) begin
+      copies   <= 1'b1;
+      copying  <= 1'b1;
+      place    <= '0;
+      line_now <= 8'(line_next) > of_fetched.ended.lines ? 7'd0 : line_next;
+    end else if (copying) begin
+      place <= place + ROW_BITS'(1);
+      if (&place) copying <= 1'b0;
+    end
+    if (judged.valid && judged.kind == ENTRY_FRAME) copies <= 1'b0;
+    if (ends && copies) begin
+      states_busy  <= 1'b1;
+      line_pending <= 1'b0;
+      line_next    <= 8'(line_now) == of_judged.ended.lines ? 7'd0 : line_now + 7'd1;
+    end else if (states_sent) begin
+      states_busy <= 1'b0;
+    end
+    if (ends && totals_now) begin
+      totals_busy     <= 1'b1;
+      totals_pending  <= 1'b0;
+      repeated_totals <= totals;
+    end else if (totals_sent) begin
+      totals_busy <= 1'b0;
+    end
+    repeated_line <= line_now;
+    if (store) again[judged.address] <= stored;
+    copied_value <= again[{line_now[LINE_BITS-1:0], row_copied}];
+    copied       <= copying;
+    row_written  <= row_copied;
+    if (copied) line_values[row_written] <= copied_value;
+    value_repeated <= line_values[row_repeated[ROW_BITS-1:0]];
+    if (push) lost_before <= 1'b0;
+    else if (changed) lost_before <= 1'b1;
+    if (reset) begin
+      {line_pending, totals_pending, states_busy, totals_busy, copies, copying, copied, lost_before} <= '0;
+      line_next <= '0;
     end
   end
 

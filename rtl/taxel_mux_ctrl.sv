@@ -19,6 +19,10 @@ module taxel_mux_ctrl
     output logic              markers_taken,
     output registers_t        active,          // of this frame
     input  logic [15:0]       stamp,           // of a step that starts now
+    input  micros_t           micros,
+    input  logic [30:0]       ended_micros,    // at a frame's start: the length of the one before
+    input  logic              line_due,        // and what came due in it
+    input  logic              totals_due,
     output logic              zero,            // time 0
     output logic              frame_start,
     output logic              step_start,
@@ -46,6 +50,7 @@ module taxel_mux_ctrl
   logic initial_frame, initial_begun;
   logic line_over, step_over;
   logic [7:0] next_lines;
+  registers_t ended_registers;  // of the frame before
   logic next_random;
 
   assign markers_taken = early && last_line;
@@ -91,6 +96,7 @@ module taxel_mux_ctrl
         initial_begun <= 1'b1;
         place         <= '0;
         active        <= committed;
+        ended_registers <= active;
         line_left     <= committed.line_period;
         step_left     <= committed.step_period;
       end else begin
@@ -128,6 +134,10 @@ module taxel_mux_ctrl
     end
   end
 
+  function automatic format_t format_of(registers_t r);
+    return '{version_2: r.wire_version == 2'd1, wide_values: r.ramp > 16'd255, frame_sync: r.frame_sync};
+  endfunction
+
   // What holds for a step is latched when it starts: its conversion ends when the scan has moved on.
   always_ff @(posedge clk) begin
     if (step_start) begin
@@ -137,6 +147,17 @@ module taxel_mux_ctrl
       read.line          <= line;
       read.step          <= step;
       read.stamp         <= stamp;
+      read.micros        <= micros;
+      read.format        <= format_of(active);
+      read.ended         <= '{
+          initial_frame: zero,
+          format: format_of(ended_registers),
+          micros: ended_micros,
+          lines: ended_registers.lines,
+          changed: ended_registers != active,
+          line_due: line_due,
+          totals_due: totals_due
+      };
       read.ramp          <= active.ramp;
       read.noise_floor   <= active.noise_floor;
       read.markers       <= committed_markers;

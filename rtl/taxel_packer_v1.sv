@@ -12,6 +12,8 @@ module taxel_packer_v1
     input  logic       reset,
     input  logic       ready,    // the oldest event stands at the queue's output
     input  event_t     oldest,
+    input  logic       allowed,  // it is of this version, and the other one's datagrams have gone
+    output logic       busy,     // an event has not gone yet
     output logic       pop,
     input  logic       empty,    // the queue holds none
     input  logic       frame,    // of the events to come
@@ -22,34 +24,36 @@ module taxel_packer_v1
 );
 
   event_t now;
-  logic busy, second, advance, word_over, event_over, known, fits, ends, over;
+  logic marker, second, advance, word_over, event_over, known, single, fits, ends, over;
   logic [2:0] at;             // which byte of the word
   logic [8:0] words;          // of the datagram, with this event's
   logic [15:0] field;
 
   // Whether the oldest event goes into the datagram too.
-  assign fits = oldest.frame == now.frame && words <= 9'(oldest.marker || !VALUED ? MOST - 1 : MOST - 2);
+  assign single = oldest.kind == ENTRY_MARKER || !VALUED;
+  assign fits = allowed && oldest.frame == now.frame && words <= 9'(single ? MOST - 1 : MOST - 2);
 
   assign word_over  = at == 3'd4;
-  assign event_over = word_over && (now.marker || !VALUED || second);
+  assign marker     = now.kind == ENTRY_MARKER;
+  assign event_over = word_over && (marker || !VALUED || second);
   // Once it is known that its frame has no more, that stays so: what waits is not withdrawn.
   assign known      = ready || over || (empty && frame != now.frame);
   assign ends       = !(ready && fits);
 
-  assign field  = second ? now.value : now.stamp;
+  assign field  = second ? now.value : now.at[15:0];
   assign tvalid = busy && (!event_over || known);
   assign tlast  = event_over && ends;
   assign advance = tvalid && tready;
   // An event is taken when the one before has gone.
-  assign pop = ready && (!busy || (advance && event_over));
+  assign pop = ready && allowed && (!busy || (advance && event_over));
 
   always_comb begin
     case (at)
-      3'd0: tdata = {1'b1, now.more, second, 1'b0, now.marker, 1'b0, field[15:14]};
+      3'd0: tdata = {1'b1, now.more, second, 1'b0, marker, 1'b0, field[15:14]};
       3'd1: tdata = {1'b0, field[13:7]};
       3'd2: tdata = {1'b0, field[6:0]};
-      3'd3: tdata = {2'b00, now.x};
-      default: tdata = {2'b00, now.y};
+      3'd3: tdata = {2'b00, now.x[5:0]};
+      default: tdata = {2'b00, now.y[5:0]};
     endcase
   end
 
@@ -64,7 +68,7 @@ module taxel_packer_v1
       now   <= oldest;
       busy  <= 1'b1;
       over  <= 1'b0;
-      words <= (busy && fits ? words : 9'd0) + (oldest.marker || !VALUED ? 9'd1 : 9'd2);
+      words <= (busy && fits ? words : 9'd0) + (single ? 9'd1 : 9'd2);
     end
     if (reset) begin
       busy   <= 1'b0;

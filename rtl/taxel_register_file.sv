@@ -37,11 +37,6 @@ module taxel_register_file
   logic [3:0] rule;
   logic reads, greets, totals, lacks;
 
-  // What this build does not have: FA-1 and version 2 of the wire.
-  function automatic logic lacking(registers_t r);
-    return r.mechanoreceptor || r.wire_version != 2'd0;
-  endfunction
-
   logic writes, marks;
   // REG6 has no field, so a read changes nothing.
   assign writes = checked && rule == 4'd0;
@@ -62,7 +57,7 @@ module taxel_register_file
     // What is wrong with them; which of that comes first.
     judged  <= begun;
     which   <= broken(changed, STEPS, COLUMNS, ROWS, CHANNELS);
-    lacks   <= reserved || lacking(changed);
+    lacks   <= reserved || changed.mechanoreceptor;  // this build has no FA-1
     checked <= judged;
     rule    <= lacks ? 4'd4 : refused(which);
     // The answer.

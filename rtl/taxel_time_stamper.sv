@@ -1,24 +1,34 @@
-// Time stamps of 100 us: how many have passed since time 0, the start of the first frame that is sent.
+// Times since time 0, the start of the first frame that is sent: stamps of 100 us, and us.
 //
-// With `frame_sync` all reads of a frame carry the stamp of its start, else each carries that of its step.
-module taxel_time_stamper (
+// With `frame_sync` all reads of a frame carry the time of its start, else each carries that of its step.
+module taxel_time_stamper
+  import taxel_types::*;
+(
     input  logic        clk,
     input  logic        zero,         // this clock is time 0
     input  logic        frame_start,  // a frame starts in this clock
     input  logic        frame_sync,
-    output logic [15:0] stamp         // of a step that starts in this clock
+    output logic [15:0] stamp,        // of a step that starts in this clock
+    output micros_t     micros,
+    output logic [30:0] ended         // at a frame's start: how long the one before was, us
 );
 
   localparam int CLOCKS = 10_000;  // of 10 ns in 100 us
+  localparam int SHORT = 100;      // in 1 us
 
   logic [15:0] counted, of_frame, now;
   logic [13:0] clocks;
+  micros_t counted_us, of_frame_us, now_us;
+  logic [6:0] clocks_us, clocks_ended;
 
-  assign now   = zero ? 16'd0 : counted;
-  assign stamp = (frame_sync && !frame_start) ? of_frame : now;
+  assign now    = zero ? 16'd0 : counted;
+  assign stamp  = (frame_sync && !frame_start) ? of_frame : now;
+  assign now_us = zero ? '0 : counted_us;
+  assign micros = (frame_sync && !frame_start) ? of_frame_us : now_us;
 
   always_ff @(posedge clk) begin
     if (frame_start) of_frame <= now;
+    if (frame_start) of_frame_us <= now_us;
     if (zero) begin
       counted <= '0;
       clocks  <= 14'd1;
@@ -27,6 +37,24 @@ module taxel_time_stamper (
       clocks  <= '0;
     end else begin
       clocks <= clocks + 14'd1;
+    end
+    if (zero) begin
+      counted_us <= '0;
+      clocks_us  <= 7'd1;
+    end else if (clocks_us == 7'(SHORT - 1)) begin
+      counted_us <= counted_us + micros_t'(1);
+      clocks_us  <= '0;
+    end else begin
+      clocks_us <= clocks_us + 7'd1;
+    end
+    if (frame_start) begin
+      ended        <= '0;
+      clocks_ended <= 7'd1;
+    end else if (clocks_ended == 7'(SHORT - 1)) begin
+      if (!(&ended)) ended <= ended + 31'd1;
+      clocks_ended <= '0;
+    end else begin
+      clocks_ended <= clocks_ended + 7'd1;
     end
   end
 

@@ -16,6 +16,10 @@ module taxel_top
     parameter int BAUD_CLOCKS = 868,          // of a bit on the serial line: 115 200 baud
     parameter int ANSWERS = 8,                // that wait for the serial line
     parameter int FAULT_CLOCKS = 1_000_000,   // between two lines of faults at least
+    parameter int BOARD = 0,                  // number of the board; this and the next three are of version 2 of the wire
+    parameter int HOLD_US = 0,                // for how long an event may wait for others
+    parameter int HEARTBEAT_US = 10_000,      // between promises that nothing has happened
+    parameter int STATES_US = 1_000_000,      // in which all lines' values, and the totals, are repeated; 0: never
     parameter int DELAY = 2                   // fast clocks from the ramp's pair to the samples taken during it
 ) (
     input  logic                     clk,
@@ -50,8 +54,11 @@ module taxel_top
   if (CHANNELS != 16 && CHANNELS != 64) begin : g_channels
     $error("CHANNELS: the converter has 16 or 64");
   end
-  if (COLUMNS > 64 || ROWS > 64) begin : g_lines
-    $error("COLUMNS, ROWS: version 1 of the wire names 64 x 64 taxels");
+  if (COLUMNS > 128 || ROWS > 128 || (1 << $clog2(STEPS)) != STEPS) begin : g_lines
+    $error("COLUMNS, ROWS: at most 128, and steps that are a power of two");
+  end
+  if (STATES_US == 1 || STATES_US > 20_000_000) begin : g_states
+    $error("STATES_US: 0, or 2 to 20000000");
   end
 
   // Commands.
@@ -89,15 +96,23 @@ module taxel_top
   // The scan.
   logic zero, frame_start, step_start, read_start, step_end, row_reading, col_reading, read_done;
   logic [15:0] stamp;
+  micros_t micros;
+  logic [30:0] ended_micros;
+  logic line_due, totals_due;
   read_t read;
 
   taxel_mux_ctrl #(.COLUMNS(COLUMNS), .STEPS(STEPS), .AT_RESET(AT_RESET)) mux_ctrl (
-      .clk, .reset, .written, .markers, .starts, .markers_taken, .active, .stamp,
-      .zero, .frame_start, .step_start, .read_start, .step_end, .reading(row_reading), .converting(col_reading), .read,
+      .clk, .reset, .written, .markers, .starts, .markers_taken, .active, .stamp, .micros, .ended_micros,
+      .line_due, .totals_due, .zero, .frame_start, .step_start, .read_start, .step_end, .reading(row_reading), .converting(col_reading), .read,
       .rsel, .csel_clk(csel_reg_clk_out), .csel_din(csel_reg_din_out)
   );
 
-  taxel_time_stamper time_stamper (.clk, .zero, .frame_start, .frame_sync(active.frame_sync), .stamp);
+  taxel_time_stamper time_stamper (.clk, .zero, .frame_start, .frame_sync(active.frame_sync), .stamp, .micros,
+                                   .ended(ended_micros));
+
+  taxel_refresh #(.EVERY(STATES_US * 100)) refresh (
+      .clk, .zero, .frame_start, .lines(active.lines), .line_due, .totals_due
+  );
 
   assign record_sync     = active.record;
   assign frame_sync_out  = frame_start;
@@ -117,6 +132,11 @@ module taxel_top
   // Events.
   logic push, full, empty, ready, pop, frame, event_sent, event_lost, frame_over, not_returned;
   event_t found, oldest;
+  logic counted_first, states_ready, states_sent, totals_sent;
+  logic [15:0] count_first, value_repeated, session;
+  logic [6:0] repeated_line, row_repeated;
+  count_t lost, faults, commands;
+  totals_t totals, repeated_totals;
 
   taxel_change_detector #(
       .COLUMNS(COLUMNS),
@@ -124,24 +144,65 @@ module taxel_top
       .CHANNELS(CHANNELS),
       .STEPS(STEPS),
       .PREVIOUS_SAMPLE(PREVIOUS_SAMPLE),
-      .DIFFERENCE(DIFFERENCE)
+      .DIFFERENCE(DIFFERENCE),
+      .REPEATS(VALUED),
+      .HOLDS(HOLD_US != 0)
   ) detector (
       .clk, .reset, .step_end, .read, .read_done, .tripped, .first, .at,
-      .push, .found, .full, .frame, .sent(event_sent), .lost(event_lost), .frame_over, .not_returned
+      .push, .found, .full, .frame, .sent(event_sent), .lost(event_lost), .frame_over, .not_returned,
+      .counted_first, .count_first, .totals, .repeated_totals, .states_ready, .repeated_line, .row_repeated,
+      .value_repeated, .states_sent, .totals_sent
   );
+
+  taxel_session of_session (.clk, .reset, .counted(counted_first), .count(count_first), .session);
 
   taxel_event_fifo #(.DEPTH(QUEUE), .BITS($bits(event_t))) queue (
       .clk, .reset, .push, .entered(found), .full, .empty, .ready, .oldest, .pop
   );
 
-  taxel_packer_v1 #(.VALUED(VALUED)) packer (
-      .clk, .reset, .ready, .oldest, .pop, .empty, .frame, .tdata, .tvalid, .tready, .tlast
+  // Datagrams: each version waits until the other one's have gone.
+  logic pop_v1, pop_v2, busy_v1, sorted, entry_taken, idle_sorter, idle_v2, tvalid_v1, tvalid_v2, tlast_v1, tlast_v2;
+  logic write, bank, send, sending, leaving;
+  logic [7:0] tdata_v1, tdata_v2;
+  logic [9:0] place;
+  logic [15:0] unit;
+  event_t entry;
+  datagram_t datagram;
+
+  assign pop     = pop_v1 || pop_v2;
+  assign leaving = ready && !oldest.format.version_2;
+  assign tdata   = busy_v1 ? tdata_v1 : tdata_v2;
+  assign tvalid  = tvalid_v1 || tvalid_v2;
+  assign tlast   = busy_v1 ? tlast_v1 : tlast_v2;
+
+  taxel_packer_v1 #(.VALUED(VALUED)) packer_v1 (
+      .clk, .reset, .ready, .oldest, .allowed(leaving && idle_sorter && idle_v2), .busy(busy_v1), .pop(pop_v1), .empty,
+      .frame, .tdata(tdata_v1), .tvalid(tvalid_v1), .tready, .tlast(tlast_v1)
+  );
+
+  taxel_line_sorter #(.ROWS(ROWS)) sorter (
+      .clk, .reset, .ready(ready && oldest.format.version_2 && !busy_v1), .oldest, .leaving, .pop(pop_v2),
+      .idle(idle_sorter), .valid(sorted), .entry, .taken(entry_taken)
+  );
+
+  taxel_packer_v2 #(
+      .ROWS(ROWS),
+      .VALUED(VALUED),
+      .DIFFERENCE(DIFFERENCE),
+      .HOLD_US(HOLD_US),
+      .HEARTBEAT_US(HEARTBEAT_US)
+  ) packer_v2 (
+      .clk, .reset, .valid(sorted), .entry, .taken(entry_taken), .leaving(leaving && idle_sorter), .idle(idle_v2),
+      .states_ready, .repeated_line, .row_repeated, .value_repeated, .states_sent, .totals(repeated_totals),
+      .totals_sent, .write, .bank, .place, .unit, .send, .datagram, .sending
+  );
+
+  taxel_datagram_sender #(.ROWS(ROWS), .BOARD(16'(BOARD))) sender (
+      .clk, .reset, .session, .write, .bank, .place, .unit, .send, .datagram, .sending,
+      .tdata(tdata_v2), .tvalid(tvalid_v2), .tready, .tlast(tlast_v2)
   );
 
   // Status lines.
-  count_t lost, faults, commands;
-  totals_t totals;
-
   taxel_totals counts (
       .clk, .reset, .event_sent, .queue_lost(event_lost), .marker_lost, .not_returned, .skipped, .refused(refused_full),
       .datagram(tvalid && tready && tlast), .frame_over, .lost, .faults, .commands, .totals

@@ -4,6 +4,27 @@ package taxel_types;
   // Most markers between two frames; a further one is counted as lost.
   localparam int MARKERS = 4;
 
+  // Time since time 0, us: as many bits as the base time of a datagram of version 2 has.
+  typedef logic [47:0] micros_t;
+
+  // How events of a frame are sent: the version of the wire, whether values may exceed 255, whether all carry the frame's time.
+  typedef struct packed {
+    logic version_2;
+    logic wide_values;
+    logic frame_sync;
+  } format_t;
+
+  // What a frame's start says of the frame that ends there.
+  typedef struct packed {
+    logic        initial_frame;
+    format_t     format;
+    logic [30:0] micros;      // its length, rounded down, at most 2^31 - 1
+    logic [7:0]  lines;       // less one
+    logic        changed;     // the next frame has other registers
+    logic        line_due;    // a line's values are due to be repeated, and the totals
+    logic        totals_due;
+  } ended_t;
+
   // One read: the taxels of a multiplexer's step, converted at once, and what they are compared by.
   typedef struct packed {
     logic        initial_frame;  // of the frame before time 0, which is not sent
@@ -12,22 +33,63 @@ package taxel_types;
     logic [6:0]  line;           // the driven line
     logic [2:0]  step;
     logic [15:0] stamp;          // 100 us
+    micros_t     micros;
+    format_t     format;
+    ended_t      ended;          // the frame before
     logic [15:0] ramp;           // ticks
     logic [7:0]  noise_floor;    // ticks
     logic [2:0]  markers;        // how many go before this frame
     logic [MARKERS-1:0] starts;  // what they mark, the oldest in bit 0: a start of a recording, or a stop
   } read_t;
 
-  // One event in the queue: a taxel's change with its value, or a marker.
+  typedef enum logic [1:0] {
+    ENTRY_EVENT,
+    ENTRY_MARKER,
+    ENTRY_FRAME,  // the end of a frame of version 2
+    ENTRY_FLUSH   // what waits is to be sent, as the registers change
+  } entry_kind_t;
+
+  // One entry of the queue: a taxel's change with its value, a marker, or the end of a frame.
   typedef struct packed {
-    logic        marker;
-    logic        frame;  // alternates from one frame that has events to the next
-    logic [15:0] stamp;  // 100 us
-    logic [5:0]  x;
-    logic [5:0]  y;
-    logic        more;   // polarity: more pressure; of a marker: start
+    entry_kind_t kind;
+    format_t     format;
+    logic        frame;    // alternates from one frame that has events to the next
+    logic        lost;     // events were dropped before this entry
+    micros_t     at;       // since time 0, us; of version 1: 100 us
+    logic [6:0]  x;
+    logic [6:0]  y;
+    logic        more;     // polarity: more pressure; of a marker: start
     logic [15:0] value;
+    logic        states;   // with a frame's end: a line's values are repeated, the totals are sent
+    logic        totals;
   } event_t;
+
+  // The length of a frame, in the fields of an event.
+  function automatic logic [30:0] length_of(event_t e);
+    return {e.x, e.y, e.more, e.value};
+  endfunction
+
+  // CRC-32C (of reflected bits) with one more byte.
+  function automatic logic [31:0] crc_32c(logic [31:0] crc, logic [7:0] data);
+    logic [31:0] c;
+    c = crc ^ 32'(data);
+    for (int k = 0; k < 8; k++) c = c[0] ? (c >> 1) ^ 32'h82F63B78 : c >> 1;
+    return c;
+  endfunction
+
+  // A datagram of version 2 without its body.
+  typedef struct packed {
+    logic [3:0]  kind;
+    logic        frame_sync;
+    logic        differences;
+    logic        dropped;
+    logic [31:0] sequence_number;
+    micros_t     base;
+    logic [6:0]  line;
+    logic [15:0] span;
+    logic [9:0]  units;  // of 16 bits, of its body
+    logic        bank;   // of the buffer, where its body is
+  } datagram_t;
 
   // What a command is answered with.
   typedef enum logic [1:0] {

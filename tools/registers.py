@@ -464,11 +464,11 @@ loop of the scan; a *step* is one of the multiplexer, the inner loop. The manual
 {newline.join(rows)}
 
 All other bits are reserved and written 0. REG6 has no value: writing a register's number (0 to 7) to it reads that register back, and
-writing 8 makes the board identify itself as at reset.
+writing 8 makes the board identify itself as at reset. Writing 9 requests its totals ([the wire](wire.md)).
 
 ## Rules
 
-The logic of the board checks nothing; the host and the emulated board check these rules before a write. `steps` is the number of
+The logic, the emulated board and the host check these rules before a write; a write that breaks one changes nothing. `steps` is the number of
 multiplexer steps for each line, `driven_lines` and `sense_lines` are the array's columns and rows. Rule 4 also says that every value is
 within its range.
 

@@ -20,8 +20,12 @@ RTL = Path(__file__).parents[1]
 PACKAGES = ("taxel_types.sv", "taxel_registers.sv")
 #: Warnings that say nothing here: fields of a struct that one of its users does not read, and text from left to right.
 QUIET = ("-Wno-UNUSEDSIGNAL", "-Wno-ASCRANGE")
-#: How the logic is compiled. Registers without a reset begin with random bits, as nobody knows what a chip holds.
-OPTIONS = ("-j", "1", "-O3", "--x-assign", "unique", "--x-initial", "unique", "-CFLAGS", "-fPIC -O1")
+#: How the logic is compiled. Registers without a reset begin with random bits, as nobody knows what a chip holds. The
+#: wheel's makefile leaves out how g++ is given a header that is compiled before.
+OPTIONS = (
+    *("-j", "1", "-O3", "--x-assign", "unique", "--x-initial", "unique", "-CFLAGS", "-fPIC -O1"),
+    *("-MAKEFLAGS", "CFG_CXXFLAGS_PCH_I=-include"),
+)
 LINKED = ("-std=c++20", "-O2", "-shared", "-fPIC")
 #: A write acts in the frame whose edge comes so many clocks or more after the middle of its last stop bit.
 WRITE_CLOCKS = 23
@@ -130,8 +134,7 @@ class Logic:
             getattr(self._library, f"bench_{name}").restype = result
         self._library.bench_edge.restype = ctypes.c_uint64
         self._bench = ctypes.c_void_p(self._library.bench_new(columns, rows, channels, steps, baud_clocks, seed))
-        self._bytes = b""
-        self.call("reset")
+        self.reset()
 
     def call(self, name: str, *values: Any) -> int:
         """Call one of the bench's functions."""
@@ -140,6 +143,11 @@ class Logic:
     def close(self) -> None:
         """Give its memory back."""
         self._library.bench_delete(self._bench)
+
+    def reset(self) -> None:
+        """Hold the logic in reset for some clocks; what it sent before is forgotten."""
+        self._bytes = b""
+        self.call("reset")
 
     def ticks(self, ticks: Any) -> None:
         """Set the trip times of reads to come: uint16, shape (rows, columns)."""

@@ -8,12 +8,29 @@ import numpy as np
 
 from logic import WRITE_CLOCKS, Logic
 from taxel import Array
-from taxel.simulate import Board
+from taxel.simulate import NOT_RETURNED, Board, Version2
 from taxel.wire import Registers
 
 #: Values of `previous` and `intensity` of the emulated board as parameters of the logic.
 PREVIOUS = {"last_sent": {}, "last_sample": {"PREVIOUS_SAMPLE": 1}}
 INTENSITY = {"value": {}, "difference": {"DIFFERENCE": 1}, "nothing": {"VALUED": 0}}
+
+
+def session(ticks: Any, channels: int, ramp: int) -> int:
+    """Return the number of a session whose frame before time 0 had these trip times: shape (rows, columns)."""
+    rows, columns = ticks.shape
+    steps = -(-max(rows, 64) // channels)
+    crc = 0xFFFF_FFFF
+    for x in range(columns):
+        for y in (steps * channel + step for step in range(steps) for channel in range(channels)):
+            if y >= rows:
+                continue
+            count = int(ticks[y, x])
+            for byte in (count if count == NOT_RETURNED else min(count, ramp)).to_bytes(2, "little"):
+                crc ^= byte
+                for _ in range(8):
+                    crc = crc >> 1 ^ 0x82F6_3B78 * (crc & 1)
+    return ~crc & 0xFFFF
 
 
 def answers(serial: str) -> str:
@@ -30,6 +47,10 @@ class Pair:
     columns, rows, channels : int
     previous, intensity : str
         As of the emulated board.
+    first : uint16, shape (rows, columns), ticks, optional
+        Trip times of the frame before time 0, of which the session has its number.
+    version_2 : mapping, optional
+        Options of the emulated board's `Version2`, without its seed.
     **parameters : int
         Others of `Logic`.
     """
@@ -42,22 +63,40 @@ class Pair:
         *,
         previous: Any = "last_sent",
         intensity: Any = "value",
+        first: Any = None,
+        version_2: dict[str, int] | None = None,
         **parameters: Any,
     ) -> None:
         self.array = Array(rows, columns)
-        options = PREVIOUS[previous] | INTENSITY[intensity] | {"FAULT_CLOCKS": 5000} | parameters
+        self.version_2 = version_2 or {}
+        named = {name.upper(): value for name, value in self.version_2.items()}
+        options = PREVIOUS[previous] | INTENSITY[intensity] | {"FAULT_CLOCKS": 5000} | named | parameters
         self.logic = Logic(columns, rows, channels, **options)
-        registers = Registers(array=self.array, channels=channels)
-        self.board = Board(registers, self.array, previous=previous, intensity=intensity, queue=1 << 30)
+        self.options = {"previous": previous, "intensity": intensity, "queue": 1 << 30}
+        self.registers = Registers(array=self.array, channels=channels)
+        self.begin(np.zeros((rows, columns), np.uint16) if first is None else first)
+
+    def begin(self, first: Any) -> None:
+        """Begin a session: a new emulated board, and the logic after a reset and the frame before time 0."""
+        seed = session(first, self.registers.channels, self.registers.ramp)
+        version_2 = Version2(seed=seed, **self.version_2)
+        self.board = Board(self.registers, self.array, version_2=version_2, **self.options)
         self.expected: list[bytes] = []
         self.received: list[bytes] = []
         self.answers = self.board.greeting
         self.serial = ""
         #: The command that was sent and that the emulated board has not got yet: it acts at a frame's edge.
         self.waits = b""
-        # The frame before time 0 is not sent.
+        self.logic.call("invert", 0)
+        self.logic.call("lines", self.registers.lines)
+        self.logic.ticks(first)
         self.logic.edge()
         self.logic.edge()
+
+    def reset(self, first: Any) -> None:
+        """Reset the logic; nothing of the session before comes any more."""
+        self.logic.reset()
+        self.begin(first)
 
     def frame(self, ticks: Any, data: bytes = b"", after: int = 0) -> None:
         """Scan a frame; in it, `after` clocks from its edge on, the host begins to send one command."""
@@ -81,6 +120,12 @@ class Pair:
     def answered(self) -> bool:
         """Whether no command is on its way, nor an answer."""
         return not self.waits and self.answers == answers(self.serial)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the logic sent what the emulated board did, but for the last few that may still be on their way."""
+        count = len(self.received)
+        return self.received == self.expected[:count] and len(self.expected) - count < 4
 
     def finish(self) -> None:
         """Scan quiet frames until everything was sent."""

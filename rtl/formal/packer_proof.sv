@@ -1,6 +1,6 @@
 // The packer of version 1 behind a queue of two: whatever comes when, the bytes of a marked event are its fields, in order.
 //
-// The lowest bit of a stamp is its frame's here, so that the bytes show which frame an event is of.
+// All entries are of this version. The lowest bit of a stamp is its frame's here, so that the bytes show which frame an event is of.
 module packer_proof
   import taxel_types::*;
 (
@@ -23,7 +23,8 @@ module packer_proof
   always_comb begin
     entered = given;
     entered.frame = frame;
-    entered.stamp[0] = frame;
+    entered.at[0] = frame;
+    entered.kind = entry_kind_t'({1'b0, given.kind[0]});
   end
 
   assign push = begun && wants && !full;
@@ -33,7 +34,7 @@ module packer_proof
   );
 
   taxel_packer_v1 #(.MOST(MOST)) packer (
-      .clk, .reset(!begun), .ready, .oldest, .pop, .empty, .frame, .tdata, .tvalid, .tready, .tlast
+      .clk, .reset(!begun), .ready, .oldest, .allowed(1'b1), .busy(), .pop, .empty, .frame, .tdata, .tvalid, .tready, .tlast
   );
 
   // What goes out: which byte of a word, which word of an event, which word of a datagram.
@@ -54,15 +55,15 @@ module packer_proof
   assign moves = begun && tvalid && tready;
   assign word_over = at == 3'd4;
   assign event_over = word_over && (marker || second);
-  assign field = second ? marked_event.value : marked_event.stamp;
+  assign field = second ? marked_event.value : marked_event.at[15:0];
 
   always_comb begin
     case (at)
-      3'd0: wanted = {1'b1, marked_event.more, second, 1'b0, marked_event.marker, 1'b0, field[15:14]};
+      3'd0: wanted = {1'b1, marked_event.more, second, 1'b0, marked_event.kind == ENTRY_MARKER, 1'b0, field[15:14]};
       3'd1: wanted = {1'b0, field[13:7]};
       3'd2: wanted = {1'b0, field[6:0]};
-      3'd3: wanted = {2'b00, marked_event.x};
-      default: wanted = {2'b00, marked_event.y};
+      3'd3: wanted = {2'b00, marked_event.x[5:0]};
+      default: wanted = {2'b00, marked_event.y[5:0]};
     endcase
   end
 

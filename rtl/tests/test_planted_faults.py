@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 from test_totals import answered_and_counted
+from test_version_2 import OFTEN, written
 
 from logic import RTL
 from pair import Pair, answers
@@ -40,6 +41,24 @@ TOTALS = [
 ]
 
 
+#: Those of version 2 of the wire.
+VERSION_2 = [
+    ("taxel_packer_v2.sv", "8'(gap >> 6) - 8'd1", "8'(gap >> 6)"),
+    ("taxel_packer_v2.sv", "now.at - last <= RESTLESS", "now.at - last <= '0"),
+    ("taxel_packer_v2.sv", "|| position <= reached);", ");"),
+    ("taxel_line_sorter.sv", "oldest.x == gathering.x && ", ""),
+    ("taxel_refresh.sv", "line_start + BITS'(lines) + BITS'(1)", "line_start + BITS'(lines)"),
+    ("taxel_session.sv", "crc_32c(crc, count_before[7:0]), count_before[15:8]", "crc, count_before[7:0]"),
+    ("taxel_time_stamper.sv", "clocks_us == 7'(SHORT - 1)", "clocks_us == 7'(SHORT)"),
+    ("taxel_change_detector.sv", "if (store) again", "if (store && !of_judged.initial_frame) again"),
+    ("taxel_change_detector.sv", "found.at     = found.format", "found.at     = of_judged.format"),
+    ("taxel_datagram_sender.sv", "{now.line[2:0], STRIDE}", "{3'd0, STRIDE}"),
+    ("taxel_datagram_sender.sv", "if (at < body_end + 11'(SPAN)) crc", "if (at < body_end) crc"),
+    ("taxel_mux_ctrl.sv", "frame_sync: r.frame_sync}", "frame_sync: 1'b1}"),
+    ("taxel_mux_ctrl.sv", "r.ramp > 16'd255", "r.ramp > 16'd150"),
+]
+
+
 def plant(fault, to):
     """Write the sources with one edit."""
     file, there, instead = fault
@@ -65,8 +84,41 @@ def test_a_fault_of_the_totals_is_seen(fault, tmp_path):
     assert answered != counted
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", VERSION_2, ids=[f"{file[6:-3]}-{k}" for k, (file, _, _) in enumerate(VERSION_2)])
+def test_a_fault_of_version_2_is_seen(fault, tmp_path):
+    plant(fault, tmp_path)
+    assert differs_in_version_2(tmp_path)
+
+
 def test_the_sources_without_a_fault_are_not_taken_for_one():
     assert not differs(Pair(8, 8))
+    assert not differs_in_version_2(RTL)
+
+
+def differs_in_version_2(source) -> bool:
+    """Play frames in which every fault of version 2 shows; return whether the logic is told from the emulated board."""
+    rng = np.random.default_rng(4)
+    first = rng.integers(0, 150, (64, 3)).astype(np.uint16)
+    pair = Pair(3, 64, source=source, first=first, version_2=OFTEN)
+    held = pair.board.registers
+    parts = [
+        [],
+        [Command(0, 0b11000)],
+        [Command(4, 160)],
+        [Command(0, 0b10000)],
+        held.with_preset("2 kHz"),
+        [Command(0, 0b11000)],
+        [Command(4, 200)],
+        [Command(0, 8)],
+    ]
+    for part in parts:
+        written(pair, part if isinstance(part, list) else pair.board.registers.commands_to(part))
+        for _ in range(30):
+            moved = rng.random((64, 3)) < rng.choice([0.0, 0.02, 0.5])
+            pair.frame(np.where(moved, rng.integers(0, 600, (64, 3)), 0).astype(np.uint16), b"")
+    pair.finish()
+    return not (pair.agrees and answers(pair.serial) == pair.answers)
 
 
 def differs(pair: Pair) -> bool:

@@ -87,7 +87,9 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.Replay": plain(taxel.simulate.Replay, source=EVENTS, speed=1.0),
     "taxel.simulate.Replay.registers": method(taxel.simulate.Replay(EVENTS), "registers", preset="5.2 kHz"),
     "taxel.simulate.Board.command": fresh(taxel.simulate.Board, "command", data=bytes.fromhex("e000000000")),
-    "taxel.simulate.Board.frame": fresh(taxel.simulate.Board, "frame", ticks=np.zeros(4096, np.uint16), most=5),
+    "taxel.simulate.Board.frame": fresh(
+        taxel.simulate.Board, "frame", ticks=np.zeros(4096, np.uint16), most=5, accepted=np.ones(4096, bool)
+    ),
     "taxel.simulate.Board.record": fresh(taxel.simulate.Board, "record", start=True),
     "taxel.simulate.Pictures": plain(taxel.simulate.Pictures, values=np.zeros((3, 64, 64)), period_us=192.0),
     "taxel.simulate.Scene": plain(lambda **given: taxel.simulate.Scene(**given).motion(), parameters=SCENE.parameters),

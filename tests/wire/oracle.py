@@ -147,8 +147,8 @@ class Board:
     def lines(self) -> list[int]:
         lines = list(range(self.r.lines))
         if self.r.random_lines:
-            for k in range(len(lines) - 1, 0, -1):
-                place = self.draw() * (k + 1) // 65_536
+            for k in range(len(lines) - 1):
+                place = k + self.draw() * (len(lines) - k) // 65_536
                 lines[k], lines[place] = lines[place], lines[k]
         return lines
 

@@ -89,6 +89,8 @@ pub struct Board {
     counts: BoardCounts,
     /// The counts at the last reset.
     at_reset: BoardCounts,
+    /// How many markers were dropped since then: they count among what was dropped, but not as changes.
+    markers_dropped: u64,
     /// The counts in the last status lines, by fault.
     reported: [u64; 3],
 }
@@ -122,6 +124,7 @@ impl Board {
             refresh: Refresh::default(),
             counts: BoardCounts::default(),
             at_reset: BoardCounts::default(),
+            markers_dropped: 0,
             reported: [0; 3],
         })
     }
@@ -148,7 +151,7 @@ impl Board {
         let registers = Registers { wire_version: self.first_version, ..registers };
         self.session = self.session.wrapping_add(1);
         (self.written, self.active) = (registers, registers);
-        self.at_reset = self.counts;
+        (self.at_reset, self.markers_dropped) = (self.counts, 0);
         self.scan.reset();
         (self.time, self.refresh) = (0, Refresh::default());
         self.comparators.values.fill(0);

@@ -227,7 +227,7 @@ impl Header {
     pub fn of_stream(name: &str, stream: Stream, source: String, started_ns: i64) -> taxel_core::Result<Self> {
         stream.check(name)?;
         let columns = u16::try_from(stream.values().count()).unwrap_or(u16::MAX);
-        let array = Array::new(1, columns, 1.0, name)?;
+        let array = Array::unmeasured(1, columns, name);
         let board = Self::of_board(array, None, source, started_ns);
         let header = Self { name: name.to_owned(), stream: Some(stream), ..board };
         header.check()?;

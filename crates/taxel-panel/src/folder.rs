@@ -59,6 +59,16 @@ impl Folder {
         files
     }
 
+    /// The readouts by name: files that end in `readout.json`.
+    pub(super) fn readouts(&self) -> Vec<String> {
+        let names = std::fs::read_dir(&self.path).into_iter().flatten().flatten();
+        let mut names: Vec<_> = names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        names.retain(|name| name.ends_with("readout.json") && checked_name(name).is_ok());
+        names.sort_unstable();
+        names.truncate(MOST_LISTED);
+        names
+    }
+
     /// Path of a file in the folder, which need not exist.
     ///
     /// # Errors

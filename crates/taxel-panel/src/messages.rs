@@ -13,7 +13,10 @@ use super::live_source::LiveSource;
 pub(super) fn array(array: &Array) -> Value {
     let digit = |&exists: &bool| if exists { '1' } else { '0' };
     let exists = array.exists.as_ref().map(|all| all.iter().map(digit).collect::<String>());
-    json!({ "rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm, "name": array.name, "exists": exists })
+    // Pitch and places are as in files.
+    let mut sensor = json!(Array { exists: None, ..array.clone() });
+    sensor["exists"] = json!(exists);
+    sensor
 }
 
 /// A taxel that was zeroed.
@@ -36,6 +39,26 @@ pub(super) fn warning(text: impl std::fmt::Display) -> Value {
     json!({ "type": "warning", "text": text.to_string() })
 }
 
+/// Without any datagram for so long a source is quiet, ns.
+const QUIET_NS: i64 = 1_000_000_000;
+
+/// A source with heartbeats is lost after so many of the longest intervals between them, and after this time at least, ns.
+const MISSING_HEARTBEATS: i64 = 3;
+const LOST_NS: i64 = 500_000_000;
+
+/// Whether datagrams arrive, since when none do, and how long they may be missing.
+fn arrival(now: &Counters) -> Value {
+    let silent_ns = now.arrived_ns.map_or(0, |arrived_ns| (now_ns() - arrived_ns).max(0));
+    let lost_ns = now.heartbeat_us.map(|interval| (MISSING_HEARTBEATS * interval * 1000).max(LOST_NS));
+    let state = match (now.arrived_ns, lost_ns) {
+        (None, _) => "nothing",
+        (Some(_), Some(lost_ns)) if silent_ns > lost_ns => "lost",
+        (Some(_), None) if silent_ns > QUIET_NS => "quiet",
+        _ => "arriving",
+    };
+    json!({ "state": state, "since_ns": now.arrived_ns, "silent_s": silent_ns as f64 / 1e9, "heartbeat_us": now.heartbeat_us })
+}
+
 /// `counters` of a live source; rates are those of the last `seconds`, since the counters `before`.
 #[allow(clippy::cast_precision_loss)]
 pub(super) fn counters(
@@ -43,7 +66,7 @@ pub(super) fn counters(
     now: &Counters,
     before: Option<&Counters>,
     seconds: f64,
-    frame_us: f64,
+    frame_us: Option<f64>,
     clients: usize,
 ) -> Map<String, Value> {
     let rate = |now: u64, before: Option<u64>| before.map(|before| now.saturating_sub(before) as f64 / seconds);
@@ -57,7 +80,8 @@ pub(super) fn counters(
         "events_per_s": rate(now.events, before.map(|b| b.events)),
         "bytes_per_s": rate(now.capture.bytes, before.map(|b| b.capture.bytes)),
         "datagrams_per_s": rate(now.capture.datagrams, before.map(|b| b.capture.datagrams)),
-        "frames_per_s": 1e6 / frame_us,
+        "frames_per_s": frame_us.map(|frame_us| 1e6 / frame_us),
+        "arrival": arrival(now),
         "lost": {
             "kernel": now.capture.dropped_by_kernel,
             "queue": now.capture.dropped_by_queue,

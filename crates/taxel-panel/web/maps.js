@@ -46,13 +46,11 @@ class Map2D {
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
 
-  /** @param {number} rows @param {number} columns */
-  size(rows, columns) {
+  /** @param {number} rows @param {number} columns @param {number} aspect */
+  size(rows, columns, aspect) {
     [this.canvas.width, this.canvas.height] = [columns, rows];
-    // A sensor much longer than wide stays within the page, and one of few rows can be pointed at: its taxels are no squares then.
-    const aspect = String(Math.max(1 / 3, Math.min(8, columns / rows)));
-    this.frame.style.aspectRatio = aspect;
-    this.frame.parentElement?.style.setProperty("--aspect", aspect);
+    this.frame.style.aspectRatio = String(aspect);
+    part("maps", HTMLElement).style.setProperty("--aspect", String(aspect));
     this.image = new ImageData(columns, rows);
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
@@ -129,7 +127,7 @@ export class Maps {
     this.exists = exists;
     if (rows === this.rows && columns === this.columns) return;
     [this.rows, this.columns] = [rows, columns];
-    for (const map of [this.pressure, this.change]) map.size(rows, columns);
+    for (const map of [this.pressure, this.change]) map.size(rows, columns, this.aspect);
     this.rest = new Uint16Array(rows * columns).fill(UNKNOWN_VALUE);
     this.picture = null;
     this.health = null;
@@ -260,6 +258,14 @@ export class Maps {
     } else return;
     event.preventDefault();
     event.stopPropagation();
+  }
+
+  /**
+   * @returns {number} width over height of a map on the page; a sensor much longer than wide stays within it, and one of few rows
+   *   can be pointed at: its taxels are no squares then
+   */
+  get aspect() {
+    return Math.max(1 / 3, Math.min(8, this.columns / Math.max(1, this.rows)));
   }
 
   /** @param {[number, number] | null} taxel */

@@ -30,7 +30,7 @@ export const FIELDS = [
   { name: "line_read", manual: "row_read_duration", register: 2, low: 0, bits: 32, offset: 0, unit: "10 ns", default: 300, least: 1, greatest: 4294967295, text: "Part of line_period in which the line is read." },
   { name: "step_period", manual: "col_change_period", register: 3, low: 0, bits: 16, offset: 0, unit: "10 ns", default: 75, least: 1, greatest: 65535, text: "Time from one multiplexer step to the next." },
   { name: "step_read", manual: "col_read_duration", register: 3, low: 16, bits: 16, offset: 0, unit: "10 ns", default: 55, least: 1, greatest: 65535, text: "Part of step_period in which the channels are read." },
-  { name: "ramp", manual: "ramp_time", register: 4, low: 0, bits: 16, offset: 0, unit: "ticks", default: 150, least: 1, greatest: 65535, text: "Duration of the ramp." },
+  { name: "ramp", manual: "ramp_time", register: 4, low: 0, bits: 16, offset: 0, unit: "ticks", default: 150, least: 1, greatest: 65534, text: "Duration of the ramp." },
   { name: "threshold_rest", manual: "threshold_rest", register: 4, low: 16, bits: 16, offset: 0, unit: "1/1024", default: 0, least: 0, greatest: 65535, text: "FA-1: theta_0, in ticks after the power law." },
   { name: "threshold_decay", manual: "threshold_decay", register: 5, low: 0, bits: 8, offset: 0, unit: "1/1024 theta_0", default: 0, least: 0, greatest: 255, text: "FA-1: decrease of the threshold by a frame without a spike, B of Table 5.3." },
   { name: "noise_floor", manual: "noise_floor", register: 5, low: 8, bits: 8, offset: 0, unit: "ticks", default: 3, least: 0, greatest: 255, text: "Largest difference that does not cause an event." },
@@ -44,6 +44,7 @@ export const PRESETS = [
   { name: "5.2 kHz", sense_lines: 64, values: {} },
   { name: "2 kHz", sense_lines: 64, values: { line_period: 781, line_read: 780, step_period: 195, step_read: 175, ramp: 510, noise_floor: 10 } },
   { name: "20.8 kHz", sense_lines: 64, values: { line_period: 75, line_read: 75, channels: 64 } },
+  { name: "5.2 kHz, 64 channels", sense_lines: 64, values: { step_period: 300, step_read: 280, ramp: 825, noise_floor: 16, channels: 64 } },
   { name: "5.2 kHz, FA-1", sense_lines: 64, values: { mechanoreceptor: 1, threshold_rest: 33, threshold_jump: 983, threshold_decay: 51 } },
   { name: "128 x 128, 1 kHz", sense_lines: 128, values: { line_period: 781, line_read: 780, step_period: 390, step_read: 370, ramp: 1095, noise_floor: 22, lines: 128, channels: 64, wire_version: 2 } },
   { name: "128 x 128, 2 kHz", sense_lines: 128, values: { line_period: 390, line_read: 390, step_period: 195, step_read: 175, ramp: 510, noise_floor: 10, lines: 128, channels: 64, wire_version: 2 } },
@@ -77,6 +78,7 @@ export function refused(v) {
   if (step_read > step_period) broken.push({ rule: 1, text: `step_read ${us(step_read)} us is longer than step_period ${us(step_period)} us (rule 1)` });
   if (steps * step_period > line_read) broken.push({ rule: 2, text: `${steps} x step_period ${us(step_period)} us is longer than line_read ${us(line_read)} us (rule 2)` });
   if (ramp >= 3 * step_read) broken.push({ rule: 3, text: `ramp ${ramp} ticks is not shorter than step_read ${us(step_read)} us = ${3 * step_read} ticks (rule 3)` });
+  if (ramp + 3 > 3 * step_period) broken.push({ rule: 3, text: `ramp ${ramp} ticks leaves no 3 ticks of step_period ${us(step_period)} us = ${3 * step_period} ticks in which it falls (rule 3)` });
   if (channels + 10 > step_period) broken.push({ rule: 7, text: `step_period ${us(step_period)} us is too short for ${channels} channels: the logic compares one a clock and wants ${us(channels + 10)} us (rule 7)` });
   if (wire_version !== 2 && (driven_lines > 64 || sense_lines > 64)) broken.push({ rule: 8, text: `version 1 of the wire names 64 x 64 taxels, the array has ${sense_lines} x ${driven_lines}: choose version 2 (rule 8)` });
   return broken;
@@ -90,8 +92,9 @@ export function refused(v) {
 export function warned(v) {
   /** @type {BrokenRule[]} */
   const broken = [];
-  const { step_period, step_read, ramp, noise_floor } = v;
+  const { random_lines, step_period, step_read, ramp, noise_floor, lines } = v;
   if (step_period - step_read < 20) broken.push({ rule: 5, text: `step_period ${us(step_period)} us leaves ${us(step_period - step_read)} us before step_read ${us(step_read)} us: taxels settle in ${us(20)} us (rule 5)` });
+  if (random_lines * (2 * lines + 20) > step_period - step_read) broken.push({ rule: 5, text: `random_lines: ${us(step_period - step_read)} us before step_read: any of ${lines} lines settles in ${us(2 * lines + 20)} us (rule 5)` });
   if (noise_floor >= ramp) broken.push({ rule: 6, text: `noise_floor ${noise_floor} ticks is not below ramp ${ramp} ticks: no event can ever come (rule 6)` });
   return broken;
 }

@@ -340,8 +340,10 @@ impl WireBoard {
         py: Python<'py>,
         ticks: PyReadonlyArray1<'py, u16>,
         most: usize,
+        accepted: Option<PyReadonlyArray1<'py, bool>>,
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let (given, mut sent) = (slice("ticks", &ticks)?, vec![]);
+        let accepted = accepted.as_ref().map(|accepted| slice("accepted", accepted)).transpose()?;
         let datagrams = self.0.enter(py, |(board, crossed), stop| {
             let mut ticks = Cow::from(given);
             // One of another length is refused by the board.
@@ -350,7 +352,7 @@ impl WireBoard {
             {
                 crossed.read(board.registers(), ticks.to_mut(), stop)?;
             }
-            board.frame(&ticks, |datagram| {
+            board.frame_accepting(&ticks, accepted, |datagram| {
                 let room = sent.len() < most;
                 if room {
                     sent.push(datagram.to_vec());

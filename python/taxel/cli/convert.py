@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from taxel.cli._app import app
+from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import of_source
 
@@ -17,6 +17,7 @@ __all__ = ["convert"]
 
 
 @app.command()
+@with_out("target")
 @with_file_options
 def convert(
     source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],

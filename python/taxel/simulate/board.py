@@ -173,7 +173,7 @@ class Board:
         }
         self._core = _core.WireBoard(start._json(), self.array._parts(), json.dumps(options))
 
-    def frame(self, ticks: ArrayLike, *, most: int | None = None) -> list[bytes]:
+    def frame(self, ticks: ArrayLike, *, most: int | None = None, accepted: ArrayLike | None = None) -> list[bytes]:
         """Scan one frame; return the datagrams that went out.
 
         Parameters
@@ -183,6 +183,9 @@ class Board:
             one reads as that length; `NOT_RETURNED` is a fault.
         most : int, 0 or more, optional
             How many datagrams the network takes during this frame; the rest waits in the queue.
+        accepted : bool, shape as of `ticks`, optional
+            Taxels whose events find room in the queue; events of the others are dropped and counted. Left out, all
+            do as far as `queue` has room.
 
         Returns
         -------
@@ -190,7 +193,7 @@ class Board:
 
         Raises
         ------
-        ProblemError : not one trip time a taxel
+        ProblemError : not one trip time, or one flag, a taxel
 
         Examples
         --------
@@ -198,7 +201,9 @@ class Board:
         [1400]
         """
         at_most = 2**32 if most is None else whole("most", most, 0, 2**32)
-        return self._core.frame(numbers("ticks", ticks, np.uint16).reshape(-1), at_most)
+        given = numbers("ticks", ticks, np.uint16).reshape(-1)
+        flags = None if accepted is None else numbers("accepted", accepted, np.bool_).reshape(-1)
+        return self._core.frame(given, at_most, flags)
 
     def reset(self) -> None:
         """Reset it: registers, values and time as at the start, in a new session; what waits is still sent."""

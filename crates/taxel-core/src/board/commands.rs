@@ -1,6 +1,8 @@
 //! Commands of the host and the status lines that answer them.
 
 use super::Board;
+use super::refresh::totals;
+use crate::wire::v2::Status;
 use crate::wire::{Command, Registers};
 
 impl Board {
@@ -27,6 +29,12 @@ impl Board {
         let Command { register, value } = command;
         if register == 6 && value == 8 {
             return self.greeting().trim_end().to_owned();
+        }
+        if register == 6 && value == 9 {
+            let Status { frames, events, dropped, datagrams, faults } = self.totals();
+            return format!(
+                "status frames={frames} events={events} dropped={dropped} datagrams={datagrams} faults={faults}"
+            );
         }
         if register == 6 && value < 8 {
             return format!("ok REG{value}=0x{:08X}", self.written.word(value as u8));
@@ -55,8 +63,14 @@ impl Board {
         if self.active.wire_version == 2 {
             self.link.marker(self.now(), start, &mut self.counts);
         } else {
-            self.link.marker_word(self.time, start, &mut self.counts);
+            let queued = self.link.marker_word(self.time, start, &mut self.counts);
+            self.markers_dropped += u64::from(!queued);
         }
+    }
+
+    /// The totals since reset.
+    pub(super) fn totals(&self) -> Status {
+        totals(&self.counts, &self.at_reset, self.markers_dropped)
     }
 
     /// One status line for each kind of fault whose count has changed since the last call.

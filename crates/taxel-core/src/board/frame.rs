@@ -5,8 +5,14 @@ use super::asynchronous::{Asynchronous, Crossing, Sample};
 use super::comparator::NOT_RETURNED;
 use super::link::Found;
 use super::options::{IntensityWord, Previous};
-use super::refresh::totals;
 use crate::{Result, problem};
+
+/// What is given of a frame, by taxel: trip times, and whose events find room.
+#[derive(Clone, Copy)]
+struct Read<'a> {
+    ticks: &'a [u16],
+    accepted: Option<&'a [bool]>,
+}
 
 impl Board {
     /// Scans one frame and advances time by its length.
@@ -19,21 +25,41 @@ impl Board {
     /// # Errors
     ///
     /// `Problem` if the number of trip times is not that of taxels.
-    pub fn frame(&mut self, ticks: &[u16], mut sink: impl FnMut(&[u8]) -> bool) -> Result<()> {
+    pub fn frame(&mut self, ticks: &[u16], sink: impl FnMut(&[u8]) -> bool) -> Result<()> {
+        self.frame_accepting(ticks, None, sink)
+    }
+
+    /// [`Self::frame`], in which only these taxels' events find room; those of others are dropped and counted.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if the number of trip times or of flags is not that of taxels.
+    pub fn frame_accepting(
+        &mut self,
+        ticks: &[u16],
+        accepted: Option<&[bool]>,
+        mut sink: impl FnMut(&[u8]) -> bool,
+    ) -> Result<()> {
         if ticks.len() != self.array.len() {
             return Err(problem!("frame of {} trip times: the array has {} taxels", ticks.len(), self.array.len()));
         }
+        if let Some(accepted) = accepted
+            && accepted.len() != self.array.len()
+        {
+            return Err(problem!("accepted of {} taxels: the array has {}", accepted.len(), self.array.len()));
+        }
+        let read = Read { ticks, accepted };
         self.link.offer(&mut self.counts, &mut sink);
         self.take_over(&mut sink);
         let registers = self.active;
         let lines = self.scan.lines(&registers);
         let any = self.compare(ticks);
         if self.is_asynchronous() {
-            self.queue_crossings(any, ticks, &mut sink);
+            self.queue_crossings(any, read, &mut sink);
         } else if any {
             for (place, &x) in (0_u64..).zip(&lines) {
                 if self.comparators.line_changed[usize::from(x)] {
-                    self.line(x, self.time + place * u64::from(registers.line_period), ticks, &mut sink);
+                    self.line(x, self.time + place * u64::from(registers.line_period), read, &mut sink);
                 }
             }
         }
@@ -76,29 +102,29 @@ impl Board {
 
     /// Queues the events of one driven line: step by step, channel by channel. For version 2, with all events of a
     /// frame at one time, row by row, because the words' positions must ascend.
-    fn line(&mut self, x: u16, start: u64, ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
+    fn line(&mut self, x: u16, start: u64, read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
         let registers = self.active;
         if registers.wire_version == 2 && registers.frame_sync {
             for y in 0..self.array.rows {
-                self.taxel(self.time, (x, y), ticks, sink);
+                self.taxel(self.time, (x, y), read, sink);
             }
             return;
         }
         for k in 0..self.scan.sense_lines().len() {
             let (step, y) = self.scan.sense_lines()[k];
             let at = if registers.frame_sync { self.time } else { start + step * u64::from(registers.step_period) };
-            self.taxel(at, (x, y), ticks, sink);
+            self.taxel(at, (x, y), read, sink);
         }
     }
 
     /// Queues the event of a taxel, if it has one.
-    fn taxel(&mut self, at: u64, (x, y): (u16, u16), ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
+    fn taxel(&mut self, at: u64, (x, y): (u16, u16), read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
         let registers = self.active;
         let taxel = self.array.index(x, y);
         if !self.comparators.changed[taxel] || !self.exists(taxel) {
             return;
         }
-        let (value, before) = (ticks[taxel].min(registers.ramp), self.comparators.values[taxel]);
+        let (value, before) = (read.ticks[taxel].min(registers.ramp), self.comparators.values[taxel]);
         let (p, intensity) = if registers.mechanoreceptor {
             self.afferents.spike(taxel)
         } else {
@@ -107,15 +133,16 @@ impl Board {
                 IntensityWord::Difference => (value >= before, value.abs_diff(before)),
             }
         };
-        if self.enqueue(Found { at, x, y, p, intensity }, sink) && !registers.mechanoreceptor {
+        if self.enqueue(Found { at, x, y, p, intensity }, read, sink) && !registers.mechanoreceptor {
             self.comparators.values[taxel] = value;
         }
     }
 
     /// Finds the crossings of taxels that compare by themselves, and queues those before this frame.
-    fn queue_crossings(&mut self, any: bool, ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
+    fn queue_crossings(&mut self, any: bool, read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) {
         let Some(mut asynchronous) = self.asynchronous.take() else { return };
         let (registers, columns, new) = (self.active, usize::from(self.array.columns), asynchronous.is_new());
+        let ticks = read.ticks;
         if any {
             for taxel in (0..ticks.len()).filter(|&taxel| self.comparators.changed[taxel]) {
                 let (x, y) = ((taxel % columns) as u16, (taxel / columns) as u16);
@@ -129,22 +156,26 @@ impl Board {
             }
         }
         // A taxel whose comparator has not returned keeps its last reading.
-        let read =
+        let now =
             ticks.iter().zip(&self.comparators.values).map(|(&t, &value)| if t == NOT_RETURNED { value } else { t });
-        let due = asynchronous.end_frame(self.time, read.map(|t| t.min(registers.ramp)));
+        let due = asynchronous.end_frame(self.time, now.map(|t| t.min(registers.ramp)));
         self.asynchronous = Some(asynchronous);
         // At reset, the events of all taxels are in the first frame itself.
         debug_assert!(!new || due.is_empty());
         for Crossing { at, x, y, p, value, moved } in due {
             let intensity = if self.intensity == IntensityWord::Difference { moved } else { value };
-            self.enqueue(Found { at, x, y, p, intensity }, sink);
+            self.enqueue(Found { at, x, y, p, intensity }, read, sink);
         }
     }
 
     /// Queues an event on the active version of the wire; returns false if the queue was full and the event was
     /// dropped.
-    fn enqueue(&mut self, found: Found, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
+    fn enqueue(&mut self, found: Found, read: Read<'_>, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
         self.counts.changes += 1;
+        if read.accepted.is_some_and(|accepted| !accepted[self.array.index(found.x, found.y)]) {
+            self.link.refuse(&mut self.counts);
+            return false;
+        }
         if self.active.wire_version == 2 {
             return self.link.pack(found, &mut self.counts, sink);
         }
@@ -155,21 +186,21 @@ impl Board {
     /// Sends what is due at the end of a frame: all words of version 1; for version 2 events, promises, states and
     /// totals.
     fn end_frame(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
+        let every = self.version_2.states_us * 100;
+        if every > 0 {
+            self.refresh.frame(&self.active, every);
+        }
         if self.active.wire_version == 1 {
             self.link.flush_words(&mut self.counts, sink);
             return;
         }
         let (now, next) = (self.now(), self.now() + self.active.frame_10ns() / 100);
         self.link.end_frame((now, next), &mut self.counts, sink);
-        let every = self.version_2.states_us * 100;
-        if every == 0 {
-            return;
-        }
-        for x in self.refresh.lines(self.time, every, &self.active) {
+        if let Some(x) = self.refresh.line(&self.active) {
             self.repeat(x, now, sink);
         }
-        if self.refresh.totals(self.time, every) {
-            let status = totals(&self.counts, &self.at_reset);
+        if self.refresh.totals() {
+            let status = self.totals();
             self.link.status(now, &status, &mut self.counts, sink);
         }
     }

@@ -93,10 +93,10 @@ impl Link {
         self.enqueue(&words[..if valued { 2 } else { 1 } * WORD_BYTES], counts, sink)
     }
 
-    /// Queues a marker of version 1.
-    pub(super) fn marker_word(&mut self, at: u64, start: bool, counts: &mut BoardCounts) {
+    /// Queues a marker of version 1; returns false if the queue was full and the marker was dropped.
+    pub(super) fn marker_word(&mut self, at: u64, start: bool, counts: &mut BoardCounts) -> bool {
         let word = Word::Marker { stamp: stamp(at), start };
-        self.enqueue(&word.to_bytes(), counts, &mut |_| false);
+        self.enqueue(&word.to_bytes(), counts, &mut |_| false)
     }
 
     /// Queues the words of a taxel, or a marker; returns false if the queue was full and they were dropped.
@@ -124,6 +124,12 @@ impl Link {
         }
     }
 
+    /// Drops an event that finds no room.
+    pub(super) fn refuse(&mut self, counts: &mut BoardCounts) {
+        counts.dropped += 1;
+        self.packer.dropped();
+    }
+
     /// Queues an event of version 2; returns false if the queue was full and the event was dropped.
     pub(super) fn pack(
         &mut self,
@@ -133,8 +139,7 @@ impl Link {
     ) -> bool {
         let Self { capacity, packer, queue, .. } = self;
         if queue.words + EVENT_WORDS * packer.waiting() + EVENT_WORDS > *capacity {
-            counts.dropped += 1;
-            packer.dropped();
+            self.refuse(counts);
             return false;
         }
         counts.words += EVENT_WORDS as u64;

@@ -4,42 +4,56 @@ use super::counts::BoardCounts;
 use crate::wire::Registers;
 use crate::wire::v2::Status;
 
-/// How much was repeated since reset.
+/// What a board repeats: a line each time that its share of the period is over, the totals each time that the period is.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Refresh {
-    /// Number of times that the totals were sent.
-    totals: u64,
-    /// Number of lines repeated, over all passes of the array.
-    lines: u64,
+    /// Time since a line was last due, 10 ns, times the number of lines; and whether one is due.
+    since_line: u64,
+    line_due: bool,
+    /// Line that is repeated next.
+    line: u16,
+    /// The same of the totals.
+    since_totals: u64,
+    totals_due: bool,
 }
 
 impl Refresh {
-    /// The driven lines whose values are due at `time` (10 ns), if all lines are repeated once in `every` (10 ns).
-    ///
-    /// If a frame is longer than the period, each line is repeated once per frame.
-    pub(super) fn lines(&mut self, time: u64, every: u64, registers: &Registers) -> impl Iterator<Item = u16> + use<> {
-        let lines = u64::from(registers.lines);
-        let due = (u128::from(time) * u128::from(lines) / u128::from(every)) as u64;
-        let from = std::mem::replace(&mut self.lines, due).max(due.saturating_sub(lines));
-        (from..due).map(move |line| (line % lines) as u16)
+    /// Advances by a frame, if all lines are repeated once in `every` (10 ns).
+    pub(super) fn frame(&mut self, registers: &Registers, every: u64) {
+        let passed = registers.frame_10ns();
+        self.since_line += passed * u64::from(registers.lines);
+        self.line_due |= self.since_line >= every;
+        self.since_line %= every;
+        self.since_totals += passed;
+        self.totals_due |= self.since_totals >= every;
+        self.since_totals %= every;
     }
 
-    /// Whether the totals are due at `time` (10 ns).
-    pub(super) fn totals(&mut self, time: u64, every: u64) -> bool {
-        let (due, sent) = (time / every, self.totals);
-        self.totals = due.max(sent);
-        due > sent
+    /// The line to repeat at the end of this frame: one at most, so that logic can do it.
+    pub(super) fn line(&mut self, registers: &Registers) -> Option<u16> {
+        if !std::mem::take(&mut self.line_due) {
+            return None;
+        }
+        let line = if self.line < registers.lines { self.line } else { 0 };
+        self.line = (line + 1) % registers.lines;
+        Some(line)
+    }
+
+    /// Whether the totals are sent at the end of this frame.
+    pub(super) fn totals(&mut self) -> bool {
+        std::mem::take(&mut self.totals_due)
     }
 }
 
-/// The totals since reset; the packer fills in the number of datagrams before this one.
-pub(super) fn totals(now: &BoardCounts, at_reset: &BoardCounts) -> Status {
+/// The totals since reset, in which `markers` of what was dropped were no events. In a datagram the packer replaces the
+/// number of datagrams by those before it.
+pub(super) fn totals(now: &BoardCounts, at_reset: &BoardCounts, markers: u64) -> Status {
     let dropped = now.dropped - at_reset.dropped;
     Status {
         frames: now.frames - at_reset.frames,
-        events: (now.changes - at_reset.changes).saturating_sub(dropped),
+        events: now.changes - at_reset.changes + markers - dropped,
         dropped,
-        datagrams: 0,
+        datagrams: now.datagrams - at_reset.datagrams,
         faults: now.not_returned - at_reset.not_returned,
     }
 }

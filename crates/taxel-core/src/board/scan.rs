@@ -60,10 +60,12 @@ impl Lfsr {
         self.0
     }
 
-    /// Shuffles lines (Fisher and Yates, from the last position down; position = word x (k + 1) >> 16).
+    /// Shuffles lines (Fisher and Yates, from the first position up, so that logic can draw line by line; the n - k lines
+    /// from position k on change places with k by k + (word x (n - k) >> 16)).
     fn shuffle(&mut self, lines: &mut [u16]) {
-        for k in (1..lines.len()).rev() {
-            let place = (usize::from(self.draw()) * (k + 1)) >> 16;
+        let n = lines.len();
+        for k in 0..n.saturating_sub(1) {
+            let place = k + ((usize::from(self.draw()) * (n - k)) >> 16);
             lines.swap(k, place);
         }
     }

@@ -102,6 +102,63 @@ fn random_lines_visit_each_line_once_a_frame_in_an_order_of_its_own() {
     }
 }
 
+/// The order of lines as `docs/readings.md` words it.
+fn drawn(word: &mut u16, lines: u16) -> Vec<u16> {
+    let mut order: Vec<u16> = (0..lines).collect();
+    for k in 0..usize::from(lines) - 1 {
+        for _ in 0..16 {
+            let taps = [0, 2, 3, 5].map(|bit| *word >> bit & 1);
+            *word = *word >> 1 | taps.iter().sum::<u16>() % 2 << 15;
+        }
+        let left = usize::from(lines) - k;
+        order.swap(k, k + (usize::from(*word) * left >> 16));
+    }
+    order
+}
+
+#[test]
+fn the_random_order_is_drawn_line_by_line() {
+    let registers = Registers { random_lines: true, noise_floor: 0, ..Registers::default() };
+    let (mut board, mut word) = (Board::new(registers, &Array::thesis()).unwrap(), 0xace1);
+    for frame in 0..20_u16 {
+        let (events, _) = decode(&play(&mut board, &[frame + 1; 4096]).concat(), Array::thesis(), Pairing::Direct);
+        let order: Vec<u16> = events.x.chunks(64).map(|line| line[0]).collect();
+        assert_eq!(order, drawn(&mut word, 64), "frame {frame}");
+    }
+}
+
+#[test]
+fn totals_count_since_reset_and_markers_among_what_was_dropped() {
+    let mut board = board().queue(1000);
+    let nine = Command { register: 6, value: 9 }.to_bytes();
+    let mut ticks = [100; 4096];
+    ticks[9] = NOT_RETURNED;
+    board.frame(&ticks, |_| false).unwrap();
+    board.record(true);
+    assert_eq!(board.command(&nine), "status frames=1 events=500 dropped=3596 datagrams=0 faults=1\n");
+    board.frame(&ticks, |_| true).unwrap();
+    let counts = *board.counts();
+    let expected = format!("status frames=2 events=4095 dropped=3596 datagrams={} faults=2\n", counts.datagrams);
+    assert_eq!(board.command(&nine), expected);
+    board.reset().unwrap();
+    assert_eq!(board.command(&nine), "status frames=0 events=0 dropped=0 datagrams=0 faults=0\n");
+}
+
+#[test]
+fn only_events_of_accepted_taxels_find_room() {
+    for wire_version in [1, 2] {
+        let mut board = Board::new(Registers { wire_version, ..Registers::default() }, &Array::thesis()).unwrap();
+        let accepted: Vec<bool> = (0..4096).map(|taxel| taxel % 3 == 0).collect();
+        board.frame_accepting(&[100; 4096], Some(&accepted), |_| true).unwrap();
+        let counts = *board.counts();
+        assert_eq!((counts.changes, counts.dropped), (4096, 4096 - 1366), "version {wire_version}");
+        // The others still differ.
+        board.frame(&[100; 4096], |_| true).unwrap();
+        assert_eq!(board.counts().changes, 2 * 4096 - 1366);
+        assert!(board.frame_accepting(&[0; 4096], Some(&[true]), |_| true).is_err());
+    }
+}
+
 #[test]
 fn a_full_queue_drops_both_words_of_a_taxel_and_counts_them() {
     let mut board = board().queue(1000);
@@ -123,7 +180,8 @@ fn commands_are_answered_and_taken_over_at_a_frames_edge() {
     assert_eq!(board.command(&write(4, 165)), "bad REG4 rule 3\n");
     assert_eq!(board.command(&write(6, 4)), "ok REG4=0x000000A0\n");
     assert_eq!(board.command(&write(6, 8)), board.greeting());
-    assert_eq!(board.command(&write(6, 9)), "bad REG6 rule 4\n");
+    assert_eq!(board.command(&write(6, 9)), "status frames=0 events=0 dropped=0 datagrams=0 faults=0\n");
+    assert_eq!(board.command(&write(6, 10)), "bad REG6 rule 4\n");
     assert_eq!(
         board.command(&[write(5, 0x003f_0a00), write(6, 5)].concat()),
         "ok REG5=0x003F0A00\nok REG5=0x003F0A00\n"

@@ -133,7 +133,7 @@ pub(super) const FIELDS: [Field; 16] = [
         mask: 0xffff,
         offset: 0,
         least: 1,
-        greatest: 65535,
+        greatest: 65534,
     },
     Field {
         name: "threshold_rest",

@@ -14,7 +14,7 @@ pub struct Preset {
 }
 
 /// The presets, in the order of the reference; a board's registers at reset are the first preset for its array's size.
-pub const PRESETS: [Preset; 8] = [
+pub const PRESETS: [Preset; 9] = [
     Preset {
         name: "5.2 kHz",
         sense_lines: 64,
@@ -79,6 +79,29 @@ pub const PRESETS: [Preset; 8] = [
             threshold_rest: 0,
             threshold_decay: 0,
             noise_floor: 3,
+            lines: 64,
+            record: false,
+            channels: 64,
+        },
+    },
+    Preset {
+        name: "5.2 kHz, 64 channels",
+        sense_lines: 64,
+        registers: Registers {
+            random_lines: false,
+            mechanoreceptor: false,
+            invert_comparator: false,
+            frame_sync: true,
+            wire_version: 1,
+            threshold_jump: 0,
+            line_period: 300,
+            line_read: 300,
+            step_period: 300,
+            step_read: 280,
+            ramp: 825,
+            threshold_rest: 0,
+            threshold_decay: 0,
+            noise_floor: 16,
             lines: 64,
             record: false,
             channels: 64,

@@ -53,6 +53,17 @@ pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, S
             ),
         ));
     }
+    if ramp + 3 > 3 * step_period {
+        return Some((
+            3,
+            format!(
+                "ramp {} ticks leaves no 3 ticks of step_period {} us = {} ticks in which it falls (rule 3)",
+                ramp,
+                us(step_period),
+                3 * step_period
+            ),
+        ));
+    }
     if channels + 10 > step_period {
         return Some((
             7,
@@ -79,10 +90,12 @@ pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, S
 /// Warnings about values that are allowed but probably a mistake.
 pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {
     let mut warnings = vec![];
+    let random_lines = i64::from(registers.random_lines);
     let step_period = i64::from(registers.step_period);
     let step_read = i64::from(registers.step_read);
     let ramp = i64::from(registers.ramp);
     let noise_floor = i64::from(registers.noise_floor);
+    let lines = i64::from(registers.lines);
     if step_period - step_read < 20 {
         warnings.push((
             5,
@@ -92,6 +105,17 @@ pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {
                 us(step_period - step_read),
                 us(step_read),
                 us(20)
+            ),
+        ));
+    }
+    if random_lines * (2 * lines + 20) > step_period - step_read {
+        warnings.push((
+            5,
+            format!(
+                "random_lines: {} us before step_read: any of {} lines settles in {} us (rule 5)",
+                us(step_period - step_read),
+                lines,
+                us(2 * lines + 20)
             ),
         ));
     }

@@ -41,13 +41,13 @@ fn a_preset_leaves_what_it_does_not_say() {
         Registers::presets(&array, channels).map(|preset| preset.name).collect::<Vec<_>>()
     };
     assert_eq!(of(8, 16), ["5.2 kHz", "2 kHz", "5.2 kHz, FA-1"]);
-    assert_eq!(of(64, 64), ["20.8 kHz"]);
+    assert_eq!(of(64, 64), ["20.8 kHz", "5.2 kHz, 64 channels"]);
     assert_eq!(of(128, 16), ["128 x 128, 1.3 kHz"]);
 }
 
 #[test]
 fn presets_keep_the_rules_and_their_rates() {
-    let rates = [5208.33, 2000.64, 20_833.3, 5208.33, 1000.32, 2003.21, 5208.33, 1302.08];
+    let rates = [5208.33, 2000.64, 20_833.3, 5208.33, 5208.33, 1000.32, 2003.21, 5208.33, 1302.08];
     for (Preset { name, sense_lines, registers }, rate) in PRESETS.iter().zip(rates) {
         let array = Array::new(*sense_lines, *sense_lines, 1.0, "of the preset's size").unwrap();
         assert_eq!(registers.check(&array), Ok(()), "{name}");
@@ -108,6 +108,12 @@ fn every_rule_refuses_with_its_numbers_and_keeps_the_old_value() {
             165,
             3,
             "ramp 165 ticks is not shorter than step_read 0.55 us = 165 ticks (rule 3); the board keeps ramp 150 ticks",
+        ),
+        (
+            3,
+            55 << 16 | 51,
+            1,
+            "step_read 0.55 us is longer than step_period 0.51 us (rule 1); the board keeps step_period 0.75 us, step_read 0.55 us",
         ),
         (4, 0, 4, "ramp is 0: must be 1 or more (rule 4); the board keeps ramp 150 ticks"),
         (7, 1, 4, "REG7=0x00000001 sets reserved bits: they must be 0 (rule 4)"),

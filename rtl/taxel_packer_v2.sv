@@ -1,0 +1,348 @@
+// Datagrams of version 2 of the wire: what comes out of the queue becomes bodies in a buffer of two banks, each with a header.
+//
+// A body is written as units of 16 bits. What a datagram holds, and when it ends, is as of the emulated board's packer: an
+// event that does not fit ends it, so does the end of a frame, unless events are held for later ones.
+module taxel_packer_v2
+  import taxel_types::*;
+#(
+    parameter int ROWS = 64,
+    parameter bit VALUED = 1'b1,
+    parameter bit DIFFERENCE = 1'b0,
+    parameter int HOLD_US = 0,          // for how long an event may wait for others
+    parameter int HEARTBEAT_US = 10_000 // between promises that nothing has happened
+) (
+    input  logic        clk,
+    input  logic        reset,
+    input  logic        valid,        // an entry, by ascending rows within a line
+    input  event_t      entry,
+    output logic        taken,
+    input  logic        leaving,      // an entry of version 1 is next
+    output logic        idle,         // no event waits, nor a datagram
+    // What is repeated.
+    input  logic        states_ready,
+    input  logic [6:0]  repeated_line,
+    output logic [6:0]  row_repeated,
+    input  logic [15:0] value_repeated,
+    output logic        states_sent,
+    input  totals_t     totals,
+    output logic        totals_sent,
+    // The buffer and the header of what is in it.
+    output logic        write,
+    output logic        bank,
+    output logic [9:0]  place,
+    output logic [15:0] unit,
+    output logic        send,         // one clock
+    output datagram_t   datagram,
+    input  logic        sending       // the datagram before has not gone
+);
+
+  localparam int STRIDE = ROWS > 1 ? $clog2(ROWS) : 0;
+  localparam int MOST = 688;         // units of a body: 1376 bytes
+  localparam micros_t LATEST = 48'd32_511;
+  localparam micros_t RESTLESS = 48'd100_000;
+  localparam micros_t LONGEST = 48'd65_535;
+  localparam logic [14:0] FAR = 15'h7FFF;  // skip of the control words of 15 bits, and of 7
+  localparam logic [6:0] NEAR = 7'h7F;
+
+  typedef enum logic [3:0] {
+    IDLE,
+    WEIGH,    // where an event lies, seen from the one before
+    PLACE,    // whether it fits
+    WRITE,    // units of a word, or of a marker
+    CLOSE,    // what was gathered is sent
+    BEYOND,   // a promise of more than 16 bits: an empty datagram with a later base
+    OVER,     // the end of a frame
+    BEAT,     // a promise alone
+    REPEAT,   // a line's values
+    TOTALS,   // the board's totals
+    SEND,     // a datagram without events
+    NEXT      // what else an entry asks for
+  } state_t;
+
+  state_t state, after;
+  event_t now;
+  format_t format;
+  logic gathered, flag, lost, any, again, late;
+  logic [9:0] units;
+  micros_t base, at, promised, last, since, span, quiet;
+  logic [6:0] line;
+  logic signed [15:0] position, reached;
+  logic [14:0] gap;
+  logic [31:0] sequence_number;
+  logic states, totals_due;
+  logic [7:0] row;
+  logic [4:0] word;
+  logic fetching;
+
+  // Units that wait to be written, the first in the lowest bits.
+  logic [6:0][15:0] waiting;
+  logic [2:0] left;
+
+  function automatic logic [47:0] at_most(micros_t t);
+    return t < LONGEST ? t : LONGEST;
+  endfunction
+
+  assign position = 16'(now.x) << STRIDE | 16'(now.y);
+  assign taken = state == IDLE && valid;
+  assign idle  = state == IDLE && !gathered && !valid && !send && !sending;
+  assign row_repeated = row[6:0];
+
+  // An event as units.
+  logic narrow, jumps;
+  logic [6:0][15:0] units_of;
+  logic [2:0] count_of;
+  logic [7:0] value_8;
+  logic [15:0] gap_16;
+  logic [14:0] rest;
+
+  assign narrow   = VALUED && !format.wide_values;
+  assign jumps   = narrow && gap >= 15'(NEAR);
+  assign rest    = jumps ? 15'(gap[5:0]) : gap;
+  assign value_8 = now.value > 16'd255 ? 8'd255 : now.value[7:0];
+  assign gap_16  = {now.more, rest};
+
+  always_comb begin
+    units_of = '0;
+    if (narrow) begin
+      units_of[0] = {now.more, rest[6:0], value_8};
+      count_of = 3'd1;
+      if (jumps) begin
+        units_of = {units_of[5:0], {1'b0, NEAR, 8'(gap >> 6) - 8'd1}};
+        count_of = count_of + 3'd1;
+      end
+      if (again) begin
+        units_of = {units_of[4:0], 16'(now.at - base), {1'b1, NEAR, 8'd0}};
+        count_of = count_of + 3'd2;
+      end
+    end else if (VALUED) begin
+      units_of[1:0] = {gap_16, now.value};
+      count_of = 3'd2;
+      if (again) begin
+        units_of = {units_of[2:0], 16'd0, 16'(now.at - base), {1'b1, FAR}, 16'd0};
+        count_of = 3'd6;
+      end
+    end else begin
+      units_of[0] = gap_16;
+      count_of = 3'd1;
+      if (again) begin
+        units_of = {units_of[4:0], 16'(now.at - base), {1'b1, FAR}};
+        count_of = 3'd3;
+      end
+    end
+  end
+
+  // Totals as units, the lowest first.
+  logic [319:0] all_totals;
+  assign all_totals = {16'd0, totals.faults, 32'd0, sequence_number, 16'd0, totals.dropped, 16'd0, totals.events,
+                       16'd0, totals.frames};
+
+  logic [3:0] kind;  // of events
+  assign kind = !VALUED ? 4'd0 : narrow ? 4'd1 : 4'd2;
+
+  task automatic header(logic [3:0] of_kind, micros_t from, logic [6:0] from_line, logic [15:0] promise,
+                        logic [9:0] length, logic dropped);
+    send     <= 1'b1;
+    datagram <= '{
+        kind: of_kind,
+        frame_sync: format.frame_sync,
+        differences: DIFFERENCE && of_kind < 4'd6,
+        dropped: dropped,
+        sequence_number: sequence_number,
+        base: from,
+        line: from_line,
+        span: promise,
+        units: length,
+        bank: bank
+    };
+    sequence_number <= sequence_number + 32'd1;
+    bank            <= !bank;
+    units           <= '0;
+  endtask
+
+  always_ff @(posedge clk) begin
+    write       <= 1'b0;
+    send        <= 1'b0;
+    states_sent <= 1'b0;
+    totals_sent <= 1'b0;
+    // Of the clock before: they stand while they are used.
+    since <= now.at - base;
+    quiet <= now.at - promised;
+    late  <= now.at - base > LATEST;
+    case (state)
+      IDLE: begin
+        if (valid) begin
+          now        <= entry;
+          lost       <= lost || entry.lost;
+          states     <= entry.states;
+          totals_due <= entry.totals;
+          state      <= entry.kind == ENTRY_EVENT ? WEIGH : OVER;
+          if (!gathered) format <= entry.format;
+        end else if (leaving && gathered) begin
+          now.kind           <= ENTRY_FLUSH;
+          now.at             <= at;
+          {states, totals_due} <= '0;
+          state              <= OVER;
+        end
+      end
+      WEIGH: begin
+        again <= gathered && (now.at != at || position <= reached);
+        if (!gathered) gap <= 15'(now.y);
+        else if (now.at != at || position <= reached) gap <= 15'(position);
+        else gap <= 15'(position - reached - 16'sd1);
+        state <= PLACE;
+        if (gathered && now.format != format) begin
+          // What waits has its own format: it is sent first.
+          state <= CLOSE;
+          after <= WEIGH;
+        end else begin
+          format <= now.format;
+        end
+      end
+      PLACE: begin
+        if (gathered && (late || units + 10'(count_of) > 10'(MOST))) begin
+          state <= CLOSE;
+          after <= WEIGH;
+        end else begin
+          if (!gathered) begin
+            gathered <= 1'b1;
+            base     <= now.at;
+            line     <= now.x;
+            flag     <= lost;
+            lost     <= 1'b0;
+          end
+          at      <= now.at;
+          reached  <= position;
+          last    <= now.at;
+          any     <= 1'b1;
+          write   <= 1'b1;
+          place   <= units;
+          unit    <= units_of[0];
+          units   <= units + 10'd1;
+          waiting <= units_of >> 16;
+          left    <= count_of - 3'd1;
+          state   <= count_of == 3'd1 ? IDLE : WRITE;
+          after   <= IDLE;
+        end
+      end
+      WRITE: begin
+        write   <= 1'b1;
+        place   <= units;
+        unit    <= waiting[0];
+        units   <= units + 10'd1;
+        waiting <= waiting >> 16;
+        left    <= left - 3'd1;
+        if (left == 3'd1) state <= after;
+      end
+      OVER: begin
+        // The clock in which `since` and `quiet` are computed.
+        after <= NEXT;
+        state <= BEAT;
+      end
+      BEAT: begin
+        state <= NEXT;
+        if (gathered) begin
+          if (now.kind != ENTRY_FRAME || HOLD_US == 0 || since + micros_t'(length_of(now)) > micros_t'(HOLD_US)
+              || states || totals_due) state <= CLOSE;
+        end else if (now.kind == ENTRY_FRAME && now.at > promised
+            && ((any && now.at - last <= RESTLESS) || quiet >= micros_t'(HEARTBEAT_US))) begin
+          base  <= now.at - at_most(quiet);
+          span  <= at_most(quiet);
+          state <= SEND;
+        end
+      end
+      SEND: begin
+        if (!sending && !send) begin
+          header(kind, base, 7'd0, 16'(span), 10'd0, lost);
+          lost     <= 1'b0;
+          promised <= now.at;
+          state    <= after;
+        end
+      end
+      CLOSE: begin
+        if (!sending && !send) begin
+          header(kind, base, line, 16'(at_most(since)), units, flag);
+          gathered <= 1'b0;
+          if (base + at_most(since) > promised) promised <= base + at_most(since);
+          state <= after;
+          if (since > LONGEST) begin
+            base  <= now.at - LONGEST;
+            span  <= LONGEST;
+            state <= SEND;
+          end
+        end
+      end
+      NEXT: begin
+        row  <= '0;
+        word <= '0;
+        fetching <= 1'b1;
+        if (now.kind == ENTRY_MARKER) begin
+          waiting  <= {48'd0, 16'd0, now.more ? 16'd1 : 16'd2, 16'd0, 16'd0};
+          left     <= 3'd4;
+          now.kind <= ENTRY_FLUSH;
+          after    <= BEYOND;
+          state    <= WRITE;
+        end else if (states) begin
+          if (states_ready) state <= REPEAT;
+        end else if (totals_due) begin
+          state <= TOTALS;
+        end else begin
+          state <= IDLE;
+        end
+      end
+      BEYOND: begin
+        // A marker has been written.
+        if (!sending && !send) begin
+          header(4'd3, now.at, 7'd0, 16'd0, units, lost);
+          lost  <= 1'b0;
+          state <= IDLE;
+        end
+      end
+      REPEAT: begin
+        // A value comes a clock after its row is asked for.
+        fetching <= 1'b0;
+        if (32'(row) == ROWS) begin
+          if (!sending && !send) begin
+            header(narrow ? 4'd6 : 4'd7, now.at, repeated_line, 16'd0, units, lost);
+            lost        <= 1'b0;
+            states      <= 1'b0;
+            states_sent <= 1'b1;
+            state       <= NEXT;
+          end
+        end else if (!fetching) begin
+          waiting[1] <= '0;
+          waiting[0] <= narrow ? {8'd0, value_repeated > 16'd255 ? 8'd255 : value_repeated[7:0]} : value_repeated;
+          left       <= narrow ? 3'd1 : 3'd2;
+          row        <= row + 8'd1;
+          after      <= REPEAT;
+          fetching   <= 1'b1;
+          state      <= WRITE;
+        end
+      end
+      default: begin  // TOTALS
+        if (word == 5'd20) begin
+          if (!sending && !send) begin
+            header(4'd4, now.at, 7'd0, 16'd0, units, lost);
+            lost        <= 1'b0;
+            totals_due  <= 1'b0;
+            totals_sent <= 1'b1;
+            state       <= NEXT;
+          end
+        end else begin
+          write <= 1'b1;
+          place <= units;
+          unit  <= 16'(all_totals >> (16 * word));
+          units <= units + 10'd1;
+          word  <= word + 5'd1;
+        end
+      end
+    endcase
+    if (reset) begin
+      {gathered, lost, any, bank, write, send, states_sent, totals_sent} <= '0;
+      sequence_number <= '0;
+      promised        <= '0;
+      units           <= '0;
+      state           <= IDLE;
+    end
+  end
+
+endmodule

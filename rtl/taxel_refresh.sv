@@ -1,0 +1,36 @@
+// When a board of version 2 repeats a line's values and its totals: all lines once in EVERY clocks.
+//
+// Both flags say at a frame's start whether they came due in the frame that ended.
+module taxel_refresh #(
+    parameter int EVERY = 100_000_000  // clocks; 0: never
+) (
+    input  logic       clk,
+    input  logic       zero,         // this clock is time 0
+    input  logic       frame_start,
+    input  logic [7:0] lines,        // of this frame, less one
+    output logic       line_due,
+    output logic       totals_due
+);
+
+  if (EVERY == 0) begin : g_never
+    assign {line_due, totals_due} = '0;
+    wire unused = &{clk, zero, frame_start, lines};
+  end else begin : g_every
+    localparam int BITS = $clog2(EVERY + 257);
+
+    logic [BITS-1:0] since_line, since_totals, line_next, totals_next, line_start, totals_start;
+
+    assign line_start   = zero ? '0 : since_line;
+    assign totals_start = zero ? '0 : since_totals;
+    assign line_next    = line_start + BITS'(lines) + BITS'(1);
+    assign totals_next  = totals_start + BITS'(1);
+
+    always_ff @(posedge clk) begin
+      since_line   <= line_next >= BITS'(EVERY) ? line_next - BITS'(EVERY) : line_next;
+      since_totals <= totals_next >= BITS'(EVERY) ? totals_next - BITS'(EVERY) : totals_next;
+      line_due     <= (line_due && !frame_start) || line_next >= BITS'(EVERY);
+      totals_due   <= (totals_due && !frame_start) || totals_next >= BITS'(EVERY);
+    end
+  end
+
+endmodule

@@ -1,0 +1,109 @@
+"""Whole frames of the simulated logic in version 2 of the wire, datagram by datagram against the emulated board."""
+
+import numpy as np
+import pytest
+from test_frames import clocks, last_faults, pressures, settles, write
+
+from pair import Pair, answers
+from taxel.simulate import NOT_RETURNED
+from taxel.wire import Command
+
+#: Options of version 2 with which each kind of datagram comes within few frames.
+OFTEN = {"board": 513, "states_us": 700, "heartbeat_us": 60}
+#: Columns, rows, channels, what a value is compared with, what an event holds, for how long it may wait.
+BUILDS = [
+    (8, 8, 16, "last_sent", "value", 0),
+    (5, 7, 16, "last_sample", "difference", 300),
+    (9, 64, 16, "last_sent", "nothing", 40),
+    (6, 128, 64, "last_sent", "value", 0),
+]
+
+
+def built(columns: int, rows: int, channels: int, previous: str, intensity: str, hold_us: int) -> Pair:
+    """Return a pair in a session whose number is not that of a quiet first frame."""
+    rng = np.random.default_rng([columns, rows])
+    first = rng.integers(0, 1200, (rows, columns)).astype(np.uint16)
+    first[-1, -1] = NOT_RETURNED
+    options = OFTEN | {"hold_us": hold_us}
+    return Pair(columns, rows, channels, previous=previous, intensity=intensity, first=first, version_2=options)
+
+
+def written(pair: Pair, commands: list[Command]) -> None:
+    """Write registers of both boards, each before the next."""
+    still = np.zeros(pair.array.shape, np.uint16)
+    for command in commands:
+        pair.frame(still, command.to_bytes())
+        while not pair.answered:
+            pair.frame(still)
+
+
+def in_version_2(pair: Pair) -> None:
+    """Let both boards send version 2."""
+    written(pair, [Command(0, 0b11000)])
+    assert pair.board.registers.wire_version == 2
+
+
+def kinds(pair: Pair) -> set[int]:
+    """Return the kinds of the datagrams of version 2."""
+    return {datagram[1] & 15 for datagram in pair.received if datagram[0] == 0x54}
+
+
+def test_quick_frames_of_version_2_are_the_emulated_boards():
+    rng = np.random.default_rng(31)
+    pair = built(*BUILDS[0])
+    in_version_2(pair)
+    ticks = np.zeros(pair.array.shape, np.uint16)
+    for _ in range(60):
+        ticks = pressures(rng, pair, ticks)
+        pair.frame(ticks)
+    pair.finish()
+    assert pair.agrees
+    assert kinds(pair) == {1, 4, 6}
+    # A reset begins a session of another number, in the version of the build.
+    for _ in range(2):
+        pair.reset(rng.integers(0, 150, pair.array.shape).astype(np.uint16))
+        in_version_2(pair)
+        for k in range(5):
+            pair.frame(np.full(pair.array.shape, 20 * k, np.uint16))
+        pair.finish()
+        assert pair.agrees
+        assert len(pair.received) > 5
+
+
+def test_128_lines_begin_in_version_2():
+    rng = np.random.default_rng(128)
+    pair = Pair(128, 8, version_2=OFTEN | {"states_us": 20_000})
+    assert pair.board.registers.wire_version == 2
+    ticks = np.zeros(pair.array.shape, np.uint16)
+    for _ in range(12):
+        ticks = pressures(rng, pair, ticks)
+        pair.frame(ticks)
+    pair.finish()
+    assert pair.agrees
+    assert kinds(pair) == {1, 6}
+    assert max(datagram[17] >> 4 for datagram in pair.received) > 7
+
+
+@pytest.mark.parametrize(("columns", "rows", "channels", "previous", "intensity", "hold_us"), BUILDS)
+def test_random_pressures_and_writes_in_both_versions(columns, rows, channels, previous, intensity, hold_us):
+    rng = np.random.default_rng([columns, rows, channels])
+    pair = built(columns, rows, channels, previous, intensity, hold_us)
+    if rows <= 64:
+        # Time for ramps of more than 255 ticks.
+        held = pair.board.registers
+        written(pair, held.commands_to(held.with_preset("2 kHz")))
+    ticks = np.zeros(pair.array.shape, np.uint16)
+    for _ in range(250):
+        ticks = pressures(rng, pair, ticks)
+        command = write(rng, pair, in_version_2=0.7) if pair.answered and rng.random() < 0.7 else b""
+        if command and not settles(pair, command):
+            command = b""
+        pair.frame(ticks, command, int(rng.integers(0, clocks(pair.board.registers))) if command else 0)
+    pair.finish()
+    assert not pair.logic.call("shared")
+    assert pair.agrees
+    assert answers(pair.serial) == pair.answers
+    assert last_faults(pair.serial) == last_faults(pair.board.faults())
+    # Which of the two kinds with values, and whether markers come, is drawn.
+    assert kinds(pair) >= {4}
+    assert kinds(pair) & ({0} if intensity == "nothing" else {6, 7})
