@@ -51,7 +51,7 @@ fn a_noisy_array_with_nothing_on_it_rests_at_its_mean_and_not_at_its_lowest_valu
     let mut random = StdRng::seed_from_u64(4);
     for noise in [0.0_f32, 1.2, 3.0] {
         let mut rest = unknown();
-        let mut value = |_, taxel: usize| {
+        let mut value = |_: i64, taxel: usize| {
             48.0 + taxel as f32 + noise * (0..12).map(|_| random.random_range(-0.5..0.5_f32)).sum::<f32>()
         };
         sampled(&mut rest, 0, 40, &mut value);
