@@ -13,7 +13,34 @@ from taxel import _core
 from taxel._base.arguments import shown
 from taxel._core import ProblemError
 
-__all__ = ["Clock"]
+__all__ = ["Clock", "doubt"]
+
+#: Reading: no two clocks differ by more (crystals by 0.01 %, the worst oscillators by 1 %) ...
+DRIFT_PPM = 10_000.0
+#: ... and no datagram on a local network is later than this, us.
+DELAY_US = 1_000_000.0
+
+
+def doubt(drift_ppm: float, delay_us: float) -> str | None:
+    """Return why a drift between two clocks, or a delay of datagrams, cannot be; None if they can.
+
+    Parameters
+    ----------
+    drift_ppm : float, parts per million
+    delay_us : float, us
+        That of 99 in 100 datagrams at most.
+    """
+    wrong = []
+    if abs(drift_ppm) > DRIFT_PPM:
+        wrong.append(f"a drift of {drift_ppm:+.0f} ppm (clocks differ by less than {DRIFT_PPM:.0f})")
+    if delay_us > DELAY_US:
+        wrong.append(f"a delay of {delay_us / 1e6:.1f} s")
+    if not wrong:
+        return None
+    return (
+        f"{' and '.join(wrong)} cannot be: the sender did not keep pace with its own clock, as an emulator on a busy "
+        "machine does, or paused; its times hold, but not when they were on this computer's clock"
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -28,7 +28,7 @@ def test_a_weight_laid_on_the_array_makes_newtons_of_events(tmp_path: Path) -> N
     before = json.loads(run("info", path, "--json").stdout)
     assert (before["calibration"], before["pressure"]["unit"]) == (None, "ticks")
     done = run(
-        "calibrate", path, "--load", "2", "--from", "0.1", "--to", "0.2", "--date", "2026-11-21", "--note", "scale"
+        "calibrate", path, "--load", "2", "--from", "1.1", "--to", "1.2", "--date", "2026-11-21", "--note", "scale"
     )
     assert done.returncode == 0, done.stderr
     place = tmp_path / "a.calibration.json"

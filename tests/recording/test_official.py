@@ -60,7 +60,7 @@ def test_the_picture_is_a_standard_raw_image_and_a_note_a_standard_log(tmp_path:
     assert set(picture) >= RAW_IMAGE
     assert (picture["width"], picture["height"], picture["encoding"], picture["step"]) == (64, 64, "mono8", 64)
     assert base64.b64decode(picture["data"]) == bytes([255, 128]) + bytes(4094)
-    assert (picture["rest"], picture["full_ticks"]) == ("lowest so far", 60.0)
+    assert (picture["rest"], picture["full_ticks"]) == ("first values", 60.0)
     schema, message = messages["/notes"]
     assert schema.name == "foxglove.Log"
     assert set(json.loads(message.data)) >= LOG
@@ -84,14 +84,9 @@ def test_a_converted_file_shows_what_was_held_where_something_came(tmp_path: Pat
     taxel.convert(events, tmp_path / "a.mcap")
     said = pressure(tmp_path / "a.mcap")
     assert [p["t_us"] for p in said] == [0, 100_000, 3_600_000_000, 3_600_200_000]
-    # Above the lowest so far, 10 at (1, 0) and 50 at (2, 0); white is the largest of 10 s.
-    assert [list(base64.b64decode(p["data"])) for p in said] == [
-        [0] * 4,
-        [0, 255, 0, 0],
-        [0, 255, 0, 0],
-        [0, 255, 0, 0],
-    ]
-    assert [p["full_ticks"] for p in said] == [1.0, 30.0, 20.0, 20.0]
+    # Above the first values; what is held for an hour is the rest.
+    assert [list(base64.b64decode(p["data"])) for p in said] == [[0] * 4, [0, 255, 0, 0], [0] * 4, [0] * 4]
+    assert [p["full_ticks"] for p in said] == [1.0, 30.0, 1.0, 1.0]
 
 
 def test_a_converted_file_shows_the_pictures_around_what_happened(tmp_path: Path) -> None:
@@ -109,7 +104,9 @@ def test_a_converted_file_shows_the_pictures_around_what_happened(tmp_path: Path
     for picture in said:
         held = ticks[np.asarray(t) <= picture["t_us"]][-1]
         grey = base64.b64decode(picture["data"])[0]
-        assert abs(grey / 255 * picture["full_ticks"] - (held - 1)) <= picture["full_ticks"] / 255
+        # The rest follows what is far above it with 20 s.
+        rest = 1 if picture["t_us"] < 0 else 1 + (held - 1) * min(1.0, picture["t_us"] / 20e6)
+        assert 0 <= held - grey / 255 * picture["full_ticks"] + picture["full_ticks"] / 255 <= rest + held / 50 + 9
     # A note at 5 ms, a detection of 6 ms that was known at 6.2 ms.
     plain = some_events()
     plain.markers = []

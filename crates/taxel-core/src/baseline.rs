@@ -35,7 +35,7 @@ wide! {
 }
 
 /// The baseline of each taxel, and the taxels' latest values above it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Baseline {
     /// Baselines by taxel; [`Value::NO_REST`] until the first value of a taxel whose baseline is not known.
     baselines: Vec<f64>,
@@ -86,13 +86,20 @@ impl Baseline {
                 }
             }
         }
-        let time = t.saturating_sub(self.t.unwrap_or(t));
+        // A clock that steps back moves no baseline.
+        let time = t.saturating_sub(self.t.unwrap_or(t)).max(0);
         if time != self.steps.0 {
             self.steps = (time, self.tau_us.map(|tau| -(-(time as f64) / tau).exp_m1() as f32));
         }
         self.t = Some(t);
         let [near, far] = self.steps.1;
         follow(values, &mut self.baselines, &mut self.above, &self.far, near, far);
+        &self.above
+    }
+
+    /// The latest values above the baselines.
+    #[must_use]
+    pub fn above(&self) -> &[f32] {
         &self.above
     }
 
@@ -108,6 +115,11 @@ impl Baseline {
         if self.t.is_some() {
             self.above[taxel] = (before + f64::from(self.above[taxel]) - baseline) as f32;
         }
+    }
+
+    /// Makes a taxel's first value its baseline.
+    pub fn begin(&mut self, taxel: usize, value: f64) {
+        (self.baselines[taxel], self.above[taxel]) = (value, 0.0);
     }
 
     /// Sets the difference from the baseline from which a taxel's value is far.

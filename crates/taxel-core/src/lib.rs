@@ -25,6 +25,8 @@ pub mod frames;
 pub mod held;
 pub mod rest;
 pub mod spikes;
+pub mod touch_counts;
+pub mod tracked_rest;
 
 pub mod circuit;
 

@@ -40,33 +40,19 @@ impl Value for f64 {
     }
 }
 
-/// The rest of each taxel, by index: measured, or the lowest value so far.
+/// The rest of each taxel, by index.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rest<V> {
     values: Vec<V>,
-    /// Whether the rest follows the lowest value.
-    lowest: bool,
-    /// Taxels whose rest was set individually: lower values do not change it.
+    /// Taxels whose rest was set individually: it stays.
     zeroed: BTreeSet<usize>,
 }
 
 impl<V: Value> Rest<V> {
-    /// A rest that follows the lowest value of each taxel; [`Value::NO_REST`] before its first value.
-    #[must_use]
-    pub fn lowest(values: Vec<V>) -> Self {
-        Self { values, lowest: true, zeroed: BTreeSet::new() }
-    }
-
-    /// Measured rests, which do not change; [`Value::NO_REST`] if unknown, which the taxel's first value replaces.
+    /// Rests by taxel index; [`Value::NO_REST`] if unknown, which the taxel's first value replaces.
     #[must_use]
     pub fn measured(values: Vec<V>) -> Self {
-        Self { lowest: false, ..Self::lowest(values) }
-    }
-
-    /// Whether the rest follows the lowest value.
-    #[must_use]
-    pub fn is_lowest(&self) -> bool {
-        self.lowest
+        Self { values, zeroed: BTreeSet::new() }
     }
 
     /// The rests by taxel index.
@@ -75,21 +61,25 @@ impl<V: Value> Rest<V> {
         &self.values
     }
 
-    /// Sets the rest of one taxel permanently: its later values do not change it.
+    /// Sets the rest of one taxel permanently.
     pub fn set(&mut self, taxel: usize, rest: V) {
         self.values[taxel] = rest;
         self.zeroed.insert(taxel);
     }
 
-    /// Updates the rest with a taxel's value, which must be known; returns whether the rest changed.
+    /// Sets the rest of one taxel, unless it was set permanently; returns whether it changed.
+    pub fn track(&mut self, taxel: usize, rest: V) -> bool {
+        let changed = self.values[taxel] != rest && !self.zeroed.contains(&taxel);
+        if changed {
+            self.values[taxel] = rest;
+        }
+        changed
+    }
+
+    /// Reads a taxel's value, which must be known and is its rest if none is known; returns whether the rest changed.
     #[inline(always)]
     pub fn follow(&mut self, taxel: usize, value: V) -> bool {
-        let rest = self.values[taxel];
-        let lower = (rest == V::NO_REST || self.lowest && value < rest) && !self.zeroed.contains(&taxel);
-        if lower {
-            self.values[taxel] = value;
-        }
-        lower
+        self.values[taxel] == V::NO_REST && self.track(taxel, value)
     }
 
     /// Difference of a taxel's value from its rest; 0 if it is lower, or if either is unknown.

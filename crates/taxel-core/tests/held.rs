@@ -118,13 +118,12 @@ fn in_whole_ticks_above_noise_is_the_same_as_touched() {
 }
 
 #[test]
-fn a_rest_follows_the_lowest_value_unless_it_was_measured_or_set() {
-    let mut rest = Rest::lowest(vec![u16::NO_REST; 2]);
-    assert!(rest.follow(0, 50) && !rest.follow(0, 60) && rest.follow(0, 40));
-    rest.set(0, 45);
-    assert!(!rest.follow(0, 10));
-    assert_eq!((rest.values(), rest.above(0, 47), rest.is_lowest()), (&[45, u16::NO_REST][..], 2, true));
+fn an_unknown_rest_is_the_first_value_and_one_that_was_set_stays() {
     let mut rest = Rest::measured(vec![30, u16::NO_REST]);
     assert!(!rest.follow(0, 10) && rest.follow(1, 20) && !rest.follow(1, 10));
-    assert_eq!((rest.values(), rest.is_lowest()), (&[30, 20][..], false));
+    assert_eq!(rest.values(), [30, 20]);
+    assert!(rest.track(0, 31) && !rest.track(0, 31));
+    rest.set(0, 45);
+    assert!(!rest.track(0, 10) && rest.track(1, 19));
+    assert_eq!((rest.values(), rest.above(0, 47)), (&[45, 19][..], 2));
 }

@@ -20,6 +20,8 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
             &["held"],
             &["rest"],
             &["baseline", "circuit"],
+            &["tracked_rest"],
+            &["touch_counts"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],

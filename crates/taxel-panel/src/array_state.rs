@@ -7,17 +7,24 @@ use std::sync::Arc;
 
 use super::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
 use taxel_core::held::{Held, UNKNOWN};
-use taxel_core::rest::Rest;
+use taxel_core::rest::{Rest, Value};
+use taxel_core::tracked_rest::TrackedRest;
 use taxel_live::pipeline::Change;
 
 /// Columns of [`COLUMN_US`] after which a change has decayed: 127, less a sixteenth per column, is then 0.
 pub const FORGET: i64 = 64;
 
+/// How often the rest is tracked, us: a multiple of the width of the columns of time.
+const TRACK_US: i64 = 64_000;
+
+/// Most steps of the rest during a silence; the rest of a longer one is a single step.
+const TRACK_STEPS: i64 = 64;
+
 /// Size of a change whose event has no value.
 const UNVALUED: i8 = 16;
 
 /// State of an array at a moment, from which an [`ArrayState`] can begin.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Keyframe {
     /// Board time of the latest event, us; `None` before the first.
     pub latest: Option<i64>,
@@ -27,6 +34,38 @@ pub struct Keyframe {
     pub held: Vec<u16>,
     /// Value of each taxel at rest.
     pub rest: Vec<u16>,
+    /// How that rest was found; `None`: it is tracked anew from there.
+    pub tracked: Option<Box<TrackedRest>>,
+}
+
+/// Where the rest comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RestSource {
+    /// A tare, or the values held at a moment.
+    Given,
+    /// A quiet stretch, from which it is tracked.
+    Quiet,
+    /// There was no quiet stretch so far: the taxels' first values, from which it is tracked.
+    None,
+}
+
+impl Keyframe {
+    /// A sensor of which nothing is known.
+    #[must_use]
+    pub fn blank(taxels: usize) -> Self {
+        Self { latest: None, events: 0, held: vec![UNKNOWN; taxels], rest: vec![UNKNOWN; taxels], tracked: None }
+    }
+}
+
+/// The first time after `t` at which the rest is tracked, us.
+fn next_track(t: i64) -> i64 {
+    (t.div_euclid(TRACK_US) + 1).saturating_mul(TRACK_US)
+}
+
+/// A rest that is tracked from these values on.
+fn tracked_from(columns: usize, floor: u16, values: &[u16]) -> TrackedRest {
+    let rest = |&value: &u16| if value == UNKNOWN { f64::NO_REST } else { value.into() };
+    TrackedRest::new(columns, floor.into(), values.iter().map(rest).collect())
 }
 
 /// Held values, rest and recent changes of every taxel, with raster and curves by column of time.
@@ -35,8 +74,13 @@ pub struct ArrayState {
     /// Column and row of each taxel, looked up because a division per change would dominate the cost.
     places: Arc<[(u16, u16)]>,
     floor: u16,
+    columns: usize,
     held: Held,
     rest: Rest<u16>,
+    /// The rest as it is tracked; `None` where it was given.
+    tracked: Option<Box<TrackedRest>>,
+    /// When the rest is tracked next, us.
+    track_at: Option<i64>,
     /// Number of changes of the rest.
     rests: u64,
     change: Vec<i8>,
@@ -69,8 +113,11 @@ impl ArrayState {
         let mut state = Self {
             places: (0..from.held.len()).map(place).collect(),
             floor,
+            columns,
             held: from.held.clone().into(),
-            rest: Rest::lowest(from.rest.clone()),
+            rest: Rest::measured(from.rest.clone()),
+            tracked: Some(from.tracked.clone().unwrap_or_else(|| Box::new(tracked_from(columns, floor, &from.rest)))),
+            track_at: from.latest.map(next_track),
             rests: 1,
             change: vec![0; from.held.len()],
             time_columns: TimeColumns::new(from.held.len() / columns, time_column_bytes),
@@ -96,7 +143,9 @@ impl ArrayState {
     /// A keyframe of the current state.
     #[must_use]
     pub fn keyframe(&self) -> Keyframe {
-        Keyframe { latest: self.latest, events: self.events, held: self.held().to_vec(), rest: self.rest().to_vec() }
+        let tracked = self.tracked.clone();
+        let (held, rest) = (self.held().to_vec(), self.rest().to_vec());
+        Keyframe { latest: self.latest, events: self.events, held, rest, tracked }
     }
 
     /// Computes the sums above rest from all taxels.
@@ -175,8 +224,43 @@ impl ArrayState {
         self.change_above_rest(taxel, above, self.above(taxel));
     }
 
-    /// Moves time forward; an earlier time does nothing.
+    /// Moves time forward, with the rest that is tracked; an earlier time does nothing.
     pub fn advance(&mut self, t: i64) {
+        let mut steps = 0;
+        while let Some(at) = self.track_at.filter(|&at| at <= t) {
+            // The values do not change any more before `t`.
+            steps += 1;
+            let at = if steps < TRACK_STEPS { at } else { next_track(t) - TRACK_US };
+            self.move_to(at);
+            self.track(at);
+        }
+        self.move_to(t);
+        if self.track_at.is_none() {
+            self.track_at = Some(next_track(t));
+        }
+    }
+
+    /// Reads the held values for the rest, at `t` us.
+    fn track(&mut self, t: i64) {
+        self.track_at = Some(next_track(t));
+        let Some(tracked) = &mut self.tracked else { return };
+        let value = |&held: &u16| if held == UNKNOWN { f32::NAN } else { f32::from(held) };
+        tracked.take(t, self.held.values().iter().map(value));
+        let mut changed = false;
+        for (taxel, rest) in tracked.rests().enumerate() {
+            // The rest follows values of 16 bits.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            if let Some(rest) = rest {
+                changed |= self.rest.track(taxel, rest.round() as u16);
+            }
+        }
+        if changed {
+            self.rests += 1;
+            self.sum_above_rest();
+        }
+    }
+
+    fn move_to(&mut self, t: i64) {
         if self.latest.is_some_and(|latest| t < latest) {
             return;
         }
@@ -222,6 +306,7 @@ impl ArrayState {
             return;
         }
         self.latest = Some(t);
+        self.track_at = Some(next_track(t));
         let column = column_of(t, self.column_us);
         self.time_columns.truncate_after(column);
         self.enter_column(column, column_of(t, COLUMN_US));
@@ -259,18 +344,31 @@ impl ArrayState {
         self.change_above_rest(taxel, above, self.above(taxel));
     }
 
-    /// Sets the rest of all taxels to their held values.
-    pub fn rest_now(&mut self) {
-        self.rest = Rest::measured(self.held().to_vec());
+    /// Sets the rest of all taxels; [`UNKNOWN`] for those whose first value it is.
+    pub fn set_rest(&mut self, rest: Vec<u16>) {
+        self.rest = Rest::measured(rest);
+        self.tracked = None;
         self.rests += 1;
         self.sum_above_rest();
     }
 
-    /// Lets the rest of all taxels follow their lowest value from now on.
-    pub fn rest_lowest(&mut self) {
-        self.rest = Rest::lowest(self.held().to_vec());
+    /// Tracks the rest of all taxels from their held values on.
+    pub fn track_rest(&mut self) {
+        let held = self.held().to_vec();
+        self.tracked = Some(Box::new(tracked_from(self.columns, self.floor, &held)));
+        self.rest = Rest::measured(held);
         self.rests += 1;
         self.sum_above_rest();
+    }
+
+    /// Where the rest comes from.
+    #[must_use]
+    pub fn rest_source(&self) -> RestSource {
+        match &self.tracked {
+            None => RestSource::Given,
+            Some(tracked) if tracked.quiet().is_some() => RestSource::Quiet,
+            Some(_) => RestSource::None,
+        }
     }
 
     /// Copies rest and noise floor from another state of the same source, where they differ.
@@ -278,6 +376,7 @@ impl ArrayState {
         if self.floor != other.floor || self.rest != other.rest {
             self.floor = other.floor;
             self.rest.clone_from(&other.rest);
+            self.tracked.clone_from(&other.tracked);
             self.sum_above_rest();
         }
     }
@@ -345,7 +444,7 @@ mod tests {
     use super::*;
 
     fn blank(taxels: usize) -> Keyframe {
-        Keyframe { latest: None, events: 0, held: vec![UNKNOWN; taxels], rest: vec![UNKNOWN; taxels] }
+        Keyframe::blank(taxels)
     }
 
     fn change(t: i64, taxel: u32, ticks: u16) -> Change {
@@ -421,7 +520,7 @@ mod tests {
         let curve = state.time_columns().curve(0);
         assert_eq!((curve.sum, curve.area, curve.x, curve.y), (40, 2, 0.75, 0.75));
         assert_eq!(state.change(), [7, 0, 0, 30], "the larger of two changes, 3 and 7");
-        state.rest_now();
+        state.set_rest(state.held().to_vec());
         state.update_curve();
         assert_eq!(state.time_columns().curve(0).sum, 0);
         state.advance(FORGET * COLUMN_US);
@@ -438,14 +537,33 @@ mod tests {
         state.update_curve();
         assert_eq!((state.time_columns().curve(0).sum, state.time_columns().curve(0).area), (60, 3));
         state.apply_one(&change(200, 1, 30));
-        state.apply_one(&change(200, 0, 30));
-        assert_eq!(state.rest(), [30, 60, 40, 40]);
-        state.apply_one(&change(300, 1, 80));
-        state.update_curve();
-        assert_eq!(state.time_columns().curve(0).sum, 60);
-        state.rest_lowest();
-        state.apply_one(&change(400, 1, 20));
-        assert_eq!(state.rest()[1], 20);
+        state.apply_one(&change(200, 0, 40));
+        // Long after, the others rest where they stay, and it still where it was zeroed.
+        state.advance(500_000_000);
+        assert_eq!(state.rest(), [40, 60, 60, 60]);
+        state.track_rest();
+        assert_eq!(state.rest(), [40, 30, 60, 60]);
+    }
+
+    #[test]
+    fn the_rest_is_given_found_in_a_quiet_stretch_or_none() {
+        let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        (0..4).for_each(|taxel| state.apply_one(&change(0, taxel, 48)));
+        assert_eq!(state.rest_source(), RestSource::None);
+        state.advance(1_000_000);
+        assert_eq!((state.rest_source(), state.rest()), (RestSource::Quiet, &[48; 4][..]));
+        // A value below the rest, once, is not the rest.
+        state.apply_one(&change(1_010_000, 0, 20));
+        state.apply_one(&change(1_050_000, 0, 48));
+        state.advance(1_060_000);
+        assert_eq!(state.rest(), [48; 4]);
+        // A drift is followed within seconds.
+        (0..4).for_each(|taxel| state.apply_one(&change(1_100_000, taxel, 51)));
+        state.advance(9_000_000);
+        assert_eq!(state.rest(), [51; 4]);
+        state.set_rest(vec![40, 40, 40, UNKNOWN]);
+        state.advance(19_000_000);
+        assert_eq!((state.rest_source(), state.rest()), (RestSource::Given, &[40, 40, 40, UNKNOWN][..]));
     }
 
     #[test]

@@ -58,12 +58,14 @@ pub struct LabelRow {
 /// Taxels (column, row) that do not work as they should.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct UnhealthyTaxels {
-    /// Without events although their neighbours have some.
+    /// That did nothing while they were touched, and hold 0 as far as is known.
     pub dead: Vec<(u16, u16)>,
-    /// With one value only.
+    /// That did nothing while they were touched, and hold another value.
     pub stuck: Vec<(u16, u16)>,
-    /// With far more events than their neighbours.
+    /// That change by themselves.
     pub noisy: Vec<(u16, u16)>,
+    /// Number of taxels that were not touched enough to say.
+    pub untold: u64,
 }
 
 /// The stretch of a recording that is to be cut out.

@@ -1,7 +1,7 @@
 //! A live source: copies of a board's events from the pipeline, and the state and the keyframe index made of them.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crossbeam_channel as channel;
 use taxel_core::Array;
@@ -34,6 +34,8 @@ pub(super) struct LiveSource {
     pub(super) activity: Mutex<Activity>,
     /// Events that found no room in the queue from the pipeline.
     missing: AtomicU64,
+    /// Whether the state has the rest that was given with the readout.
+    rested: AtomicBool,
     /// Number of zeroings that the state has applied.
     zeroings: AtomicU64,
     silence: Mutex<Silence>,
@@ -68,18 +70,18 @@ impl LiveSource {
     pub(super) fn new(handle: Handle, noise_floor: u8) -> Result<Self> {
         let (detections, events) = (handle.detections(MOST_WAITING), handle.events()?);
         let array = handle.options().array.clone();
-        let unknown = vec![UNKNOWN; array.len()];
-        let blank = Keyframe { latest: None, events: 0, held: unknown.clone(), rest: unknown };
+        let blank = Keyframe::blank(array.len());
         // Enough for all that a view of the past can show, at the widest columns too.
         let bytes = TimeColumns::bytes_for(array.rows.into(), REACH_US / COLUMN_US);
         Ok(Self {
             state: Mutex::new(ArrayState::new(array.columns, noise_floor.into(), &blank, COLUMN_US, bytes)),
-            activity: Mutex::new(Activity::new(array.len())),
+            activity: Mutex::new(Activity::new(&array)),
             index: LiveIndex::new(array, noise_floor.into()),
             events: Mutex::new(events),
             handle,
             detections,
             missing: AtomicU64::new(0),
+            rested: AtomicBool::new(false),
             zeroings: AtomicU64::new(0),
             silence: Mutex::default(),
         })
@@ -128,9 +130,25 @@ impl LiveSource {
         }
         drop(events);
         received.detections.extend(self.detections.try_iter());
+        self.apply_rest();
         received.zeroed = self.apply_zeroings();
         received.picture |= received.zeroed;
         received
+    }
+
+    /// Sets the rest of all taxels once, where a tare was given or has been measured.
+    fn apply_rest(&self) {
+        if self.rested.load(Ordering::Relaxed) {
+            return;
+        }
+        let rest = self.handle.rest();
+        if rest.len() == self.array().len() {
+            // A rest is a mean of held values, which have 16 bits.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let ticks = rest.into_iter().map(|rest| rest.map_or(UNKNOWN, |rest| rest.round() as u16)).collect();
+            lock(&self.state).set_rest(ticks);
+            self.rested.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Sets the rest of taxels that were zeroed since the last call; returns whether there were any.

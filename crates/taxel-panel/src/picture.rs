@@ -2,7 +2,7 @@
 
 use taxel_live::recording::now_ns;
 
-use super::array_state::ArrayState;
+use super::array_state::{ArrayState, RestSource};
 use super::encoded_spikes::EncodedSpikes;
 use super::player::Player;
 use super::taxel_history::TaxelHistory;
@@ -21,6 +21,8 @@ pub(super) const MOVES: u16 = 2;
 pub(super) const RESTART: u16 = 4;
 pub(super) const RECORDS: u16 = 8;
 pub(super) const FOLLOWS: u16 = 16;
+const REST_GIVEN: u16 = 32;
+const REST_QUIET: u16 = 64;
 
 /// What a picture contains beside the state of the array.
 #[derive(Debug, Clone, Copy)]
@@ -196,7 +198,12 @@ fn write(
             put(SECTIONS + 8 * number + 4, &(*length as u32).to_le_bytes());
         }
     }
-    put(6, &about.flags.to_le_bytes());
+    let rest = match state.rest_source() {
+        RestSource::Given => REST_GIVEN,
+        RestSource::Quiet => REST_QUIET,
+        RestSource::None => 0,
+    };
+    put(6, &(about.flags | rest).to_le_bytes());
     put(8, &about.number.to_le_bytes());
     put(14, &columns.to_le_bytes());
     put(16, &state.latest().unwrap_or(i64::MIN).to_le_bytes());

@@ -123,11 +123,12 @@ fn rest(hub: &Hub, request: &Request<'_>) -> Answer {
     match request.get("how").and_then(Value::as_str) {
         Some("now") if state.held().iter().all(|&held| held == UNKNOWN) => Err("no events have arrived yet".into()),
         Some("now") => {
-            state.rest_now();
+            let held = state.held().to_vec();
+            state.set_rest(held);
             Ok(())
         }
         Some("lowest") => {
-            state.rest_lowest();
+            state.track_rest();
             Ok(())
         }
         _ => Err(Refusal::of("how", "must be now or lowest")),
@@ -256,10 +257,11 @@ async fn health(hub: &Hub, name: Option<&str>) -> Answer<Value> {
     };
     let taxels = array.exists.as_ref().map_or(array.len(), |exists| exists.iter().filter(|&&one| one).count());
     let with_events = activity.events.iter().filter(|&&n| n > 0).count();
-    let UnhealthyTaxels { dead, stuck, noisy } = hub.ask(move |handler| handler.health(&array, &activity)).await?;
+    let UnhealthyTaxels { dead, stuck, noisy, untold } =
+        hub.ask(move |handler| handler.health(&array, &activity)).await?;
     Ok(json!({
         "type": "health", "source": name, "taxels": taxels, "heard": with_events, "dead": dead, "stuck": stuck,
-        "noisy": noisy,
+        "noisy": noisy, "untold": untold,
     }))
 }
 

@@ -68,6 +68,13 @@ class Map2D {
   }
 }
 
+/** What the page says of the rest. */
+const REST_FROM = {
+  given: "above the given rest",
+  quiet: "above the rest of a quiet stretch",
+  none: "rest not known yet: above the first values",
+};
+
 /** The maps, their colours, the crosshair and the marks of unwell taxels. */
 export class Maps {
   /**
@@ -201,6 +208,7 @@ export class Maps {
     write(part("pressure-top", HTMLElement), `${Math.round(scale)} ticks`);
     write(part("change-least", HTMLElement), `−${Math.round(changes)}`);
     write(part("change-top", HTMLElement), `+${Math.round(changes)} ticks`);
+    write(part("rest-from", HTMLElement), this.picture ? REST_FROM[this.picture.restFrom] : "");
     const { unknown } = this.info;
     part("unknown", HTMLElement).hidden = unknown === 0;
     write(part("unknown-count", HTMLElement), counted(unknown, "taxel without events", "taxels without events"));

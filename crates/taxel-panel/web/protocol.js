@@ -38,7 +38,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ label_id: number, label: string, t_us: number }} Label
  * @typedef {{ type: "labels", name: string, path: string, labels: Label[] }} Labels
  * @typedef {[number, number]} Taxel column and row
- * @typedef {{ type: "health", source: string | null, taxels: number, heard: number, dead: Taxel[], stuck: Taxel[], noisy: Taxel[] }} Health
+ * @typedef {{ type: "health", source: string | null, taxels: number, heard: number, dead: Taxel[], stuck: Taxel[], noisy: Taxel[], untold: number }} Health
  * @typedef {{ taxel: Taxel, t_us: number, rest: number, before: number | null }} Zeroing
  * @typedef {{ type: "zeroed", taxels: Zeroing[] }} Zeroed
  * @typedef {{ type: "trained", name: string, readout: string, text: string }} Trained
@@ -77,6 +77,7 @@ export const UNKNOWN_VALUE = 65535;
  * @property {Float32Array | null} centres the same words as floats: x at 2, y at 3
  * @property {Uint16Array | null} history least, greatest, last
  * @property {Uint16Array | null} rest
+ * @property {"given" | "quiet" | "none"} restFrom where the rest comes from
  * @property {Uint8Array | null} spikes of the encoder, as the raster
  */
 
@@ -112,6 +113,7 @@ export function readPicture(buffer) {
     restart: (flags & 4) !== 0,
     recording: (flags & 8) !== 0,
     following: (flags & 16) !== 0,
+    restFrom: flags & 32 ? "given" : flags & 64 ? "quiet" : "none",
     rows: view.getUint16(12, true),
     columns: view.getUint16(14, true),
     t_us: t === -(2n ** 63n) ? null : Number(t),

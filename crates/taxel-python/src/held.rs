@@ -3,10 +3,14 @@
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::held::{HeldOverTime, UNKNOWN, as_events};
-use taxel_core::rest::{Rest, touched_from};
+use taxel_core::rest::{Rest, Value, touched_from};
+use taxel_core::touch_counts::{BIN_US, Counts, TouchCounts};
+use taxel_core::tracked_rest::TrackedRest;
 use taxel_core::{Error, problem};
 
-use crate::convert::{ArrayParts, EventsIn, EventsOut, array, from_events, slice, to_array, to_events};
+use crate::convert::{
+    ArrayParts, EventsIn, EventsOut, FramesIn, array, from_events, slice, to_array, to_events, to_frames,
+};
 use crate::enter::{Shared, enter};
 use crate::errors::core;
 
@@ -96,6 +100,118 @@ fn above_rest<'py>(
     Ok(array(py, found))
 }
 
+/// The rest of pictures that nobody tared: `columns` of the array, its noise floor, and the rest of each taxel to begin
+/// with (NaN where unknown).
+#[pyclass(frozen, name = "TrackedRest", module = "taxel._core")]
+struct PyTrackedRest(Shared<TrackedRest>);
+
+#[pymethods]
+impl PyTrackedRest {
+    #[new]
+    fn new(columns: usize, noise_floor: f64, begins: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
+        let begins = slice("begins", &begins)?.iter().map(|&rest| if rest.is_nan() { f64::NO_REST } else { rest });
+        Ok(Self(Shared::new(TrackedRest::new(columns, noise_floor, begins.collect()))))
+    }
+
+    /// Reads pictures at `t` us, one after the other in `values` (NaN where a taxel has none); returns them above the
+    /// rest, 0 below it.
+    fn above<'py>(
+        &self,
+        py: Python<'py>,
+        t: PyReadonlyArray1<'py, i64>,
+        values: PyReadonlyArray1<'py, f32>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let (t, values) = (slice("t", &t)?, slice("values", &values)?);
+        let above = self.0.enter(py, |rest, stop| {
+            let taxels = rest.begins().len();
+            if taxels == 0 || values.len() != t.len() * taxels {
+                let (n, pictures) = (values.len(), t.len());
+                return Err(problem!("{n} values for {pictures} pictures of {taxels} taxels"));
+            }
+            let mut above = Vec::with_capacity(values.len());
+            for (&t, picture) in t.iter().zip(values.chunks_exact(taxels)) {
+                stop.check()?;
+                above.extend(rest.take(t, picture.iter().copied()).iter().map(|above| above.max(0.0)));
+            }
+            Ok(above)
+        })?;
+        Ok(array(py, above))
+    }
+
+    /// The first quiet stretch, us.
+    #[getter]
+    fn quiet(&self, py: Python<'_>) -> Option<(i64, i64)> {
+        self.0.with(py, |rest| rest.quiet())
+    }
+
+    /// The rest of each taxel in its first quiet stretch, or in a later one far below it; NaN for one without any.
+    #[getter]
+    fn begins<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let known = |&rest: &f64| if rest == f64::NO_REST { f64::NAN } else { rest };
+        array(py, self.0.with(py, |rest| rest.begins().iter().map(known).collect()))
+    }
+}
+
+/// Counts of touches as rows of five numbers by taxel: touches, missed, pressed, changed, by itself.
+pub(crate) fn by_taxel(counts: &[Counts]) -> Vec<u32> {
+    counts.iter().flat_map(|c| [c.touches, c.missed, c.pressed, c.changed, c.by_itself]).collect()
+}
+
+/// The counts of touches of events, by taxel.
+#[pyfunction]
+fn touches_of_events<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+    let events = to_events(events)?;
+    let events = events.view()?;
+    let counts = enter(py, |stop| {
+        events.check()?;
+        let mut counts = TouchCounts::new(events.array, f64::NO_REST);
+        for k in 0..events.len() {
+            if k % 4096 == 0 {
+                stop.check()?;
+            }
+            let ticks = events.intensity.map_or(UNKNOWN, |of| if of.present[k] { of.ticks[k] } else { UNKNOWN });
+            let own = events.repaired.is_none_or(|repaired| !repaired[k]);
+            counts.event(events.t[k], events.array.index(events.x[k], events.y[k]), ticks, events.p[k], own);
+        }
+        if let Some(&last) = events.t.last() {
+            counts.advance(last.saturating_add(2 * BIN_US));
+        }
+        Ok::<_, Error>(by_taxel(counts.counts()))
+    })?;
+    Ok(array(py, counts))
+}
+
+/// The change of a picture's value that counts, ticks: above the noise floor of the board's fast presets.
+const NOISE_FLOOR: f32 = 3.0;
+
+/// The counts of touches of pictures in ticks, by taxel; `rest` of all of them, NaN where it is to be tracked.
+#[pyfunction]
+fn touches_of_frames<'py>(py: Python<'py>, frames: FramesIn<'py>, rest: f64) -> PyResult<Bound<'py, PyArray1<u32>>> {
+    let frames = to_frames(frames)?;
+    let frames = frames.view()?;
+    let counts = enter(py, |stop| {
+        let taxels = frames.array.len();
+        let mut counts = TouchCounts::new(frames.array, if rest.is_nan() { f64::NO_REST } else { rest });
+        let mut before = vec![f32::NAN; taxels];
+        for (&t, picture) in frames.t.iter().zip(frames.values.chunks_exact(taxels)) {
+            stop.check()?;
+            for (taxel, (&value, before)) in picture.iter().zip(&mut before).enumerate() {
+                // As a board reads it; the first value is no change.
+                if before.is_nan() && !value.is_nan() || (value - *before).abs() > NOISE_FLOOR {
+                    counts.value(t, taxel, value, !before.is_nan());
+                    *before = value;
+                }
+            }
+            counts.advance(t);
+        }
+        if let Some(&last) = frames.t.last() {
+            counts.advance(last.saturating_add(2 * BIN_US));
+        }
+        Ok::<_, Error>(by_taxel(counts.counts()))
+    })?;
+    Ok(array(py, counts))
+}
+
 /// What a touched taxel reads above rest at least, for a board's noise floor.
 #[pyfunction]
 fn touched_above(noise_floor: f64) -> f64 {
@@ -105,7 +221,10 @@ fn touched_above(noise_floor: f64) -> f64 {
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("UNKNOWN", UNKNOWN)?;
     module.add_class::<HeldValues>()?;
+    module.add_class::<PyTrackedRest>()?;
     module.add_function(wrap_pyfunction!(held_as_events, module)?)?;
     module.add_function(wrap_pyfunction!(above_rest, module)?)?;
+    module.add_function(wrap_pyfunction!(touches_of_events, module)?)?;
+    module.add_function(wrap_pyfunction!(touches_of_frames, module)?)?;
     module.add_function(wrap_pyfunction!(touched_above, module)?)
 }

@@ -18,6 +18,7 @@ use taxel_panel::{
 use crate::convert::{array, from_array};
 use crate::enter::enter;
 use crate::errors::core;
+use crate::held::by_taxel;
 use crate::live::Live;
 use crate::threaded::Threaded;
 
@@ -74,13 +75,14 @@ impl RequestHandler for PythonHandler {
             _ => (least.into(), greatest.into()),
         };
         let (least, greatest): (Vec<_>, Vec<_>) = activity.range.iter().map(range).unzip();
-        let (dead, stuck, noisy) = self.call(|handler| {
+        let (dead, stuck, noisy, untold) = self.call(|handler| {
             let py = handler.py();
             let values = known.then(|| (array(py, activity.values.clone()), array(py, least), array(py, greatest)));
             let counts = (array(py, activity.events.clone()), array(py, activity.moved.clone()));
-            handler.call_method1("health", (from_array(sensor), counts.0, counts.1, values))?.extract()
+            let touches = array(py, by_taxel(activity.touches.counts()));
+            handler.call_method1("health", (from_array(sensor), counts.0, counts.1, touches, values))?.extract()
         })?;
-        Ok(UnhealthyTaxels { dead, stuck, noisy })
+        Ok(UnhealthyTaxels { dead, stuck, noisy, untold })
     }
 
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>> {

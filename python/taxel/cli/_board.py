@@ -16,6 +16,7 @@ from taxel._base.options import about
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import OUTSIDE, WRONG_INPUT
+from taxel.clock import doubt
 from taxel.live import Remote, Summary, delays
 from taxel.live.options import LiveOptions
 from taxel.tare import Tare
@@ -178,7 +179,11 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         damage = f"{damaged:,} datagrams, {second['outside']:,} words, {now['wire_refused']:,} bytes of version 1"
         lost = f", {second['missing']:,} on the way"
     board = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
-    drift = "" if now["offset"] is None else f", drift {now['offset']['drift_ppm']:+.1f} ppm"
+    drift = ""
+    if now["offset"] is not None:
+        ppm = now["offset"]["drift_ppm"]
+        drift = f", drift {ppm:+.1f} ppm"
+        drift += " (wrong: the sender does not keep pace with its clock)" * bool(doubt(ppm, 0.0))
     table = Table.grid(padding=(0, 2))
     for name, total, per_second in (
         ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),

@@ -61,7 +61,7 @@ def calibrate(
         bool, typer.Option("--each", help="Fit a gain for each taxel (needs uniform kPa, or loads on single taxels).")
     ] = False,
     exponent: Annotated[float | None, typer.Option(help="The exponent, given instead of fitted.")] = None,
-    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: the lowest value of each taxel.")] = None,
+    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: that of a quiet stretch.")] = None,
     date: Annotated[str | None, typer.Option(help="Date of the calibration, as 2026-11-21. Default: today.")] = None,
     note: Annotated[str, typer.Option(help="A note: which sensor, which weights.")] = "",
     out: Annotated[
@@ -145,15 +145,14 @@ class _Read:
 def _read(recording: Recording, tare: str | None) -> _Read:
     from taxel.recording.pressure import readings  # noqa: PLC0415
 
-    values = readings(recording)
+    values = readings(recording, tare_of(tare, recording))
     if values is None:
         raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
-    frames, lowest, floor = values
-    if tare is not None:
-        own = tare_of(tare, recording)
-        assert own is not None  # as `tare` is not None
-        return _Read(frames, own.rest, floor)
-    return _Read(frames, np.where(np.isinf(lowest), np.nan, lowest) if recording.has_events else None, floor)
+    frames, rest, floor = values
+    if rest.source == "none" and recording.has_events:
+        raise ProblemError(f"{recording.path}: the rest of its taxels is not known, as no half second is quiet; --tare")
+    known = rest.source not in ("unit", "none")
+    return _Read(frames, rest.values.reshape(recording.array.shape) if known else None, floor)
 
 
 def _load(

@@ -15,11 +15,14 @@ from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._recordings import TARE_HELP, tare_of
 from taxel.cli._topics import listed
 
 if TYPE_CHECKING:
+    from taxel.frames import Frames
     from taxel.recording import Recording
     from taxel.recording.pressure import Series
+    from taxel.recording.rest import Rest
 
 __all__ = ["info"]
 
@@ -42,6 +45,7 @@ def info(
         Path | None,
         typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
     ] = None,
+    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: that of a quiet stretch.")] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace the files that are written if they exist.")
     ] = False,
@@ -56,7 +60,7 @@ def info(
     """
     from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
     from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
-    from taxel.recording.pressure import series  # noqa: PLC0415
+    from taxel.recording.pressure import above_rest, series  # noqa: PLC0415
     from taxel.recording.summary import summary  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
@@ -77,15 +81,16 @@ def info(
         if isinstance(opened, list):
             if picture is not None or table is not None:
                 raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")
-            every = [summary(recording, series(recording)) for recording in opened]
+            every = [summary(recording, series(recording, tare_of(tare, recording))) for recording in opened]
             typer.echo(json.dumps(every) if as_json else "\n".join(_page(facts) for facts in every))
             return
         if len(opened.sources) > 1:
-            several = _sources(opened, drawn=picture is not None or table is not None)
+            several = _sources(opened, tare, drawn=picture is not None or table is not None)
             typer.echo(json.dumps(several) if as_json else _pages(several))
             return
         recording = opened
-        pressed = series(recording)
+        rest = tare_of(tare, recording)
+        pressed = series(recording, rest)
         facts = summary(recording, pressed)
         facts["array_assumed"] &= not files.array
     if table is not None:
@@ -95,35 +100,32 @@ def info(
         write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
         facts["table"] = str(table)
     if picture is not None:
-        _draw(picture, recording, pressed, overwrite)
+        _draw(picture, recording, above_rest(recording, rest), overwrite)
         facts["picture"] = str(picture)
     typer.echo(json.dumps(facts) if as_json else _page(facts))
 
 
-def _draw(picture: Path, recording: Recording, pressed: Series | None, overwrite: bool) -> None:
+def _draw(picture: Path, recording: Recording, above: tuple[Frames, float, Rest] | None, overwrite: bool) -> None:
     """Write rates, a map of the taxels and the pressure over time as a picture."""
     import matplotlib as mpl  # noqa: PLC0415  loads slowly
 
     from taxel._base.files import write_whole  # noqa: PLC0415
     from taxel.plot import overview, pressure  # noqa: PLC0415
-    from taxel.recording.pressure import above_rest  # noqa: PLC0415
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt  # noqa: PLC0415
 
-    figure, kind = plt.figure(figsize=(11, 4 if pressed is None else 10), layout="constrained"), picture.suffix[1:]
-    if pressed is None:
+    figure, kind = plt.figure(figsize=(11, 4 if above is None else 10), layout="constrained"), picture.suffix[1:]
+    if above is None:
         overview(recording, figure)
     else:
         grid = figure.add_gridspec(2, 1, height_ratios=(2, 3))
         overview(recording, figure.add_subfigure(grid[0]))
-        above = above_rest(recording)
-        assert above is not None  # there are series
-        pressure(*above, figure=figure.add_subfigure(grid[1]))
+        pressure(*above[:2], figure=figure.add_subfigure(grid[1]))
     write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
 
 
-def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
+def _sources(recording: Recording, tare: str | None, *, drawn: bool) -> dict[str, Any]:
     """Return the facts of each source of a file, with offset and drift of their clocks against the first one's."""
     from taxel.recording.pressure import series  # noqa: PLC0415  the command line starts quickly
     from taxel.recording.summary import summary  # noqa: PLC0415
@@ -136,7 +138,7 @@ def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
     first = next(iter(recording.sources.values()))
     sources: dict[str, Any] = {}
     for name, source in recording.sources.items():
-        facts = summary(source, None if source.is_stream else series(source))
+        facts = summary(source, None if source.is_stream else series(source, tare_of(tare, source)))
         clock, ours = source.clock, first.clock
         if source.is_stream:
             facts["columns"] = source.columns
@@ -208,14 +210,22 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if facts["calibration"] is not None:
         yield "calibration", facts["calibration"]
     if facts["pressure"] is not None:
+        yield "rest", facts["rest"]["text"]
         yield from _pressure(facts["pressure"])
     if facts["notes"]:
         yield "notes", str(len(facts["notes"]))
     if facts["detections"]:
         yield "detections", ", ".join(f"{label} {n}" for label, n in facts["detections"].items())
+    yield from _taxels(facts)
+
+
+def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield which taxels do not work; people count rows first."""
     for name, places in facts["taxels"].items():
-        shown = ", ".join(f"({x}, {y})" for x, y in places[:8]) + " ..." * (len(places) > 8)
-        yield f"{name} taxels", f"{len(places)}" + f": {shown}" * bool(places)
+        shown = ", ".join(f"({y}, {x})" for x, y in places[:8]) + " ..." * (len(places) > 8)
+        yield f"{name} taxels", f"{len(places)}" + f", at (row, column) {shown}" * bool(places)
+    if facts["taxels_untold"]:
+        yield "other taxels", f"{facts['taxels_untold']} not touched enough to say whether they work"
 
 
 def _pressure(pressed: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -246,6 +256,8 @@ def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         late = facts["delay_us"]
         delays = f"delays {late['median']:.0f} us median, {late['p99']:.0f} us 99 %"
         yield "clock", f"drift {facts['drift_ppm']:+.1f} ppm; {delays}"
+        if facts["clock_doubt"] is not None:
+            yield "", facts["clock_doubt"]
 
 
 def _losses(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

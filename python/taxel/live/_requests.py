@@ -29,7 +29,7 @@ from taxel.recorded import recorded
 from taxel.recording import Recording, open_recording
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
-from taxel.recording.health import TaxelStatistics, judged
+from taxel.recording.health import TaxelStatistics, by_taxel, judged
 from taxel.tare import Tare
 from taxel.wire import Command
 
@@ -82,7 +82,7 @@ def _reasons() -> Iterator[None]:
 
 
 def _rest(recording: Recording) -> Tare:
-    """Return the rest of taxels: before the first label and the start marker, or at the recording's beginning."""
+    """Return the taxels' rest: before the first label and the start marker, or at the recording's beginning."""
     source = recorded(recording)
     first = int(source.t[0]) if len(source) else 0
     ends = [note.t - _BEFORE_US for note in recording.notes if note.t is not None]
@@ -180,22 +180,28 @@ class RequestHandler:
         array: _core._Array,
         events: NDArray[np.uint32],
         moved: NDArray[np.uint32],
+        touches: NDArray[np.uint32],
         values: tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]] | None,
-    ) -> tuple[_Taxels, _Taxels, _Taxels]:
-        """Return the taxels that are dead, stuck and noisy.
+    ) -> tuple[_Taxels, _Taxels, _Taxels, int]:
+        """Return the taxels that are dead, stuck and noisy, and how many were not touched enough to say.
 
         Parameters
         ----------
         array : the sensor
         events, moved : shape (taxels,)
             Events of each taxel, and those in the direction of the one before.
+        touches : shape (5 taxels,)
+            Five counts of touches by taxel, as the core gives them.
         values : three arrays of shape (taxels,), or None without intensities
             Number of different values; least and greatest held value, -1 where unknown.
         """
         sensor = Array._from_parts(array)
-        counts = [np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))]
-        taxels = judged(sensor, TaxelStatistics(*counts)).named()
-        return taxels["dead"], taxels["stuck"], taxels["noisy"]
+        activity, on, *known = (
+            np.asarray(column, np.int64).reshape(sensor.shape) for column in (events, moved, *(values or ()))
+        )
+        result = judged(sensor, TaxelStatistics(activity, on, by_taxel(touches, sensor), *known))
+        taxels = result.named()
+        return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untold))
 
     def cut(self, path: Path, out: Path, start_us: int, stop_us: int) -> list[str]:
         """Write a stretch of a recording to a new file; return what that file cannot hold."""

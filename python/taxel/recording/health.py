@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._base.arguments import shown
 from taxel._base.drawing import draw
 from taxel._core import ProblemError
@@ -16,27 +17,32 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recorded import Recorded
 from taxel.recorded import recorded as held_by
+from taxel.recording.rest import FORCE_UNITS, ticks_by_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Health", "TaxelStatistics", "health", "judged"]
+__all__ = ["Health", "TaxelStatistics", "Touches", "by_taxel", "health", "judged"]
 
-#: Reading: a taxel is dead if it had no event while the median of its neighbours had at least this number of events,
-#: and at least this number in the direction of their event before. A touch causes such events; noise at the noise floor
-#: alternates ...
-DEAD_BELOW, MOVED_FROM = 10, 3
+#: Reading: a taxel is dead, or stuck, if its place was touched at least this number of times (`_core`, *touch counts*)
+#: and it never changed meanwhile, if it has this number of neighbours: beyond the edge of an insole nothing presses ...
+TOUCHED_FROM, NEIGHBOURS_FROM = 3, 5
 #: ... or if it is known to hold 0 while the least value of its neighbours (median) was at least this number of ticks
 #: and this share of the largest value of the array ...
 REST_FROM, REST_SHARE = 10, 0.2
-#: ... or if most of the array is so noisy that hardly any taxel had few events: among taxels with active neighbours, at
-#: most this share of the number of silent ones ...
-QUIET_SHARE = 0.1
+#: ... or if it had no event while the median of its neighbours had at least this number, and most of the array is so
+#: noisy that hardly any taxel had few events: among taxels with active neighbours, at most this share of the number of
+#: silent ones ...
+LOUD_FROM, QUIET_SHARE = 10, 0.1
 #: ... It is stuck if it had at least this number of events, all with one value ...
 STUCK_FROM = 3
-#: ... It is noisy if it had this many times the events of four in five of the 24 taxels around it, and at least this
-#: number.
-NOISY_TIMES, NOISY_FROM, NOISY_SHARE = 8.0, 20, 0.8
+#: ... It is noisy if it changed by itself in at least this number of bins of 50 ms, which are at least this share of
+#: those in which it changed, and at most this share of its changes went on in the direction of the one before: a touch
+#: goes on, noise turns back.
+NOISY_FROM, NOISY_SHARE, NOISY_ON = 10, 0.5, 0.45
+
+#: A taxel that was not touched enough works if it had at least this number of events, or was once pressed itself.
+WORKS_FROM = 10
 
 #: Number of taxels whose neighbours are computed at once.
 _AT_ONCE = 1 << 17
@@ -52,6 +58,8 @@ class Health:
     activity : int64, shape (rows, columns)
         Number of events (or changes of the picture) at each taxel.
     dead, stuck, noisy : bool, shape (rows, columns)
+    untold : bool, shape (rows, columns)
+        Not touched enough to say: neither named nor seen to work.
     """
 
     array: Array
@@ -59,6 +67,7 @@ class Health:
     dead: NDArray[np.bool_]
     stuck: NDArray[np.bool_]
     noisy: NDArray[np.bool_]
+    untold: NDArray[np.bool_]
 
     def named(self) -> dict[str, list[tuple[int, int]]]:
         """Return column and row (x, y) of the taxels that are dead, stuck and noisy."""
@@ -74,15 +83,21 @@ class Health:
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(places)} {name}" for name, places in self.named().items())
-        return f"Health({self.array.taxels} taxels: {counts})"
+        untold = int(np.count_nonzero(self.untold))
+        return (
+            f"Health({self.array.taxels} taxels: {counts}"
+            + f", {untold} not touched enough to say" * bool(untold)
+            + ")"
+        )
 
 
 def health(recorded: Events | Frames | Recorded) -> Health:
     """Return which taxels are dead, stuck or noisy, each compared with its neighbours.
 
-    A recording cannot show whether taxels work in a region that was never touched: a taxel counts as dead only if most
-    of its neighbours had events, or if it is known to hold 0 and they never do. States of wire version 2
-    (`Events.repaired`) and the values held at the beginning count as held values, but not as events of the taxel.
+    A recording cannot show whether taxels work in a region that was never touched: a taxel is named dead or stuck only
+    if its neighbours were touched three times or more. One that was touched less and did nothing is *untold*. States of
+    wire version 2 (`Events.repaired`) and the values held at the beginning count as held values, but not as changes of
+    the taxel. Without neighbours, as in one channel, no taxel is named.
 
     Parameters
     ----------
@@ -99,23 +114,23 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 
     Notes
     -----
-    *Reading* (the thesis defines none). Dead: no event, while the median of its up to 8 neighbours has 10 events or
-    more, of which 3 or more have the polarity of the same taxel's event before; or no event and known to hold 0, while
-    the median of the least values of its neighbours is 10 ticks or more and a fifth of the array's largest value. Noise
-    at the noise floor causes events of alternating polarity, so that a working taxel may have none for long while
-    others do; it shows a dead taxel only if it is so strong that, over half of the array or more, the taxels with 1 to
-    9 events are at most a tenth as many as the silent ones. Stuck: 3 events or more, all with one intensity, while its
-    neighbours show more than one; or silent like a dead one, but known to hold a value other than 0. Noisy: 20 events
-    or more, and 8 times as many as four in five of the up to 24 taxels around it.
+    *Reading* (the thesis defines none). A place is touched while three in four of its up to 8 neighbours are 8 ticks
+    above their rest, until all but one in four are back; in pictures 150 ticks are the range of the values. Dead: three
+    touches or more and no change in any of them, with 5 neighbours or more; or no event and known to hold 0, while the
+    median of the least values of its neighbours is 10 ticks or more and a fifth of the array's largest value; or no
+    event in noise so strong that, over half of the array or more, the taxels with 1 to 9 events are at most a tenth as
+    many as the silent ones. Stuck: like a dead one, but known to hold a value other than 0; or 3 events or more, all
+    with one intensity, while its neighbours show more than one. Noisy: in 10 bins of 50 ms or more, half of all in
+    which it changes, it has 3 changes or more, and more than 8 times those of all but one of the 24 taxels around it;
+    and at most 45 % of its changes go on in the direction of the one before.
 
     Examples
     --------
-    >>> t = np.repeat(np.arange(0, 20_000, 1000), 9)
-    >>> x, y = np.tile(np.tile(np.arange(3), 3), 20), np.tile(np.repeat(np.arange(3), 3), 20)
-    >>> but_one = (x != 1) | (y != 1)
-    >>> events = Events(t[but_one], x[but_one], y[but_one], t[but_one] % 4000 > 1000, array=Array(3, 3))
-    >>> health(events)
-    Health(9 taxels: 1 dead, 0 stuck, 0 noisy)
+    >>> touch = np.array([0, 40, 80, 40, 0])[:, None, None] * np.ones((3, 3))
+    >>> values = np.concatenate([touch] * 3) + 50
+    >>> values[:, 1, 1] = 0
+    >>> health(Frames(values, np.arange(15) * 100_000, unit="ticks"))
+    Health(9 taxels: 1 dead, 0 stuck, 0 noisy, 8 not touched enough to say)
     """
     held = held_by(recorded)
     if isinstance(held, Events):
@@ -127,12 +142,31 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     ways = (flat[1:] > flat[:-1]).astype(np.int8) - (flat[1:] < flat[:-1])
     turn, taxel = np.nonzero(ways)
     activity, moved = _ways(taxel, ways[turn, taxel], held.array)
-    # In pictures a taxel that never changes is dead or stuck, depending on its value.
-    result = judged(held.array, TaxelStatistics(activity, moved, activity + 1))
+    # The values of pictures count from the least one.
+    scale, least = ticks_by_unit(held), np.nanmin(flat, initial=np.inf)
+    ticks = Frames((held.values - least) * scale if np.isfinite(least) else held.values, held.t, array=held.array)
+    counts = _core.touches_of_frames(ticks._parts(), 0.0 if held.unit in FORCE_UNITS else np.nan)
+    result = judged(held.array, TaxelStatistics(activity, moved, by_taxel(counts, held.array)), loud=False)
     if not len(held):
         return result
-    loaded = held.values[0] > held.values.min()
-    return Health(held.array, activity, result.dead & ~loaded, result.dead & loaded, result.noisy)
+    # In pictures a taxel that never changes is dead or stuck, depending on its value.
+    loaded = held.values[0] > least
+    return replace(result, dead=result.dead & ~loaded, stuck=result.stuck | result.dead & loaded)
+
+
+class Touches(NamedTuple):
+    """Counts of each taxel's touches; whole numbers, shape (rows, columns)."""
+
+    touches: NDArray[np.int64]
+    """Number of touches of its place, as its neighbours show them."""
+    missed: NDArray[np.int64]
+    """Those in which it did not change."""
+    pressed: NDArray[np.int64]
+    """Number of bins in which it was touched itself."""
+    changed: NDArray[np.int64]
+    """Number of bins in which it changed."""
+    by_itself: NDArray[np.int64]
+    """Those in which hardly any taxel around it did."""
 
 
 class TaxelStatistics(NamedTuple):
@@ -142,6 +176,7 @@ class TaxelStatistics(NamedTuple):
     """Number of events."""
     moved: NDArray[np.int64]
     """Number of events with the polarity of the taxel's event before."""
+    touches: Touches
     values: NDArray[np.signedinteger] | None = None
     """Number of different intensities of its events: 0, 1, or 2 for more; None if events have none."""
     least: NDArray[np.signedinteger] | None = None
@@ -150,33 +185,43 @@ class TaxelStatistics(NamedTuple):
     """The greatest value that it is known to have held, ticks; -1 for a taxel without any event."""
 
 
-def judged(array: Array, statistics: TaxelStatistics) -> Health:
-    """Return the health of taxels with these statistics, by the rules of `health`."""
+def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> Health:
+    """Return the health of taxels with these statistics, by the rules of `health`; `loud`: that of noise too."""
     exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
-    activity = statistics.activity
+    activity, of = statistics.activity, statistics.touches
     silent = exists & (activity == 0)
-    # A median reaches a bound only if a neighbour reaches it, so all other taxels are skipped.
-    among = _reaches(activity, exists, _beside(exists & (activity >= DEAD_BELOW)) & exists, DEAD_BELOW)
-    moved = _reaches(statistics.moved, exists, silent & among, MOVED_FROM)
-    quiet = np.count_nonzero(among & (activity > 0) & (activity < DEAD_BELOW))
-    alone = quiet <= QUIET_SHARE * np.count_nonzero(among & silent)
-    loud = alone and 2 * np.count_nonzero(among) > np.count_nonzero(exists)
-    dead = silent & among & (moved | loud)
+    enough = (of.touches >= TOUCHED_FROM) & (_neighbours(exists) >= NEIGHBOURS_FROM)
+    dead = exists & enough & (of.missed == of.touches)
+    if loud:
+        # A median reaches a bound only if a neighbour reaches it, so all other taxels are skipped.
+        among = _reaches(activity, exists, (_neighbours(exists & (activity >= LOUD_FROM)) > 0) & exists, LOUD_FROM)
+        quiet = np.count_nonzero(among & (activity > 0) & (activity < LOUD_FROM))
+        alone = quiet <= QUIET_SHARE * np.count_nonzero(among & silent)
+        if alone and 2 * np.count_nonzero(among) > np.count_nonzero(exists):
+            dead |= silent & among
     stuck = np.zeros(array.shape, bool)
     if statistics.least is not None and statistics.greatest is not None:
         least = max(REST_FROM, REST_SHARE * int(statistics.greatest.max(initial=0)))
         known = exists & (statistics.least >= 0)
-        at_zero = silent & (statistics.greatest == 0) & _beside(known & (statistics.least >= least))
+        at_zero = silent & (statistics.greatest == 0) & (_neighbours(known & (statistics.least >= least)) > 0)
         dead |= _reaches(statistics.least, known, at_zero, least)
         stuck = dead & (statistics.greatest > 0)
     if statistics.values is not None:
         still = exists & (activity >= STUCK_FROM) & (statistics.values == 1)
         stuck |= _reaches(statistics.values, exists & (activity > 0), still, 1, above=True)
-    noisy = exists & (activity >= NOISY_FROM)
-    places = np.flatnonzero(noisy)
-    often = NOISY_TIMES * _around(activity, exists, places, 2, NOISY_SHARE)
-    noisy.reshape(-1)[places] = activity.reshape(-1)[places] > often
-    return Health(array, activity, dead & ~stuck, stuck, noisy)
+    noisy = exists & (of.by_itself >= NOISY_FROM) & (of.by_itself >= NOISY_SHARE * of.changed)
+    noisy &= ~stuck & (statistics.moved <= NOISY_ON * activity)
+    # A channel has no neighbours that would show what it should do.
+    noisy &= min(array.shape) > 1
+    dead &= ~stuck
+    works = enough | (of.pressed > 0) | (activity >= WORKS_FROM)
+    untold = exists & ~dead & ~stuck & ~noisy & ~works
+    return Health(array, activity, dead, stuck, noisy, untold)
+
+
+def by_taxel(counts: NDArray[np.uint32], array: Array) -> Touches:
+    """Return the counts of touches that the core gives, as grids."""
+    return Touches(*counts.astype(np.int64).reshape(array.rows, array.columns, 5).transpose(2, 0, 1))
 
 
 def _statistics_of_events(events: Events) -> TaxelStatistics:
@@ -184,8 +229,9 @@ def _statistics_of_events(events: Events) -> TaxelStatistics:
     own = np.ones(len(events), bool) if events.repaired is None else ~events.repaired
     index = events.array.index(events.x, events.y).astype(np.int64)
     activity, moved = _ways(index[own], np.where(events.p[own], 1, -1), events.array)
+    touches = by_taxel(_core.touches_of_events(events.sorted()._parts()), events.array)
     if events.intensity is None or events.present is None:
-        return TaxelStatistics(activity, moved)
+        return TaxelStatistics(activity, moved, touches)
     shape, size = events.array.shape, events.array.rows * events.array.columns
     pairs = np.unique(index[events.present & own] * 65_536 + events.intensity[events.present & own].astype(np.int64))
     values = np.bincount(pairs // 65_536, minlength=size).astype(np.int32)
@@ -194,7 +240,8 @@ def _statistics_of_events(events: Events) -> TaxelStatistics:
     np.minimum.at(least, index[events.present], ticks)
     np.maximum.at(greatest, index[events.present], ticks)
     least[greatest < 0] = -1
-    return TaxelStatistics(activity, moved, values.reshape(shape), least.reshape(shape), greatest.reshape(shape))
+    grids = (of.reshape(shape) for of in (values, least, greatest))
+    return TaxelStatistics(activity, moved, touches, *grids)
 
 
 def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -208,14 +255,14 @@ def _ways(index: NDArray[np.int64], way: NDArray[Any], array: Array) -> tuple[ND
     return activity, moved
 
 
-def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which taxels have a taxel of a mask among their up to 8 neighbours."""
+def _neighbours(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return how many of the up to 8 neighbours of each taxel a mask has."""
     rows, columns = mask.shape
     padded = np.pad(mask, 1)
-    reached = np.zeros(mask.shape, bool)
+    number = np.zeros(mask.shape, np.uint8)
     for i, j in _offsets(1):
-        reached |= padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
-    return reached
+        number += padded[1 + i : 1 + i + rows, 1 + j : 1 + j + columns]
+    return number
 
 
 def _reaches(

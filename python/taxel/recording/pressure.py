@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._core import ProblemError
 from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
-from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording.contents import UNKNOWN
 from taxel.recording.pictures import period_us
 from taxel.recording.recording import Recording
+from taxel.recording.rest import FORCE_UNITS, Picture, Rest, found, loaded_above, ticks_by_unit, tracked
+from taxel.tare import Tare
 
 __all__ = ["Series", "above_rest", "readings", "series"]
 
@@ -25,6 +28,10 @@ MOST_PICTURES = 2000
 PICTURES_HZ = 100.0
 #: Number of values of pictures that are computed at once.
 _BLOCK = 1 << 21
+#: The rest of events is tracked this often, us.
+_TRACKED_US = 50_000
+#: Largest rectangle around the taxels with events whose rest is tracked with regard to neighbours.
+_MOST_PLACES = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +52,8 @@ class Series:
         As of `Frames.centre`.
     centre_unit : {"mm", "taxels", "places"}
         As of `Array.centre_unit`.
+    rest : Rest
+        What was subtracted.
     force : float64, shape (n,), N
         Of values in kPa, if the area of each taxel is known.
     """
@@ -58,10 +67,11 @@ class Series:
     centre: NDArray[np.float64] | None
     area_unit: str
     centre_unit: str
+    rest: Rest
     force: NDArray[np.float64] | None = None
 
     @classmethod
-    def of(cls, frames: Frames, above: float) -> Series:
+    def of(cls, frames: Frames, above: float, rest: Rest) -> Series:
         """Return the series of pictures above rest."""
         array = frames.array
         in_mm2 = array.area_mm2 is not None
@@ -69,7 +79,7 @@ class Series:
         centre = None if array.is_channels else frames.centre(above)
         return cls(
             frames.t, frames.unit, above, None if array.is_channels else area, frames.peak(), frames.total(), centre,
-            "mm2" if in_mm2 else "taxels", array.centre_unit or "", force_n(frames),
+            "mm2" if in_mm2 else "taxels", array.centre_unit or "", rest, force_n(frames),
         )  # fmt: skip
 
 
@@ -81,33 +91,29 @@ def force_n(frames: Frames) -> NDArray[np.float64] | None:
     return np.asarray(np.einsum("nij,ij->n", frames.values, areas, dtype=np.float64) * N_PER_KPA_MM2)
 
 
-def series(recording: Recording) -> Series | None:
+def series(recording: Recording, tare: Tare | None = None) -> Series | None:
     """Return area, peak, sum and centre of a recording's pictures above rest (`above_rest`); None without intensities.
 
     For events only taxels with events are computed, a block of pictures at a time: for a large sensor with few events
     no whole picture is in memory.
     """
     if not recording.has_events or recording.calibration is not None:
-        result = above_rest(recording)
+        result = above_rest(recording, tare)
         return None if result is None else Series.of(*result)
     events = recording.events
     if events.present is None or events.intensity is None or not events.present.any():
         return None
     floor = ContactArea().above
     drawn = _Drawn.of(recording)
-    rest = np.full(len(drawn.taxels), np.inf)
-    for first, values in drawn.blocks():
-        known = drawn.t[first : first + len(values), None] >= drawn.since
-        rest = np.minimum(rest, np.min(values, axis=0, where=known, initial=np.inf))
+    rest = _rest_of(recording, drawn, tare)
     array, n = events.array, len(drawn.t)
     areas = array.area_mm2
     each = (np.ones(array.shape) if areas is None else areas).reshape(-1)[drawn.taxels]
     area, peak, total, centre = np.zeros(n), np.zeros(n), np.zeros(n), np.full((n, 2), np.nan)
     places = None if array.is_channels else [axis.reshape(-1)[drawn.taxels] for axis in array.positions()]
-    for first, values in drawn.blocks():
-        over = _core.above_rest(values.reshape(-1), rest).reshape(values.shape)
+    for first, over in drawn.above(rest):
         loaded = over > np.float64(floor)
-        part = slice(first, first + len(values))
+        part = slice(first, first + len(over))
         area[part] = np.where(loaded, each, 0.0).sum(axis=1)
         peak[part], total[part] = over.max(axis=1), over.sum(axis=1, dtype=np.float64)
         if places is None:
@@ -118,18 +124,24 @@ def series(recording: Recording) -> Series | None:
         np.divide(moments, all_of_them, out=centre[part], where=all_of_them > 0)
     of = (area, centre) if places is not None else (None, None)
     unit = "taxels" if areas is None else "mm2"
-    return Series(drawn.t, "ticks", floor, of[0], peak, total, of[1], unit, array.centre_unit or "")
+    return Series(drawn.t, "ticks", floor, of[0], peak, total, of[1], unit, array.centre_unit or "", rest)
 
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """The held values of the taxels with events at the times of pictures, in blocks of pictures."""
+    """The held values of the taxels with events, in blocks of pictures."""
 
+    #: Times of the pictures, us.
     t: NDArray[np.int64]
-    #: The indices of the taxels, the time of the first event of each, us, and their held values.
+    #: The indices of the taxels, the time from which the value of each is known, us, and their held values.
     taxels: NDArray[np.int64]
     since: NDArray[np.int64]
     held: _core.HeldValues
+    #: The place of each taxel in the rectangle around them, and that one's shape.
+    places: NDArray[np.int64]
+    box: tuple[int, int]
+    #: Place, time (us) and rest of the taxels that were zeroed.
+    zeroed: tuple[tuple[int, int, float], ...]
 
     @classmethod
     def of(cls, recording: Recording) -> _Drawn:
@@ -137,19 +149,76 @@ class _Drawn:
         assert events.present is not None and events.intensity is not None  # noqa: PT018  the caller checked
         there = np.flatnonzero(events.present)
         taxels, column = np.unique(events.array.index(events.x[there], events.y[there]), return_inverse=True)
-        begins, held = None, recording._contents.held
-        if held is not None:
-            begins = np.where(held == UNKNOWN, 0, held).reshape(-1)[taxels].astype(np.float32)
         since = np.full(len(taxels), np.iinfo(np.int64).max)
         np.minimum.at(since, column, events.t[there])
+        begins, held = None, recording._contents.held
+        if held is not None:
+            known = held.reshape(-1)[taxels] != UNKNOWN
+            begins = np.where(known, held.reshape(-1)[taxels], 0).astype(np.float32)
+            since[known] = np.iinfo(np.int64).min
         values = _core.HeldValues(events._parts(), taxels.astype(np.uint32), begins)
-        return cls(_times(recording), taxels, since, values)
+        y, x = np.divmod(taxels, events.array.columns)
+        rows, columns = int(np.ptp(y)) + 1, int(np.ptp(x)) + 1
+        if rows * columns > _MOST_PLACES:
+            places, rows, columns = np.arange(len(taxels)), 1, len(taxels)
+        else:
+            places = (y - y.min()) * columns + x - x.min()
+        of = {int(taxel): k for k, taxel in enumerate(taxels)}
+        zeroings = [(of.get(z.y * events.array.columns + z.x), z.t, z.rest) for z in recording.zeroings]
+        zeroed = tuple((k, t, rest) for k, t, rest in zeroings if k is not None)
+        return cls(_times(recording), taxels, since, values, places, (rows, columns), zeroed)
 
-    def blocks(self) -> Iterator[tuple[int, NDArray[np.float32]]]:
-        """Yield the number of the first picture of each block, and the held values of the taxels in its pictures."""
-        each = max(1, _BLOCK // max(1, len(self.taxels)))
-        for first in range(0, len(self.t), each):
-            yield first, self.held.at(self.t[first : first + each]).reshape(-1, len(self.taxels))
+    def blocks(self) -> Iterator[tuple[NDArray[np.bool_], Picture]]:
+        """Yield the held values in the rectangle, at the pictures' times and often enough between them.
+
+        Beside them stands which of them are pictures.
+        """
+        between = np.arange(self.t[0], self.t[-1], _TRACKED_US) if len(self.t) else self.t
+        times = np.union1d(self.t, between)
+        shown = np.isin(times, self.t)
+        size = self.box[0] * self.box[1]
+        each = max(1, _BLOCK // max(1, size))
+        for first in range(0, len(times), each):
+            t = times[first : first + each]
+            held = self.held.at(t).reshape(-1, len(self.taxels))
+            values = np.full((len(t), size), np.nan, np.float32)
+            values[:, self.places] = np.where(t[:, None] >= self.since, held, np.float32(np.nan))
+            yield shown[first : first + each], (t, values)
+
+    def found(self) -> Rest:
+        """Return the rest that a quiet stretch shows; its values are those of the taxels with events."""
+        rest = found(lambda: (picture for _, picture in self.blocks()), self.box[0] * self.box[1], self.box[1])
+        return replace(rest, values=rest.values[self.places])
+
+    def above(self, rest: Rest) -> Iterator[tuple[int, NDArray[np.float32]]]:
+        """Yield the number of the first picture of each block, and the values of the taxels above rest."""
+        kept: deque[tuple[NDArray[np.bool_], Picture]] = deque()
+
+        def read() -> Iterator[Picture]:
+            for block in self.blocks():
+                kept.append(block)
+                yield block[1]
+
+        everywhere = np.full(self.box[0] * self.box[1], np.nan)
+        everywhere[self.places] = rest.values
+        first = 0
+        for t, over in _above(replace(rest, values=everywhere), read(), self.box[1]):
+            shown, (_, values) = kept.popleft()
+            for k, since, zero in self.zeroed:
+                place, later = self.places[k], t >= since
+                over[later, place] = np.maximum(np.nan_to_num(values[later, place] - np.float32(zero)), 0)
+            yield first, over[shown][:, self.places]
+            first += int(np.count_nonzero(shown))
+
+
+def _above(rest: Rest, pictures: Iterable[Picture], columns: int, scale: float = 1.0) -> Iterable[Picture]:
+    """Yield pictures above a rest: tracked where nobody gave it; 0 where a value or its rest is not known."""
+    if rest.source in ("quiet", "none"):
+        yield from tracked(rest, pictures, columns, scale)
+        return
+    known = np.where(np.isnan(rest.values), np.inf, rest.values)
+    for t, values in pictures:
+        yield t, _core.above_rest(np.nan_to_num(values).reshape(-1), known).reshape(values.shape)
 
 
 def _rate_hz(recording: Recording) -> float:
@@ -164,46 +233,92 @@ def _times(recording: Recording) -> NDArray[np.int64]:
     return np.arange(first, stop, period_us("rate_hz", _rate_hz(recording)), dtype=np.int64)
 
 
-def above_rest(recording: Recording) -> tuple[Frames, float] | None:
-    """Return pictures of the values above rest, and the threshold of a loaded taxel; None without intensities.
+def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, float, Rest] | None:
+    """Return pictures of the values above rest, the threshold of a loaded taxel, and the rest.
 
-    They are in N or kPa if the recording has a calibration file beside it.
+    They are in N or kPa if the recording has a calibration file beside it. None without intensities.
 
-    *Reading*: in a recording of events the rest of a taxel is the lowest value since its first event, and it is loaded
-    if it is above its rest by more than the noise floor of the board's fast presets and half a tick, as in
-    `taxel.encode.ContactArea`. Files of pictures hold pressure, so the rest is 0.
+    Parameters
+    ----------
+    recording : Recording
+    tare : Tare, optional
+        The rest as it was measured.
+
+    Notes
+    -----
+    *Reading*: the rest is a given tare, and that of a zeroed taxel what it was zeroed to; else the calibration's; else
+    0 where the unit is one of force or pressure; else that of a quiet stretch, tracked from there on
+    (`taxel.encode.LocalLoad`); else it is not known: events are then above each taxel's first value, and pictures as
+    they are. A taxel is loaded if it is above its rest by more than the noise floor of the board's fast presets and
+    half a tick, as in `taxel.encode.ContactArea`; in another unit the range of a recording's values counts as 150
+    ticks.
     """
-    read = readings(recording)
+    read = _read(recording, tare)
     if read is None:
         return None
     frames, rest, floor = read
     if recording.calibration is not None:
-        known = recording.calibration.rest is not None
-        return recording.calibration.apply(frames, None if known else np.where(np.isinf(rest), np.nan, rest)), 0.0
-    if not recording.has_events:
-        return frames, 0.0
-    return frames._above(rest), floor
+        of, values = recording.calibration, rest.values.reshape(frames.array.shape)
+        return Frames(of._values(frames.values, values), frames.t, unit=of.unit, array=frames.array), 0.0, rest
+    if recording.has_events:
+        drawn = _Drawn.of(recording)
+        values = np.zeros((len(frames), frames.array.rows * frames.array.columns), np.float32)
+        for first, over in drawn.above(replace(rest, values=rest.values.reshape(-1)[drawn.taxels])):
+            values[first : first + len(over), drawn.taxels] = over
+    elif rest.source in ("unit", "none"):
+        return frames, 0.0, rest
+    else:
+        pictures = [(frames.t, frames.values.reshape(len(frames), -1))]
+        [(_, values)] = _above(rest, pictures, frames.array.columns, ticks_by_unit(frames))
+    shape = len(frames), *frames.array.shape
+    return Frames(values.reshape(shape), frames.t, unit=frames.unit, array=frames.array), floor, rest
 
 
-def readings(recording: Recording) -> tuple[Frames, NDArray[np.float64], float] | None:
-    """Return raw pictures, each taxel's rest, and the threshold of a loaded taxel; None without intensities.
+def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:
+    """Return raw pictures, the rest of each taxel, and the threshold of a loaded taxel; None without intensities.
 
-    The rest of a taxel without any event is infinite.
+    The rest is as of `above_rest`, but that of a quiet stretch as it was there.
     """
+    return _read(recording, tare)
+
+
+def _read(recording: Recording, tare: Tare | None) -> tuple[Frames, Rest, float] | None:
     if not recording.has_events:
-        return recording.frames(), np.zeros(recording.array.shape), 0.0
+        frames = recording.frames()
+        rest = _rest_of_pictures(recording, frames, tare)
+        return frames, rest, loaded_above(ticks_by_unit(frames)) if rest.source == "quiet" else 0.0
     events = recording.events
     if events.present is None or not events.present.any():
         return None
-    frames = recording.frames(_rate_hz(recording))
-    known = frames.t[:, None, None] >= _first_event_us(events)
-    rest = np.min(frames.values, axis=0, where=known, initial=np.inf).astype(np.float64)
-    return frames, rest, ContactArea().above
+    drawn = _Drawn.of(recording)
+    rest, values = _rest_of(recording, drawn, tare), np.full(events.array.shape, np.nan)
+    values.reshape(-1)[drawn.taxels] = rest.values
+    return recording.frames(_rate_hz(recording)), replace(rest, values=values.reshape(-1)), ContactArea().above
 
 
-def _first_event_us(events: Events) -> NDArray[np.int64]:
-    """Return the time of each taxel's first event, us; the largest time if there is none."""
-    first = np.full(events.array.shape, np.iinfo(np.int64).max)
-    there = events.present
-    np.minimum.at(first, (events.y[there], events.x[there]), events.t[there])
-    return first
+def _rest_of(recording: Recording, drawn: _Drawn, tare: Tare | None) -> Rest:
+    """Return the rest of the taxels with events, in their order."""
+    given = _given(recording, tare)
+    rest = drawn.found() if given is None else replace(given, values=given.values[drawn.taxels])
+    return replace(rest, zeroed=len({k for k, *_ in drawn.zeroed}))
+
+
+def _rest_of_pictures(recording: Recording, frames: Frames, tare: Tare | None) -> Rest:
+    given, taxels = _given(recording, tare), frames.array.rows * frames.array.columns
+    if given is not None:
+        return given
+    if frames.unit in FORCE_UNITS:
+        return Rest("unit", np.zeros(taxels))
+    pictures = [(frames.t, frames.values.reshape(len(frames), -1))]
+    return found(lambda: pictures, taxels, frames.array.columns, ticks_by_unit(frames))
+
+
+def _given(recording: Recording, tare: Tare | None) -> Rest | None:
+    """Return the rest that somebody measured; NaN where a taxel has none."""
+    if tare is not None:
+        if tare.array.shape != recording.array.shape:
+            given, own = (f"{rows} x {columns}" for rows, columns in (tare.array.shape, recording.array.shape))
+            raise ProblemError(f"the tare is of {given} taxels, {recording.path} of {own}")
+        return Rest("tare", tare.rest.reshape(-1))
+    of = recording.calibration
+    return None if of is None or of.rest is None else Rest("calibration", of.rest.reshape(-1))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel.clock import doubt
 from taxel.recording.health import health
 from taxel.recording.pressure import Series
 from taxel.recording.recording import Recording
@@ -63,15 +64,19 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
             "datagrams_per_s_host": len(clock.arrived_ns) / host if host else None,
             "drift_ppm": clock.drift_ppm,
             "delay_us": {"median": float(late[0]), "p99": float(late[1])},
+            "clock_doubt": doubt(clock.drift_ppm, float(late[1])),
         }
     calibration = recording.calibration
     facts["calibration"] = None if calibration is None else calibration.described()
+    facts["rest"] = None if pressed is None else {**pressed.rest.described(), "text": str(pressed.rest)}
     facts["pressure"] = None if pressed is None else _pressure(pressed)
+    of_taxels = health(table)
     return facts | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
         "registers": None if recording.registers is None else json.loads(recording.registers._json()),
-        "taxels": health(table).named(),
+        "taxels": of_taxels.named(),
+        "taxels_untold": int(np.count_nonzero(of_taxels.untold)),
         "counts": recording.counts,
         "truncated": recording.truncated,
         "rebuilt": recording.rebuilt,

@@ -174,6 +174,12 @@ impl Handle {
         (published.zeroed.values().copied().collect(), published.zeroings)
     }
 
+    /// The rest that the readout reads with, by taxel index; empty without a readout that has one.
+    #[must_use]
+    pub fn rest(&self) -> Vec<Option<f64>> {
+        self.shared.published().rest.clone()
+    }
+
     /// Number of zeroings.
     #[must_use]
     pub fn zeroings(&self) -> u64 {

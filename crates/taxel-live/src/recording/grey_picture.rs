@@ -4,6 +4,10 @@ use std::collections::VecDeque;
 
 use taxel_core::encode::Tare;
 use taxel_core::rest::{Rest, Value};
+use taxel_core::tracked_rest::TrackedRest;
+
+/// The noise floor of the board's fast presets, ticks.
+const NOISE_FLOOR: f64 = 3.0;
 
 /// White is the largest value of this period, us.
 const SCALE_US: i64 = 10_000_000;
@@ -15,6 +19,9 @@ const LATE_US: i64 = 1_000_000;
 #[derive(Debug)]
 pub(super) struct GreyScale {
     rest: Rest<f64>,
+    /// The rest as it is tracked, from the first picture on, unless a tare was given.
+    tracked: Option<TrackedRest>,
+    tared: bool,
     /// Largest recent values above rest, with their times, us; they decrease, so the first is the largest.
     peaks: VecDeque<(i64, f64)>,
 }
@@ -31,15 +38,16 @@ pub(super) struct GreyPicture {
 }
 
 impl GreyScale {
-    /// The scale of so many taxels, above the lowest value of each.
+    /// The scale of so many taxels, whose rest is tracked.
     pub(super) fn new(taxels: usize) -> Self {
-        Self { rest: Rest::lowest(vec![f64::NO_REST; taxels]), peaks: VecDeque::new() }
+        Self { rest: Rest::measured(vec![f64::NO_REST; taxels]), tracked: None, tared: false, peaks: VecDeque::new() }
     }
 
     /// Subtracts a tare's rest from now on.
     pub(super) fn tare(&mut self, tare: &Tare) {
         // A taxel without any event so far reads 0 and rests there.
         self.rest = Rest::measured(tare.rest.iter().map(|rest| rest.unwrap_or(0.0)).collect());
+        (self.tracked, self.tared) = (None, true);
         self.peaks.clear();
     }
 
@@ -52,16 +60,25 @@ impl GreyScale {
 
     /// The grey picture of the values at `t_us`; a value of 0 is also that of a taxel without any event so far.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    pub(super) fn draw(&mut self, t_us: i64, held: &[u16]) -> GreyPicture {
+    pub(super) fn draw(&mut self, t_us: i64, columns: usize, held: &[u16]) -> GreyPicture {
         if self.rest.values().len() != held.len() {
-            self.rest = Self::new(held.len()).rest;
+            *self = Self::new(held.len());
+        }
+        if !self.tared {
+            let begin = || TrackedRest::new(columns, NOISE_FLOOR, vec![f64::NO_REST; held.len()]);
+            let tracked = self.tracked.get_or_insert_with(begin);
+            tracked.take(t_us, held.iter().map(|&value| if value == 0 { f32::NAN } else { value.into() }));
+            for (taxel, rest) in tracked.rests().enumerate() {
+                self.rest.track(taxel, rest.unwrap_or(f64::NO_REST));
+            }
         }
         let mut above = vec![0.0; held.len()];
         for (taxel, &value) in held.iter().enumerate().filter(|(_, value)| **value > 0) {
             self.rest.follow(taxel, value.into());
             above[taxel] = self.rest.above(taxel, value.into());
         }
-        let rest = if self.rest.is_lowest() { "lowest so far" } else { "tare" };
+        let quiet = self.tracked.as_ref().map(|tracked| tracked.quiet().is_some());
+        let rest = quiet.map_or("tare", |quiet| if quiet { "quiet stretch" } else { "first values" });
         let peak = above.iter().copied().fold(0.0, f64::max);
         let late = self.peaks.back().is_some_and(|&(t, _)| (1..=LATE_US).contains(&t.saturating_sub(t_us)));
         // If time steps far back, the scale starts again.
@@ -85,43 +102,63 @@ mod tests {
     use super::*;
     use taxel_core::Array;
 
+    /// A scale above this rest, which does not change.
+    fn tared(rest: &[f64]) -> GreyScale {
+        let array = Array { rows: 1, columns: rest.len() as u16, ..Array::thesis() };
+        let rest = rest.iter().map(|&rest| Some(rest)).collect();
+        let mut scale = GreyScale::new(array.len());
+        scale.tare(&Tare { array, rest, noise: None, start_us: 0, stop_us: 1, note: String::new() });
+        scale
+    }
+
     #[test]
     fn rest_is_black_and_the_largest_of_the_last_ten_seconds_white() {
-        let mut scale = GreyScale::new(3);
-        let first = scale.draw(0, &[100, 50, 0]);
-        assert_eq!(first, GreyPicture { bytes: vec![0, 0, 0], rest: "lowest so far", full: 1.0 });
-        let pressed = scale.draw(100_000, &[160, 80, 0]);
+        let mut scale = tared(&[100.0, 50.0, 7.0]);
+        let first = scale.draw(0, 3, &[100, 50, 0]);
+        assert_eq!(first, GreyPicture { bytes: vec![0, 0, 0], rest: "tare", full: 1.0 });
+        let pressed = scale.draw(100_000, 3, &[160, 80, 0]);
         assert_eq!((pressed.bytes, pressed.full), (vec![255, 128, 0], 60.0));
         // A weaker press next to a stronger one, then alone: it becomes white ten seconds later.
-        assert_eq!(scale.draw(5_000_000, &[130, 50, 7]).bytes, [128, 0, 0]);
-        assert_eq!(scale.draw(10_100_000, &[130, 50, 7]).bytes, [255, 0, 0]);
-        // A value below the lowest so far lowers the rest.
-        assert_eq!(scale.draw(10_200_000, &[90, 50, 7]).bytes, [0, 0, 0]);
-        assert_eq!(scale.draw(30_000_000, &[100, 50, 7]).full, 10.0);
+        assert_eq!(scale.draw(5_000_000, 3, &[130, 50, 7]).bytes, [128, 0, 0]);
+        assert_eq!(scale.draw(10_100_000, 3, &[130, 50, 7]).bytes, [255, 0, 0]);
+    }
+
+    #[test]
+    fn what_stays_for_half_a_second_is_a_rest_and_values_below_it_are_black() {
+        let mut scale = GreyScale::new(2);
+        for k in 0..7 {
+            // A taxel that moves every time is no quiet stretch.
+            assert_eq!(scale.draw(k * 100_000, 2, &[100, 20 + 10 * (k as u16 % 2)]).rest, "first values");
+        }
+        for k in 7..20 {
+            scale.draw(k * 100_000, 2, &[100, 20]);
+        }
+        let grey = scale.draw(2_000_000, 2, &[90, 60]);
+        assert_eq!((grey.bytes, grey.rest), (vec![0, 255], "quiet stretch"));
     }
 
     #[test]
     fn a_picture_that_comes_late_keeps_the_scale() {
-        let mut scale = GreyScale::new(1);
-        scale.draw(0, &[100]);
-        assert_eq!(scale.draw(1_000_000, &[140]).full, 40.0);
-        assert_eq!(scale.draw(1_500_000, &[120]).full, 40.0);
+        let mut scale = tared(&[100.0]);
+        scale.draw(0, 1, &[100]);
+        assert_eq!(scale.draw(1_000_000, 1, &[140]).full, 40.0);
+        assert_eq!(scale.draw(1_500_000, 1, &[120]).full, 40.0);
         // Pictures from half a second ago, weaker and stronger than the latest values.
-        assert_eq!(scale.draw(1_400_000, &[110]).bytes, [64]);
-        assert_eq!(scale.draw(1_450_000, &[180]).full, 80.0);
-        assert_eq!(scale.draw(1_600_000, &[140]).bytes, [128]);
+        assert_eq!(scale.draw(1_400_000, 1, &[110]).bytes, [64]);
+        assert_eq!(scale.draw(1_450_000, 1, &[180]).full, 80.0);
+        assert_eq!(scale.draw(1_600_000, 1, &[140]).bytes, [128]);
         // The clock restarts.
-        assert_eq!(scale.draw(0, &[140]).bytes, [255]);
+        assert_eq!(scale.draw(0, 1, &[140]).bytes, [255]);
     }
 
     #[test]
     fn a_zeroed_taxel_is_black_until_it_is_pressed() {
         let mut scale = GreyScale::new(2);
-        scale.draw(0, &[100, 100]);
-        assert_eq!(scale.draw(1, &[130, 140]).bytes, [191, 255]);
+        scale.draw(0, 2, &[100, 100]);
+        assert_eq!(scale.draw(1, 2, &[130, 140]).bytes, [191, 255]);
         scale.zero(0, 130.0);
-        assert_eq!(scale.draw(2, &[130, 140]).bytes, [0, 255]);
-        assert_eq!(scale.draw(3, &[150, 140]).bytes, [128, 255]);
+        assert_eq!(scale.draw(2, 2, &[130, 140]).bytes, [0, 255]);
+        assert_eq!(scale.draw(3, 2, &[150, 140]).bytes, [128, 255]);
     }
 
     #[test]
@@ -130,9 +167,9 @@ mod tests {
         let rest = vec![Some(90.5), None, Some(20.0)];
         let tare = Tare { array, rest, noise: None, start_us: 0, stop_us: 1, note: String::new() };
         let mut scale = GreyScale::new(3);
-        scale.draw(0, &[100, 50, 20]);
+        scale.draw(0, 3, &[100, 50, 20]);
         scale.tare(&tare);
-        let grey = scale.draw(100_000, &[110, 39, 20]);
+        let grey = scale.draw(100_000, 3, &[110, 39, 20]);
         assert_eq!(grey, GreyPicture { bytes: vec![128, 255, 0], rest: "tare", full: 39.0 });
     }
 }

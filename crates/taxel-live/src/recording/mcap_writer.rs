@@ -305,8 +305,8 @@ impl Track {
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 
-    /// Subtracts a tare's rest from the pictures from now on; without a tare, the lowest value of each taxel so far is
-    /// subtracted.
+    /// Subtracts a tare's rest from the pictures from now on; without a tare it is the
+    /// rest that [`TrackedRest`](taxel_core::tracked_rest::TrackedRest) finds.
     pub fn tare(&self, tare: &Tare) {
         self.grey_scale().tare(tare);
     }
@@ -327,7 +327,7 @@ impl Track {
             let n = ticks.len();
             return Err(problem!("picture of {n} taxels, {columns} a row: must be whole rows").into());
         }
-        let grey = self.grey_scale().draw(t_us, ticks);
+        let grey = self.grey_scale().draw(t_us, columns, ticks);
         let picture = json!({
             "timestamp": time(at_ns), "frame_id": "taxel", "width": columns, "height": ticks.len() / columns,
             "encoding": "mono8", "step": columns, "data": base64(&grey.bytes), "t_us": t_us,

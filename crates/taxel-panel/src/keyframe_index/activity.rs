@@ -1,6 +1,9 @@
 //! Counts by taxel from which dead, stuck and noisy ones are found.
 
+use taxel_core::Array;
 use taxel_core::held::UNKNOWN;
+use taxel_core::rest::Value;
+use taxel_core::touch_counts::TouchCounts;
 use taxel_live::pipeline::Change;
 
 /// Events and held values of each taxel so far.
@@ -14,15 +17,19 @@ pub struct Activity {
     pub values: Vec<u8>,
     /// Least and greatest held value, ticks; [`UNKNOWN`] and 0 before the first event.
     pub range: Vec<(u16, u16)>,
+    /// Touches of each taxel, and what it did.
+    pub touches: TouchCounts,
     first: Vec<u16>,
     up: Vec<bool>,
 }
 
 impl Activity {
-    /// Counts of `taxels` taxels without any event.
+    /// Counts of an array's taxels without any event.
     #[must_use]
-    pub fn new(taxels: usize) -> Self {
+    pub fn new(array: &Array) -> Self {
+        let taxels = array.len();
         Self {
+            touches: TouchCounts::new(array, f64::NO_REST),
             events: vec![0; taxels],
             moved: vec![0; taxels],
             values: vec![0; taxels],
@@ -36,6 +43,7 @@ impl Activity {
     pub fn count(&mut self, change: &Change) {
         let taxel = change.taxel as usize;
         self.set_held(taxel, change.ticks);
+        self.touches.event(change.t, taxel, change.ticks, change.up, !change.repaired);
         if change.repaired {
             return;
         }

@@ -213,7 +213,7 @@ impl KeyframeIndex for LiveIndex {
         let stored = &ring.pieces[place];
         let held = stored.piece.held.clone().unwrap_or_default();
         let rest = stored.rest.as_ref().map_or_else(|| held.clone(), |rest| rest.to_vec());
-        let keyframe = Keyframe { latest: stored.piece.since, events: stored.piece.before, held, rest };
+        let keyframe = Keyframe { latest: stored.piece.since, events: stored.piece.before, held, rest, tracked: None };
         let number = ring.first + place as u64;
         drop(ring);
         Ok((keyframe, Box::new(LiveChanges { index: self.clone(), number, held_returned: Some(number) })))
@@ -253,7 +253,7 @@ mod tests {
         let array = Array::thesis();
         let index = LiveIndex::new(array.clone(), 3);
         let blank = vec![UNKNOWN; array.len()];
-        let start = Keyframe { latest: None, events: 0, held: blank.clone(), rest: blank.clone() };
+        let start = Keyframe::blank(array.len());
         let mut state = ArrayState::new(array.columns, 3, &start, COLUMN_US, 0);
         index.push(Piece { held: Some(blank.clone()), ..Piece::default() }, &state);
         assert_eq!(index.range(), None);

@@ -114,7 +114,7 @@ impl RecordingIndex {
                 return Err(problem!("{name}: the panel shows .mcap and .lsa; taxel convert makes a .mcap").into());
             }
         };
-        let taxels = header.array.len();
+        let header_array = header.array.clone();
         let mut index = Self {
             path: path.to_owned(),
             source,
@@ -125,7 +125,7 @@ impl RecordingIndex {
             bytes,
             events: 0,
             event_rate: (0, COLUMN_US, vec![]),
-            activity: Activity::new(taxels),
+            activity: Activity::new(&header_array),
             remarks: Remarks::default(),
             verdict,
             unfinished,
@@ -227,9 +227,13 @@ impl RecordingIndex {
     /// Reads the whole file once: another thread decodes, this one builds keyframes.
     fn build(&mut self) -> Result<()> {
         let taxels = self.header.array.len();
-        let blank = Keyframe { latest: None, events: 0, held: vec![UNKNOWN; taxels], rest: vec![UNKNOWN; taxels] };
-        let mut state =
-            ArrayState::new(self.header.array.columns, self.noise_floor(), &blank, COLUMN_US, TIME_COLUMN_BYTES);
+        let mut state = ArrayState::new(
+            self.header.array.columns,
+            self.noise_floor(),
+            &Keyframe::blank(taxels),
+            COLUMN_US,
+            TIME_COLUMN_BYTES,
+        );
         let mut keys: Vec<Key> = vec![];
         let (decoded, blocks) = channel::bounded(AHEAD);
         let index = &*self;
@@ -278,14 +282,15 @@ impl RecordingIndex {
     fn decode_all(&self, to: &channel::Sender<Decoded>) -> Result<Contents> {
         let taxels = self.header.array.len();
         let (mut decoding, mut place) = (self.decoding(), Place::default());
-        // Beside the held values, a decoder of version 2 stores the last 65 536 sequence numbers.
-        let each = 4 * taxels + (80 << 10);
+        // Beside the held values and how the rest is tracked, a decoder of version 2 stores the last 65 536 sequence
+        // numbers.
+        let each = 64 * taxels + (80 << 10);
         let (mut spacing, mut since, mut keys) = (SPACING, u64::MAX, 0);
         let mut events = Events::empty(self.header.array.clone());
         let mut contents = Contents {
             first: None,
             event_rate: EventRate::default(),
-            activity: Activity::new(taxels),
+            activity: Activity::new(&self.header.array),
             remarks: Remarks::default(),
         };
         for k in 0..self.blocks() {

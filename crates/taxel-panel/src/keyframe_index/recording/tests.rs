@@ -144,12 +144,7 @@ fn any_time_of_a_recording_looks_as_after_a_full_decode() {
                 "{ending}: raster at {t} us by {us} us"
             );
             // Curves and changes by a state of the same column width, from the beginning, without a keyframe.
-            let blank = Keyframe {
-                latest: None,
-                events: 0,
-                held: vec![UNKNOWN; index.header.array.len()],
-                rest: vec![UNKNOWN; index.header.array.len()],
-            };
+            let blank = Keyframe::blank(index.header.array.len());
             let mut slow = ArrayState::new(index.header.array.columns, index.noise_floor(), &blank, us, 1 << 28);
             changes.iter().filter(|change| change.t <= t).for_each(|change| slow.apply_one(change));
             slow.advance(t);

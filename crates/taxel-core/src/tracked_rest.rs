@@ -1,0 +1,220 @@
+//! The rest of a sensor that nobody measured: found in a quiet stretch, and tracked from there on.
+//!
+//! Reading: a stretch is quiet if no taxel was further from its mean than the tracked rest calls far; on a grid, if no
+//! three of nine neighbours were, so that bad taxels, which move alone or in pairs, do not count. It can be that of a
+//! load that does not move: a taxel that lies far below its rest for a whole quiet stretch was loaded before, and its
+//! rest is set anew.
+
+use crate::baseline::{Baseline, FAR_NOISE, stands_out_from};
+use crate::rest::Value;
+
+/// The shortest quiet stretch, us.
+pub const QUIET_US: i64 = 500_000;
+
+/// Number of taxels among a place and its 8 neighbours that a touch moves at least, on a grid.
+pub const TOUCHED_TOGETHER: usize = 3;
+
+/// The fewest samples of a quiet stretch: fewer do not show that it was quiet.
+const LEAST_SAMPLES: u32 = 4;
+
+/// The stretch being measured: statistics of each taxel's values less the first one.
+#[derive(Debug, Clone, PartialEq)]
+struct Stretch {
+    from: i64,
+    samples: u32,
+    first: Vec<f32>,
+    least: Vec<f32>,
+    greatest: Vec<f32>,
+    sums: Vec<f32>,
+    squares: Vec<f32>,
+}
+
+impl Stretch {
+    fn new(from: i64, first: &[f32]) -> Self {
+        let zeros = || vec![0.0; first.len()];
+        let (least, greatest, sums, squares) = (zeros(), zeros(), zeros(), zeros());
+        Self { from, samples: 1, first: first.to_vec(), least, greatest, sums, squares }
+    }
+
+    fn take(&mut self, values: &[f32]) {
+        self.samples += 1;
+        for (taxel, value) in values.iter().enumerate() {
+            let change = value - self.first[taxel];
+            self.least[taxel] = self.least[taxel].min(change);
+            self.greatest[taxel] = self.greatest[taxel].max(change);
+            self.sums[taxel] += change;
+            self.squares[taxel] += change * change;
+        }
+    }
+
+    /// A taxel that has no value before this one had it throughout.
+    fn begin(&mut self, taxel: usize, value: f32) {
+        self.first[taxel] = value;
+    }
+
+    #[allow(clippy::cast_precision_loss)]
+    fn mean(&self, taxel: usize) -> f64 {
+        f64::from(self.first[taxel]) + f64::from(self.sums[taxel] / self.samples as f32)
+    }
+
+    /// The median of the taxels' standard deviations on a grid, where a touch moves few of them; 0 for channels, each of
+    /// which a load may move. A taxel without a value so far is one that did not move.
+    #[allow(clippy::cast_precision_loss)]
+    fn noise(&self, columns: usize) -> f64 {
+        let n = self.samples as f32;
+        let variance = |(sum, squares): (&f32, &f32)| (squares - sum * sum / n).max(0.0) / n;
+        let mut all: Vec<f32> = self.sums.iter().zip(&self.squares).map(variance).collect();
+        if is_channels(all.len(), columns) {
+            return 0.0;
+        }
+        let middle = all.len() / 2;
+        f64::from(*all.select_nth_unstable_by(middle, f32::total_cmp).1).sqrt()
+    }
+
+    /// Whether it was quiet: see the module.
+    fn quiet(&self, far: f64, known: &[bool], columns: usize) -> bool {
+        let moved = |taxel: usize| {
+            let mean = self.mean(taxel) - f64::from(self.first[taxel]);
+            known[taxel] && (f64::from(self.greatest[taxel]) - mean).max(mean - f64::from(self.least[taxel])) >= far
+        };
+        let moved: Vec<usize> = (0..known.len()).filter(|&taxel| moved(taxel)).collect();
+        if is_channels(known.len(), columns) {
+            return moved.is_empty();
+        }
+        let rows = known.len() / columns;
+        let mut near = vec![0; known.len()];
+        for taxel in moved {
+            let (row, column) = (taxel / columns, taxel % columns);
+            for y in row.saturating_sub(1)..(row + 2).min(rows) {
+                for x in column.saturating_sub(1)..(column + 2).min(columns) {
+                    near[y * columns + x] += 1;
+                    if near[y * columns + x] >= TOUCHED_TOGETHER {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+}
+
+/// Whether so many taxels in so many columns are channels, in which no taxel has neighbours all around it.
+fn is_channels(taxels: usize, columns: usize) -> bool {
+    columns == 1 || taxels <= columns
+}
+
+/// The rest of each taxel, tracked as [`Baseline::tracked`] does; before the first quiet stretch, from the taxels' first
+/// values on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackedRest {
+    columns: usize,
+    noise_floor: f64,
+    baseline: Baseline,
+    /// The values to read: those of taxels without a value are their rest.
+    values: Vec<f32>,
+    /// Whether a taxel had a value so far, or its rest was given.
+    known: Vec<bool>,
+    stretch: Option<Stretch>,
+    far: f64,
+    /// The first quiet stretch, us.
+    quiet: Option<(i64, i64)>,
+    /// The rest of each taxel in its first quiet stretch; [`Value::NO_REST`] before it.
+    begins: Vec<f64>,
+}
+
+impl TrackedRest {
+    /// The rest of an array with so many `columns`, from `begins` on ([`Value::NO_REST`] if unknown); `noise_floor` in
+    /// the sensor's unit.
+    #[must_use]
+    pub fn new(columns: usize, noise_floor: f64, begins: Vec<f64>) -> Self {
+        let n = begins.len();
+        let far = stands_out_from(FAR_NOISE, 0.0, noise_floor);
+        let known: Vec<bool> = begins.iter().map(|&rest| rest != f64::NO_REST).collect();
+        let rest = begins.into_iter().map(|rest| if rest == f64::NO_REST { 0.0 } else { rest }).collect();
+        #[allow(clippy::cast_possible_truncation)]
+        let baseline = Baseline::tracked(rest, vec![far as f32; n]);
+        let (columns, begins) = (columns.max(1), vec![f64::NO_REST; n]);
+        Self { columns, noise_floor, baseline, values: vec![0.0; n], known, stretch: None, far, quiet: None, begins }
+    }
+
+    /// Reads the next values, at `t` us, NaN for a taxel without one; returns them above the rest (negative below it).
+    #[allow(clippy::cast_possible_truncation)]
+    pub fn take(&mut self, t: i64, values: impl IntoIterator<Item = f32>) -> &[f32] {
+        for (taxel, value) in values.into_iter().enumerate().take(self.known.len()) {
+            if value.is_nan() {
+                self.values[taxel] = self.baseline.values()[taxel] as f32;
+                continue;
+            }
+            self.values[taxel] = value;
+            if !self.known[taxel] {
+                self.known[taxel] = true;
+                self.baseline.begin(taxel, value.into());
+                if let Some(stretch) = &mut self.stretch {
+                    stretch.begin(taxel, value);
+                }
+            }
+        }
+        match &mut self.stretch {
+            Some(stretch) if stretch.from <= t => stretch.take(&self.values),
+            _ => self.stretch = Some(Stretch::new(t, &self.values)),
+        }
+        self.baseline.take(t, &self.values);
+        if self.stretch.as_ref().is_some_and(|stretch| t - stretch.from >= QUIET_US) {
+            self.end_stretch(t);
+        }
+        self.baseline.above()
+    }
+
+    /// Ends the stretch at `t`: a quiet one sets rests.
+    #[allow(clippy::cast_possible_truncation)]
+    fn end_stretch(&mut self, t: i64) {
+        let next = Stretch::new(t, &self.values);
+        let Some(stretch) = self.stretch.replace(next) else { return };
+        // Noise above the noise floor would be events without end: a load that moves is no noise.
+        let noise = stretch.noise(self.columns).min(self.noise_floor);
+        let far = stands_out_from(FAR_NOISE, noise, self.noise_floor);
+        let any = self.known.contains(&true);
+        if stretch.samples < LEAST_SAMPLES || !any || !stretch.quiet(far, &self.known, self.columns) {
+            return;
+        }
+        let first = self.quiet.is_none();
+        if first {
+            self.quiet = Some((stretch.from, t));
+        }
+        if far != self.far {
+            self.far = far;
+            (0..self.known.len()).for_each(|taxel| self.baseline.set_far(taxel, far as f32));
+        }
+        for taxel in 0..self.known.len() {
+            if !self.known[taxel] {
+                continue;
+            }
+            let (mean, rest) = (stretch.mean(taxel), self.baseline.values()[taxel]);
+            let below = mean <= rest - far;
+            if below || first && mean < rest + far {
+                self.baseline.set(taxel, mean);
+            }
+            if below || self.begins[taxel] == f64::NO_REST {
+                self.begins[taxel] = self.begins[taxel].min(self.baseline.values()[taxel]);
+            }
+        }
+    }
+
+    /// The rest of each taxel; `None` for one without any value so far.
+    pub fn rests(&self) -> impl Iterator<Item = Option<f64>> {
+        self.baseline.values().iter().zip(&self.known).map(|(&rest, &known)| known.then_some(rest))
+    }
+
+    /// The first quiet stretch so far, us.
+    #[must_use]
+    pub fn quiet(&self) -> Option<(i64, i64)> {
+        self.quiet
+    }
+
+    /// The rest of each taxel in its first quiet stretch, or in a later one that lies far below it: from where to track
+    /// a recording that is read again; [`Value::NO_REST`] for a taxel without any.
+    #[must_use]
+    pub fn begins(&self) -> &[f64] {
+        &self.begins
+    }
+}

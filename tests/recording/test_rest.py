@@ -1,0 +1,112 @@
+"""The rest of a recording: given, the calibration's, 0, that of a quiet stretch, or not known; never the lowest."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel.recording.pressure import above_rest, series
+
+from .test_commands import run
+
+
+def noisy(noise: float, seconds: float = 2.0) -> taxel.Events:
+    """A board of 12 x 16 taxels with nothing on it: an event where a value differs by more than 3 from the last one."""
+    rng = np.random.default_rng(7)
+    array = taxel.Array(12, 16)
+    rest = 48 + rng.normal(0, 2, array.shape)
+    last = np.rint(rest)
+    rows = [(0, x, y, True, last[y, x]) for y in range(12) for x in range(16)]
+    for frame in range(1, int(seconds * 5000)):
+        now = np.rint(rest + rng.normal(0, noise, rest.shape))
+        for y, x in np.argwhere(np.abs(now - last) > 3):
+            rows.append((200 * frame, x, y, now[y, x] > last[y, x], now[y, x]))
+            last[y, x] = now[y, x]
+    t, x, y, p, ticks = map(np.array, zip(*rows, strict=True))
+    return taxel.Events(t, x, y, p, array=array, intensity=ticks.astype(int))
+
+
+def test_a_board_with_nothing_on_it_reads_nothing(tmp_path: Path) -> None:
+    events = noisy(1.0)
+    lowest = np.full(events.array.shape, 999.0)
+    np.minimum.at(lowest, (events.y, events.x), events.intensity)
+    held = taxel.Frames.from_events(events, 10_000)
+    assert np.median(np.count_nonzero(held.values - lowest > 3, axis=(1, 2))) > 20, "above the lowest values it does"
+    taxel.convert(events, tmp_path / "a.npz")
+    found = series(taxel.open(tmp_path / "a.npz"))
+    assert found is not None
+    assert found.rest.source == "quiet"
+    assert np.median(found.area) / events.array.pitch_mm**2 <= 6
+
+
+def test_a_load_that_stays_and_one_that_comes_back(tmp_path: Path) -> None:
+    # Four neighbours: 50 for a second, 90 for a second, 50 again.
+    places = [(2, 2), (3, 2), (2, 3), (3, 3)]
+    rows = [(t, x, y, ticks) for t, ticks in ((0, 50), (1_000_000, 90), (2_000_000, 50)) for x, y in places]
+    rows.append((3_000_000, 0, 0, 20))
+    t, x, y, ticks = zip(*rows, strict=True)
+    events = taxel.Events(t, x, y, [1] * len(t), array=taxel.Array(6, 6, 1.0), intensity=ticks)
+    taxel.convert(events, tmp_path / "a.npz")
+    found = series(taxel.open(tmp_path / "a.npz"))
+    assert found is not None
+    pressed = (found.t >= 1_000_000) & (found.t < 2_000_000)
+    assert found.rest.quiet_us == (0, 500_000)
+    assert found.total[pressed][0] == pytest.approx(160.0)
+    # Of a load that stays, the tracked rest takes a twentieth a second.
+    assert found.total[pressed][-1] == pytest.approx(160.0 * np.exp(-1 / 20), rel=0.01)
+    assert found.area[pressed].tolist() == [4.0] * np.count_nonzero(pressed)
+    assert not found.total[~pressed].any()
+
+
+def test_a_tare_comes_first_then_the_calibrations_rest_then_a_quiet_stretch(tmp_path: Path) -> None:
+    t = [0, 0, 1_000_000, 1_200_000]
+    events = taxel.Events(t, [0, 1, 0, 0], [0] * 4, [1] * 4, array=taxel.Array(2, 2, 1.0), intensity=[50, 40, 90, 50])
+    path = tmp_path / "a.npz"
+    taxel.convert(events, path)
+    said = json.loads(run("info", path, "--json").stdout)
+    assert said["rest"]["source"] == "quiet"
+    assert said["pressure"]["peak"]["most"] == pytest.approx(40, abs=0.1)
+    tare = taxel.Tare.take(taxel.Frames(np.full((2, 2, 2), 30.0), [0, 1], unit="ticks", array=events.array))
+    tare.save(tmp_path / "tare.json")
+    said = json.loads(run("info", path, "--tare", tmp_path / "tare.json", "--json").stdout)
+    assert (said["rest"]["source"], said["pressure"]["peak"]["most"]) == ("tare", 60.0)
+    assert "rest                the given tare" in run("info", path, "--tare", tmp_path / "tare.json").stdout
+    refused = run("calibrate", path, "--load", "2", "--from", "1.0", "--to", "1.1", "--tare", tmp_path / "tare.json")
+    assert refused.returncode == 0, refused.stderr
+    said = json.loads(run("info", path, "--json").stdout)
+    assert (said["rest"]["source"], said["pressure"]["unit"]) == ("calibration", "N")
+    other = taxel.Tare.take(taxel.Frames(np.zeros((2, 3, 2)), [0, 1]))
+    other.save(tmp_path / "other.json")
+    assert "the tare is of 3 x 2 taxels" in run("info", path, "--tare", tmp_path / "other.json").stderr
+
+
+def test_pictures_of_force_rest_at_0_and_others_where_they_are_quiet(tmp_path: Path) -> None:
+    values = np.full((40, 2, 2), 20.0)
+    values[20:30, 0, :] = 80.0
+    values[20:30, 1, :] = 60.0
+    t = np.arange(40) * 50_000
+    for unit, source, peak in (("kPa", "unit", 80.0), ("counts", "quiet", 60.0)):
+        taxel.convert(taxel.Frames(values, t, unit=unit), tmp_path / f"{unit}.npz")
+        found = above_rest(taxel.open(tmp_path / f"{unit}.npz"))
+        assert found is not None
+        frames, _, rest = found
+        assert (rest.source, float(frames.values.max())) == (source, pytest.approx(peak, rel=1e-3))
+
+
+def test_what_is_never_quiet_has_no_rest_and_the_page_says_so(tmp_path: Path) -> None:
+    values = np.arange(40)[:, None, None] % 2 * 30.0 + np.full((40, 3, 3), 50.0)
+    taxel.convert(taxel.Frames(values, np.arange(40) * 50_000, unit="counts"), tmp_path / "a.npz")
+    assert "rest                not known" in run("info", tmp_path / "a.npz").stdout
+    found = above_rest(taxel.open(tmp_path / "a.npz"))
+    assert found is not None
+    assert float(found[0].values.max()) == 80.0
+    events = taxel.Events([0, 100], [0, 0], [0, 0], [1, 1], array=taxel.Array(2, 2), intensity=[50, 90])
+    taxel.convert(events, tmp_path / "e.npz")
+    refused = run("calibrate", tmp_path / "e.npz", "--load", "2")
+    assert refused.returncode == 2
+    assert "the rest of its taxels is not known" in refused.stderr
+    assert "--tare" in refused.stderr
