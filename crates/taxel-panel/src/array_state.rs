@@ -35,6 +35,8 @@ pub struct ArrayState {
     /// Column and row of each taxel, looked up because a division per change would dominate the cost.
     places: Arc<[(u16, u16)]>,
     floor: u16,
+    /// Whether pictures are shown ([`ArrayState::of_pictures`]).
+    pictures: bool,
     held: Held,
     rest: Rest<u16>,
     /// Number of changes of the rest.
@@ -69,6 +71,7 @@ impl ArrayState {
         let mut state = Self {
             places: (0..from.held.len()).map(place).collect(),
             floor,
+            pictures: false,
             held: from.held.clone().into(),
             rest: Rest::lowest(from.rest.clone()),
             rests: 1,
@@ -91,6 +94,16 @@ impl ArrayState {
             state.advance(t);
         }
         state
+    }
+
+    /// The state where pictures are shown: the rest is that of the keyframe, a change without a value is a value that is
+    /// missing from then on, and pictures are counted as events are.
+    #[must_use]
+    pub fn of_pictures(mut self, from: &Keyframe) -> Self {
+        self.pictures = true;
+        self.rest = Rest::measured(from.rest.clone());
+        self.sum_above_rest();
+        self
     }
 
     /// A keyframe of the current state.
@@ -137,7 +150,7 @@ impl ArrayState {
         for together in changes.chunk_by(|one, next| one.t == next.t) {
             let t = together[0].t;
             self.advance(t);
-            self.events += together.len() as u64;
+            self.events += if self.pictures { 1 } else { together.len() as u64 };
             together.iter().for_each(|change| self.apply_to_taxel(change));
             let column = match self.column {
                 Some(column) if self.within.contains(&t) => column,
@@ -158,6 +171,11 @@ impl ArrayState {
     #[inline]
     fn apply_to_taxel(&mut self, change: &Change) {
         let taxel = change.taxel as usize;
+        if change.ticks == UNKNOWN && self.pictures {
+            let above = self.above(taxel);
+            self.held.set(taxel, UNKNOWN);
+            return self.change_above_rest(taxel, above, 0);
+        }
         if change.ticks == UNKNOWN {
             let size = if change.up { UNVALUED } else { -UNVALUED };
             self.change[taxel] = self.change[taxel].saturating_add(size).max(-127);

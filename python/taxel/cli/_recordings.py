@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -161,6 +161,7 @@ def references(source: str | None, option: str, recordings: Sequence[Recording])
         raise ProblemError(
             f"{option} {source}: names no recording, and there are {len(recordings)}; must have the column recording"
         )
+    _check_sources(table, option, recordings)
     unnamed = [str(recording.path) for recording in recordings if table.named(recording.path) is None]
     known = {table.named(recording.path) for recording in recordings}
     others = [name for name in table.recordings if name not in known]
@@ -168,6 +169,17 @@ def references(source: str | None, option: str, recordings: Sequence[Recording])
         names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
         raise ProblemError(f"{option} {source}: names no event in {', '.join(unnamed)}; {names}")
     return [_within(table, recording, option) for recording in recordings]
+
+
+def _check_sources(table: Labels, option: str, recordings: Sequence[Recording]) -> None:
+    """Refuse labels of a source that their recording does not have."""
+    for row in table.rows:
+        labels = {one.label for one in recordings if row.recording == table.named(one.path)}
+        if row.source and labels and row.source not in labels:
+            there = ", ".join(sorted(labels))
+            raise ProblemError(
+                f"{option} {table.path}: {row.text} at {row.t} us is of source {row.source}; there is {there}"
+            )
 
 
 def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
@@ -187,7 +199,7 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
     inside = {label: t[(t >= first) & (t <= last + 1_000_000)] for label, t in events.items()}
     total = sum(map(len, events.values()))
     outside = total - sum(map(len, inside.values()))
-    span = f"{recording.path} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
+    span = f"{recording.title} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
     if total and outside == total:
         raise ProblemError(f"{option} {table.path}: holds {counted(total, 'event')}, none within {span}")
     if recording.clock is None and any(row.at_ns for row in table.rows):
@@ -219,11 +231,38 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
             typer.echo(f"taxel: warning: {warning.message}", err=True)
 
 
-def open_recording(path: Path, array: str | None = None) -> Recording:
-    """Open a file with the sensor of ``--array``."""
-    from taxel import recording  # noqa: PLC0415  the command line starts quickly
+#: Option of the commands that need times.
+RateOption = Annotated[
+    float | None,
+    typer.Option(
+        "--rate-hz",
+        help="Pictures a second, for recordings without times (their pictures are numbered), and only those.",
+    ),
+]
 
-    return of_array(recording.open_recording(path, array=None if array is None else geometry(array)), array)
+
+def timed(recording: Recording, rate_hz: float | None) -> Recording:
+    """Return a recording with the times of ``--rate-hz``; refuse it for one that has times."""
+    return recording if rate_hz is None else recording.at_rate(rate_hz)
+
+
+def open_one(path: Path, array: str | None = None, rate_hz: float | None = None) -> Recording:
+    """Open a file that holds one recording, with its feet joined, with the sensor of ``--array``."""
+    every = open_joined(path, array, rate_hz)
+    if len(every) > 1:
+        names = ", ".join(one.name for one in every[:5]) + " ..." * (len(every) > 5)
+        raise ProblemError(
+            f"{path}: holds {len(every)} recordings ({names}); taxel convert {path} FOLDER separates them"
+        )
+    return every[0]
+
+
+def open_joined(path: Path, array: str | None = None, rate_hz: float | None = None) -> list[Recording]:
+    """Open a file or a folder, with the feet of each trial joined, with the sensor of ``--array``."""
+    from taxel.recording.opening import open_joined  # noqa: PLC0415  the command line starts quickly
+
+    every = open_joined(path, array=None if array is None else geometry(array))
+    return [timed(of_array(one, array), rate_hz) for one in every]
 
 
 def of_source(recording: Recording, name: str | None) -> Recording:
@@ -236,9 +275,20 @@ def of_source(recording: Recording, name: str | None) -> Recording:
     return sources[name]
 
 
-def open_all(paths: Sequence[Path], array: str | None = None) -> list[Recording]:
-    """Open recordings one after the other; of a folder, or of another maker's file, all trials in it."""
+def open_all(paths: Sequence[Path], array: str | None = None, rate_hz: float | None = None) -> list[Recording]:
+    """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
+
+    Each sensor of a file with several is a recording of its own (`Recording.title`).
+    """
     from taxel.recording.opening import open_any  # noqa: PLC0415  the command line starts quickly
 
     opened = (open_any(path, array=None if array is None else geometry(array)) for path in paths)
-    return [of_array(one, array) for each in opened for one in (each if isinstance(each, list) else [each])]
+    every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
+    return [timed(of_array(one, array), rate_hz) for each in every for one in sensors(each)]
+
+
+def sensors(recording: Recording) -> list[Recording]:
+    """Return each sensor of a file with several as a recording; any other recording itself."""
+    if not recording._contents.is_several:
+        return [recording]
+    return [one for one in recording.sources.values() if not one.is_stream]

@@ -12,7 +12,7 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._recordings import TARE_HELP, new_report, open_all, progress, references, tare_of
+from taxel.cli._recordings import TARE_HELP, RateOption, new_report, open_all, progress, references, tare_of
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ def detect(
     ],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
+    rate_hz: RateOption = None,
     frame_us: Annotated[
         float | None,
         typer.Option(help="Length of the board's frame, us. Default: by the registers or the frames, else 192."),
@@ -66,20 +67,20 @@ def detect(
         if place is not None:
             try_whole(place, overwrite=overwrite and place == csv)
     loaded = load(readout)
-    opened = open_all([recording])
+    opened = open_all([recording], rate_hz=rate_hz)
     outcomes = []
     with progress(as_json) as update:
         events = [None] * len(opened) if truth is None else references(truth, "--truth", opened)
         if truth is not None and not any(events):
             raise ProblemError(f"--truth {truth}: names no event in {recording}")
         for one, labelled in zip(opened, events, strict=True):
-            update(f"reading {one.path}")
+            update(f"reading {one.title}")
             rest = tare_of(tare, one)
             detections = run(loaded, one, frame_us=frame_us, tare=rest)
             # Labels that the readout does not have do not count as missed.
             true = None if labelled is None else {label: labelled.get(label, _NONE) for label in loaded.labels}
             scored = None if true is None else score(detections, true, window_ms)
-            outcomes.append(Outcome(str(one.path), Example(one, true or {}, rest), detections, scored))
+            outcomes.append(Outcome(one.title, Example(one, true or {}, rest), detections, scored))
     truths = [one.example.labels for one in outcomes if one.score is not None]
     together = score_together([one.found for one in outcomes], truths, window_ms) if truths else None
     if csv is not None:

@@ -13,7 +13,7 @@ from taxel._base.files import try_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import app
-from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, open_recording, progress, tare_of
+from taxel.cli._recordings import SET_HELP, TARE_HELP, RateOption, encoder_of, open_one, progress, tare_of
 
 __all__ = ["encode"]
 
@@ -25,6 +25,7 @@ def encode(
     encoder: Annotated[str, typer.Option(help=f"One of {', '.join(encoder_names())}.")],
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
+    rate_hz: RateOption = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -36,7 +37,7 @@ def encode(
         raise ProblemError(f"{out}: spikes are written to a .npz")
     try_whole(out, overwrite=overwrite)
     chosen = encoder_of(encoder, values or [])
-    opened = open_recording(recording)
+    opened = open_one(recording, rate_hz=rate_hz)
     with progress(as_json) as update:
         update(f"reading {recording}")
         source = opened.events if opened.has_events else opened.frames()

@@ -181,8 +181,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     array = facts["array"]
     size = f"{array['rows']} x {array['columns']} taxels, {array['pitch_mm']:g} mm, {array['name']}"
     yield "array", size + (f"; a .{facts['kind']} does not hold it: --array" if facts["array_assumed"] else "")
-    if facts["from_us"] is not None:
-        yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
+    yield from _time(facts)
     if "events" in facts:
         words = f"{facts['intensities']} with intensity, {counted(len(facts['markers']), 'marker')}"
         yield "events", f"{facts['events']}, {words}"
@@ -216,6 +215,13 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name, places in facts["taxels"].items():
         shown = ", ".join(f"({x}, {y})" for x, y in places[:8]) + " ..." * (len(places) > 8)
         yield f"{name} taxels", f"{len(places)}" + f": {shown}" * bool(places)
+
+
+def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    if not facts["timed"]:
+        yield "time", "none: pictures are numbered; --rate-hz where a command needs times"
+    elif facts["from_us"] is not None:
+        yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
 
 
 def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

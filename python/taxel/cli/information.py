@@ -14,7 +14,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption
 from taxel.cli._bar import bar, duration
-from taxel.cli._recordings import SET_HELP, open_all, progress
+from taxel.cli._recordings import SET_HELP, RateOption, open_all, progress
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, LabelledTrial, Point
@@ -29,6 +29,7 @@ def information(
         list[Path], typer.Argument(help="Recordings, or folders of them: .mcap, .lsa, .npz, .csv, other makers' files.")
     ],
     array: FileArrayOption = None,
+    rate_hz: RateOption = None,
     labels: Annotated[
         str | None,
         typer.Option(
@@ -80,7 +81,7 @@ def information(
             opened = []
             for path in recordings:
                 update(f"reading {path}", 0, 0)
-                opened += open_all([path], array)
+                opened += open_all([path], array, rate_hz)
             trials = _trials(labels, opened, window_ms)
             if labels is None and len({trial.label for trial in trials}) == 1:
                 raise ProblemError(

@@ -17,6 +17,7 @@ from taxel.cli._app import app
 from taxel.cli._recordings import (
     SET_HELP,
     TARE_HELP,
+    RateOption,
     assignments,
     new_report,
     open_all,
@@ -58,6 +59,7 @@ def train(
     ] = None,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: the time before the first label.")] = None,
+    rate_hz: RateOption = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
     ),
@@ -107,12 +109,12 @@ def train(
     changes = assignments(values or [])
     changes |= {key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None}
     _planned(recipe, changes)  # reports errors of the recipe before the recordings are read
-    opened = open_all(recordings)
+    opened = open_all(recordings, rate_hz=rate_hz)
     with progress(as_json) as update:
         update("reading")
         labelled = references(labels, "--labels", opened)
         if not any(labelled):
-            raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
+            raise ProblemError(f"--labels {labels}: names no event in {', '.join(one.title for one in opened)}")
         names = sorted({label for events in labelled for label in events})
         recipe, plan = _planned(recipe, changes, _source(opened[0]), names)
         assert plan is not None
@@ -216,11 +218,11 @@ class _Training:
 
         outcomes = []
         for one, example in zip(self.opened, self.examples, strict=True):
-            self.update(f"scoring on {one.path}")
+            self.update(f"scoring on {one.title}")
             truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
             detections = run(readout, one, tare=example.tare)
             own = score(detections, truth, self.window_ms)
-            outcomes.append(Outcome(str(one.path), Example(one, truth, example.tare), detections, own))
+            outcomes.append(Outcome(one.title, Example(one, truth, example.tare), detections, own))
         return outcomes
 
 

@@ -21,7 +21,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.device import Cable
 from taxel.labels import Labels, write_labels
-from taxel.recording import open_recording
+from taxel.live._shown_files import ReadPictures, ShownFiles
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.health import TaxelStatistics, judged
@@ -86,9 +86,14 @@ class RequestHandler:
     ) -> None:
         self._listen, self._delta_intensity, self._cable = listen, delta_intensity, cable
         self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
+        self._files = ShownFiles()
 
     def close(self) -> None:
-        """Close the serial line."""
+        """Close the serial line, and remove temporary files."""
+        self._files.close()
+        self._disconnect()
+
+    def _disconnect(self) -> None:
         with self._cable_lock:
             if self._cable is not None:
                 self._cable.close()
@@ -116,7 +121,7 @@ class RequestHandler:
 
     def connect(self, place: str | None) -> None:
         """Connect the serial line to another place, or disconnect it."""
-        self.close()
+        self._disconnect()
         if place is not None:
             with _reasons():
                 cable = Cable(place)
@@ -160,20 +165,47 @@ class RequestHandler:
         taxels = judged(sensor, TaxelStatistics(*counts)).named()
         return taxels["dead"], taxels["stuck"], taxels["noisy"]
 
-    def cut(self, path: Path, out: Path, start_us: int, stop_us: int) -> list[str]:
+    def read(self, path: Path, trial: str | None, whole: bool) -> tuple[Path | None, ReadPictures | None]:
+        """Read a recording that is no file of a board's events.
+
+        Parameters
+        ----------
+        path : path
+        trial : str or None
+            Of a file with several; default: the first.
+        whole : bool
+            Whether all of a large text table is read, not only its beginning.
+
+        Returns
+        -------
+        path or None
+            Of events, a .mcap that holds them, until `close`.
+        tuple or None
+            Pictures, as the compiled part reads them.
+        """
+        with _reasons():
+            return self._files.read(path, trial, whole=whole)
+
+    def health_of_pictures(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels]:
+        """Return the taxels of a recording of pictures that are dead, stuck and noisy, in the array that is shown."""
+        with _reasons():
+            return self._files.health(path, trial)
+
+    def cut(self, path: Path, trial: str | None, out: Path, start_us: int, stop_us: int) -> list[str]:
         """Write a stretch of a recording to a new file; return what that file cannot hold."""
         with _reasons():
-            (part,) = cut(open_recording(path), start_us=start_us, stop_us=stop_us)
+            recording, _ = self._files.opened(path, trial)
+            (part,) = cut(recording, start_us=start_us, stop_us=stop_us)
             return list(convert(part, out))
 
-    def read_labels(self, table: Path, recording: str) -> list[tuple[str, int]]:
-        """Return the labels of a recording, each with its time (us), from a table."""
+    def read_labels(self, table: Path, recording: str) -> list[tuple[str, int, str]]:
+        """Return the labels of a recording, each with its time (us) and its source, from a table."""
         with _reasons():
             labels = Labels(table)
         name = labels.named(recording)
-        return [(row.text, row.t or 0) for row in labels.rows if row.recording == name]
+        return [(row.text, row.t or 0, row.source) for row in labels.rows if row.recording == name]
 
-    def write_labels(self, table: Path, rows: Sequence[tuple[str, int]]) -> None:
+    def write_labels(self, table: Path, rows: Sequence[tuple[str, int, str]]) -> None:
         """Write a table of labels."""
         with _reasons(), self._file_lock:
             write_labels(table, rows)

@@ -134,6 +134,17 @@ impl RecordingIndex {
         Ok(Arc::new(index))
     }
 
+    /// The largest sum of ticks above rest in each bin of the event rate; `None` where the curves are not stored.
+    #[must_use]
+    pub fn load(&self) -> Option<Vec<u32>> {
+        let (columns, (start, step, events)) = (self.time_columns.as_ref()?, &self.event_rate);
+        let bin = |k: i64| {
+            let range = column_of(start + k * step, COLUMN_US)..=column_of(start + (k + 1) * step - 1, COLUMN_US);
+            range.map(|column| columns.curve(column).sum).max().unwrap_or(0)
+        };
+        Some((0..).take(events.len()).map(bin).collect())
+    }
+
     /// The header of the file.
     #[must_use]
     pub fn header(&self) -> &Header {
