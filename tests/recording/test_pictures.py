@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +13,15 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from shell import call
 
 import taxel
-from taxel import Array, Frames, Note, ProblemError
-from taxel.cli import main
+from taxel import Array, Frames, Note, ProblemError, SpikeTrains
+from taxel.detect import Example, Part, Recipe, judge
+from taxel.detect.folds import _split
 from taxel.encode import LevelCrossing
 from taxel.recording.contents import Contents
-from taxel.recording.opening import open_joined
+from taxel.recording.opening import joined, open_joined
 
 WHOLE = st.integers(0, 65_535).map(float)
 ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True), st.sampled_from([-0.0, 65_536.0, float("inf")]))
@@ -111,8 +114,8 @@ def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
     array = Array(1, 2, name="channels")
     frames = Frames([[[1.0, 2.5]], [[3.0, 4.0]]], [0, 10_000], unit="N", array=array)
     of = Contents(
-        tmp_path / "a", "a", "npz", array, source="an amplifier", frames=frames, notes=(Note("heel", 5000), Note("bare")),
-        detections=taxel.Detections(["lift"], [100], [200]), columns=("hip", "knee"), lost=("something",),
+        tmp_path / "a", "a", "npz", array, source="an amplifier", frames=frames,
+        notes=(Note("heel", 5000), Note("bare")), detections=taxel.Detections(["lift"], [100], [200]), columns=("hip", "knee"), lost=("something",),
     )  # fmt: skip
     lost = taxel.convert(taxel.Recording(of), tmp_path / "a.mcap")
     assert lost == ["something"]
@@ -131,7 +134,7 @@ def test_pictures_of_events_say_that_the_datagrams_are_left(tmp_path: Path) -> N
     events = taxel.Events([0, 30_000], [1, 2], [0, 0], [True, True], array=Array(1, 4), intensity=[10, 40])
     taxel.convert(events, tmp_path / "events.mcap")
     lost = taxel.convert(tmp_path / "events.mcap", tmp_path / "pictures.mcap", frames_hz=100)
-    assert lost == ["the events between the pictures", "raw datagrams with their arrival times"]
+    assert lost == ["raw datagrams with their arrival times"]
     back = taxel.open(tmp_path / "pictures.mcap")
     assert back.frames() == taxel.open(tmp_path / "events.mcap").frames(100)
 
@@ -147,12 +150,14 @@ def test_encoders_find_the_same_in_a_mcap_as_in_its_source(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("make", [write_pedar, write_gaitpdb, write_moticon])
-def test_both_feet_of_a_file_become_sources_left_and_right(tmp_path: Path, make) -> None:
+def test_both_feet_of_a_file_become_sources_left_and_right(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], make: Callable[[Path], Path]
+) -> None:
     file = make(tmp_path)
     file = next(tmp_path.iterdir()) if file.is_dir() else file
     trials = taxel.open(file)
     assert [one.name.rsplit(" ")[-1] for one in trials] == ["left", "right"]
-    assert main(["convert", str(file), str(tmp_path / "both.mcap")]) == 0
+    assert call(capsys, "convert", file, tmp_path / "both.mcap")[0] == 0
     both = taxel.open(tmp_path / "both.mcap")
     assert list(both.sources) == ["left", "right"]
     with pytest.raises(ProblemError, match="holds 2 sources \\(left, right\\)"):
@@ -180,7 +185,7 @@ def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
     sources: dict[str, Contents] = {}
     for foot in ("left", "right"):
         sources[foot] = Contents(tmp_path / "walk.asc", f"walk {foot}", "pedar", array, label=foot, frames=frames)
-    [both] = [one for one in [taxel.recording.opening.joined([taxel.Recording(one) for one in sources.values()])][0]]
+    [both] = joined([taxel.Recording(one) for one in sources.values()])
     taxel.convert(both, tmp_path / "walk.mcap")
     (tmp_path / "walk.notes.csv").write_text("label,t_us,source\nheel,10000,left\nturn,20000,\ntoe,30000,right\n")
     back = taxel.open(tmp_path / "walk.mcap")
@@ -194,8 +199,10 @@ def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys
     frames = Frames(np.ones((50, 1, 2)), np.arange(50) * 10_000, unit="N", array=Array(1, 2))
     taxel.convert(frames, tmp_path / "a.mcap")
     (tmp_path / "labels.csv").write_text("label,t_us,source\nheel,10000,left\n")
-    main(["train", str(tmp_path / "a.mcap"), "--labels", str(tmp_path / "labels.csv"), "-o", str(tmp_path / "r.json")])
-    assert "heel at 10000 us is of source left; there is board" in capsys.readouterr().err
+    labels = tmp_path / "labels.csv"
+    code, _, said = call(capsys, "train", tmp_path / "a.mcap", "--labels", labels, "-o", tmp_path / "r.json")
+    assert code == 2
+    assert "heel at 10000 us is of source left; there is board" in said
 
 
 # without times
@@ -206,7 +213,7 @@ def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest
     file = file if file.is_file() else next(tmp_path.iterdir())
     opened = taxel.open(file)
     assert not any(one.timed for one in opened)
-    assert main(["convert", str(file), str(tmp_path / "out")]) == 0
+    assert call(capsys, "convert", file, tmp_path / "out")[0] == 0
     for ending in (".npz", ".h5", ".mcap"):
         taxel.convert(opened[0], tmp_path / f"one{ending}")
         assert not taxel.open(tmp_path / f"one{ending}").timed
@@ -217,9 +224,8 @@ def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest
         LevelCrossing([100.0]).encode(one)
     with pytest.raises(ProblemError, match="have no rate"):
         one.frames(50)
-    capsys.readouterr()
-    assert main(["info", str(tmp_path / "one.mcap")]) == 0
-    said = capsys.readouterr().out
+    code, said, _ = call(capsys, "info", tmp_path / "one.mcap")
+    assert code == 0
     assert "pictures are numbered" in said
     assert " s)" not in said
     assert "pictures/s" not in said
@@ -230,19 +236,43 @@ def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest
     with pytest.raises(ProblemError, match="has times of its own"):
         timed.at_rate(40)
     spikes = tmp_path / "spikes.npz"
-    encode = ["encode", str(tmp_path / "one.mcap"), str(spikes), "--encoder", "level_crossing", "--set", "levels=[100]"]
-    assert main(encode) != 0
-    assert main([*encode, "--rate-hz", "40"]) == 0
+    encode = ["encode", tmp_path / "one.mcap", spikes, "--encoder", "level_crossing", "--set", "levels=[100]"]
+    assert "--rate-hz" in call(capsys, *encode)[2]
+    assert call(capsys, *encode, "--rate-hz", "40")[0] == 0
 
 
-def test_a_folder_of_many_trials_becomes_a_folder_of_recordings(tmp_path: Path) -> None:
+def test_a_folder_of_many_trials_becomes_a_folder_of_recordings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     source, out = tmp_path / "source", tmp_path / "out"
     source.mkdir()
     write_pedar(source)
     write_pedar(source).rename(source / "again.asc")
     write_pedar(source)
-    assert main(["convert", str(source), str(out)]) == 0
+    assert call(capsys, "convert", source, out)[0] == 0
     names = sorted(file.name for file in out.iterdir())
     assert len(names) == len(open_joined(source)) == 2
     assert "again.mcap" in names
     assert list(taxel.open(out / "again.mcap").sources) == ["left", "right"]
+
+
+def test_the_feet_of_one_recording_share_a_fold() -> None:
+    def example(group: str, shift: int) -> Example:
+        times = [100_000 * k + shift for k in range(1, 9)]
+        spikes = SpikeTrains.from_lists([[t / 1000 - 2 for t in times]], stop=1000.0)
+        return Example(spikes, {"contact": times}, None, group)
+
+    walks = [example(group, shift) for group in ("a", "b", "") for shift in (0, 30_000)]
+    recipe = Recipe(LevelCrossing([1.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
+    found = judge(walks, recipe, 4)
+    assert found.how == "whole recordings, 4 folds"
+    with pytest.raises(ProblemError, match="must be 2 to 4, the number of recordings"):
+        judge(walks, recipe, 5)
+    for fold in _split(walks, [Part(n) for n in range(6)], 4):
+        train, test = ({walks[one.example].group for one in parts} - {""} for parts in (fold.train, fold.test))
+        assert not train & test
+    # The two feet of one walk: the same stretches of time of both.
+    for fold in _split(walks[:2], [Part(0), Part(1)], 3):
+        assert len(fold.test) == 2
+        assert fold.test[0][1:] == fold.test[1][1:]
+        assert {one.example for one in fold.train} == {0, 1}

@@ -24,9 +24,9 @@ macro_rules! assets {
 pub const ASSETS: &[Asset] = assets! {
     "text/html; charset=utf-8": "index.html";
     "text/javascript; charset=utf-8":
-        "actions.js" "board.js" "colours.js" "connection.js" "counters.js" "cursor.js" "detections.js" "dom.js" "image.js" "keys.js" "labels.js" "lanes.js" "main.js" "maps.js" "notice.js" "player.js"
+        "actions.js" "board.js" "colours.js" "connection.js" "counters.js" "cursor.js" "detections.js" "dom.js" "image.js" "keys.js" "labels.js" "lanes.js" "layout.js" "main.js" "maps.js" "notice.js" "player.js"
         "protocol.js" "raster.js" "recorder.js" "registers.js" "server.js" "settings.js" "state.js" "strip.js" "tabs.js" "timeline.js"
-        "tones.js" "view.js" "vendor/uPlot.js" "words.js" "zoom.js";
+        "tones.js" "training.js" "view.js" "vendor/uPlot.js" "window.js" "words.js";
     "text/css; charset=utf-8": "style.css" "vendor/uPlot.css";
     "image/svg+xml": "icon.svg";
     "text/plain; charset=utf-8": "vendor/colour-maps.LICENSE" "vendor/uPlot.LICENSE";

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, Weak};
 use std::time::UNIX_EPOCH;
 
 use taxel_core::problem;
-use taxel_live::locked::lock;
 use taxel_live::Result;
+use taxel_live::locked::lock;
 
 use super::keyframe_index::pictures::PictureIndex;
 use super::keyframe_index::recording::RecordingIndex;
@@ -73,6 +73,16 @@ impl Folder {
         files
     }
 
+    /// The readouts by name: files that end in `readout.json`.
+    pub(super) fn readouts(&self) -> Vec<String> {
+        let names = std::fs::read_dir(&self.path).into_iter().flatten().flatten();
+        let mut names: Vec<_> = names.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        names.retain(|name| name.ends_with("readout.json") && checked_name(name).is_ok());
+        names.sort_unstable();
+        names.truncate(MOST_LISTED);
+        names
+    }
+
     /// Path of a file in the folder, which need not exist.
     ///
     /// # Errors
@@ -93,12 +103,6 @@ impl Folder {
     /// An index that is in memory, of a file of this size.
     pub(super) fn known(&self, key: &Key, bytes: u64) -> Option<Indexed> {
         lock(&self.indices).get(key).filter(|(length, _)| *length == bytes).and_then(|(_, index)| index.upgrade())
-    }
-
-    /// An index that is in memory, of a recording that is shown.
-    pub(super) fn shown(&self, name: &str, trial: Option<&str>) -> Option<Indexed> {
-        let key = (self.file(name).ok()?, trial.map(str::to_owned));
-        lock(&self.indices).get(&key).and_then(|(_, index)| index.upgrade())
     }
 
     /// Remembers an index for as long as it is shown; the last one for longer.

@@ -144,6 +144,18 @@ pub trait RequestHandler: Send + Sync {
     /// Writes a stretch of a recording to a new file; returns what that file cannot hold.
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>>;
 
+    /// Trains a readout on the labels of a recording, writes it to `out`, and returns how well it detects, in words.
+    fn train(&self, recording: &Path, out: &Path) -> Reply<String>;
+
+    /// Ends the training that runs.
+    fn end_training(&self) -> Reply<()>;
+
+    /// Detections of a readout in a recording: label, time, and when it was known, us.
+    fn detect(&self, recording: &Path, readout: &Path) -> Reply<Vec<(String, i64, i64)>>;
+
+    /// Reads the live source out with this readout from now on.
+    fn read_out(&self, readout: &Path) -> Reply<()>;
+
     /// Reads the labels of a recording from a table.
     fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>>;
 

@@ -48,6 +48,8 @@ pub(super) struct Hub {
     options: PanelOptions,
     handler: Arc<dyn RequestHandler>,
     live: Mutex<Option<Arc<LiveSource>>>,
+    /// Labels of the readout that runs.
+    readout: Mutex<Option<Vec<String>>>,
     board: Mutex<BoardState>,
     presets: Mutex<UserPresets>,
     /// See [`Hub::file_turn`].
@@ -74,6 +76,7 @@ impl Hub {
             options,
             handler: handler.into(),
             live: Mutex::default(),
+            readout: Mutex::default(),
             board: Mutex::new(board),
             presets: Mutex::default(),
             files: Arc::default(),
@@ -84,7 +87,7 @@ impl Hub {
             registers_unknown: Notify::new(),
         });
         if let Some(live) = live {
-            hub.attach(live)?;
+            hub.attach(live, hub.options.readout.clone())?;
         }
         Ok(hub)
     }
@@ -99,8 +102,23 @@ impl Hub {
         &self.options
     }
 
-    /// Shows another live source from now on.
-    pub(super) fn attach(&self, handle: Handle) -> Result<()> {
+    /// Notes where the board's serial line is; its registers are to be read.
+    pub(super) fn connected(&self, control: Option<String>) {
+        {
+            let mut board = self.board();
+            (board.control, board.known) = (control, false);
+        }
+        self.clients.send(Broadcast::Hello);
+        self.registers_unknown.notify_one();
+    }
+
+    /// Whether the board's registers were read, or somebody stated them.
+    pub(super) fn registers_certain(&self) -> bool {
+        self.options.registers_stated || self.board().known
+    }
+
+    /// Shows another live source from now on; `readout` are the labels of the readout that runs.
+    pub(super) fn attach(&self, handle: Handle, readout: Option<Vec<String>>) -> Result<()> {
         let noise_floor = {
             let mut board = self.board();
             if board.known {
@@ -112,6 +130,7 @@ impl Hub {
             board.registers.noise_floor
         };
         *lock(&self.live) = Some(Arc::new(LiveSource::new(handle, noise_floor)?));
+        *lock(&self.readout) = readout;
         self.clients.send(Broadcast::Hello);
         self.clients.send_json(&self.zeroed_message());
         Ok(())
@@ -186,7 +205,7 @@ impl Hub {
     }
 
     fn send_counters(&self, live: &LiveSource, now: &Counters, before: Option<&Counters>, seconds: f64) {
-        let frame_us = self.board().registers.frame_us();
+        let frame_us = self.registers_certain().then(|| self.board().registers.frame_us());
         let message = messages::counters(live, now, before, seconds, frame_us, self.clients.count());
         self.clients.send(Broadcast::Counters(Arc::new(message)));
     }
@@ -230,7 +249,7 @@ impl Hub {
             "control": self.board().control,
             "folder": self.options.folder,
             "open": self.options.open,
-            "readout": self.options.readout,
+            "readout": *lock(&self.readout),
             "encoders": encode::NAMES,
             "column_us": COLUMN_US,
             "columns_us": COLUMNS_US,
@@ -257,6 +276,7 @@ impl Hub {
         json!({
             "type": "registers",
             "known": known,
+            "stated": self.options.registers_stated,
             "values": registers,
             "preset": presets::built_in_equal_to(&held, live.as_ref().map(|live| live.array())).or_else(own),
             "frame_us": registers.frame_us(),
@@ -280,6 +300,9 @@ impl Hub {
             let labels = self.labels.count(&file.name);
             json!({ "name": file.name, "bytes": file.bytes, "modified_ns": file.modified_ns, "labels": labels })
         });
-        json!({ "type": "recordings", "folder": self.folder.path(), "files": files.collect::<Vec<_>>() })
+        json!({
+            "type": "recordings", "folder": self.folder.path(), "files": files.collect::<Vec<_>>(),
+            "readouts": self.folder.readouts(),
+        })
     }
 }

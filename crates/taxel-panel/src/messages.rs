@@ -39,6 +39,25 @@ pub(super) fn warning(text: impl std::fmt::Display) -> Value {
     json!({ "type": "warning", "text": text.to_string() })
 }
 
+/// Without any datagram for so long a source is quiet, ns; one with heartbeats is lost after this at least.
+const QUIET_NS: i64 = 500_000_000;
+
+/// Heartbeats that may be missing before a source is lost.
+const MISSING_HEARTBEATS: i64 = 3;
+
+/// Whether datagrams arrive, since when none do, and how long they may be missing.
+fn arrival(now: &Counters) -> Value {
+    let silent_ns = now.arrived_ns.map_or(0, |arrived_ns| (now_ns() - arrived_ns).max(0));
+    let lost_ns = now.heartbeat_us.map(|interval| (MISSING_HEARTBEATS * interval * 1000).max(QUIET_NS));
+    let state = match (now.arrived_ns, lost_ns) {
+        (None, _) => "nothing",
+        (Some(_), Some(lost_ns)) if silent_ns > lost_ns => "lost",
+        (Some(_), None) if silent_ns > QUIET_NS => "quiet",
+        _ => "arriving",
+    };
+    json!({ "state": state, "since_ns": now.arrived_ns, "silent_s": silent_ns as f64 / 1e9, "heartbeat_us": now.heartbeat_us })
+}
+
 /// `counters` of a live source; rates are those of the last `seconds`, since the counters `before`.
 #[allow(clippy::cast_precision_loss)]
 pub(super) fn counters(
@@ -46,7 +65,7 @@ pub(super) fn counters(
     now: &Counters,
     before: Option<&Counters>,
     seconds: f64,
-    frame_us: f64,
+    frame_us: Option<f64>,
     clients: usize,
 ) -> Map<String, Value> {
     let rate = |now: u64, before: Option<u64>| before.map(|before| now.saturating_sub(before) as f64 / seconds);
@@ -60,7 +79,8 @@ pub(super) fn counters(
         "events_per_s": rate(now.events, before.map(|b| b.events)),
         "bytes_per_s": rate(now.capture.bytes, before.map(|b| b.capture.bytes)),
         "datagrams_per_s": rate(now.capture.datagrams, before.map(|b| b.capture.datagrams)),
-        "frames_per_s": 1e6 / frame_us,
+        "frames_per_s": frame_us.map(|frame_us| 1e6 / frame_us),
+        "arrival": arrival(now),
         "lost": {
             "kernel": now.capture.dropped_by_kernel,
             "queue": now.capture.dropped_by_queue,

@@ -16,6 +16,7 @@ use super::keyframe_index::KeyframeIndex;
 use super::keyframe_index::pictures::PictureIndex;
 use super::keyframe_index::recording::RecordingIndex;
 use super::messages;
+use super::time_columns::{COLUMN_US, TimeColumns};
 
 /// How often the progress of reading a file is sent.
 const PROGRESS_EVERY: Duration = Duration::from_secs(1);
@@ -53,34 +54,39 @@ impl Indexed {
 
     /// The `overview` message.
     pub(super) fn overview(&self, name: &str) -> Value {
-        match self {
+        let (start, step, bins, events) = match self {
             Self::Events(index) => {
                 let (start, step, events) = &index.event_rate;
-                let load = index.load();
-                json!({
-                    "type": "overview", "source": name, "start_us": start, "step_us": step, "events": events,
-                    "load": load,
-                })
+                (*start, *step, events.len(), &events[..])
             }
             Self::Pictures(index) => {
-                let (start, step, load) = &index.load;
-                json!({
-                    "type": "overview", "source": name, "start_us": start, "step_us": step, "events": [],
-                    "load": load,
-                })
+                let (start, step, bins) = index.bins();
+                (start, step, bins, &[][..])
             }
-        }
+        };
+        let index = self.index();
+        let force = index.time_columns().map(|columns| columns.greatest_sums(start, step, bins, COLUMN_US));
+        json!({
+            "type": "overview", "source": name, "start_us": start, "step_us": step, "events": events,
+            "force": force.unwrap_or_default(),
+        })
     }
 
     /// The `opened` message; `bytes` is the size of the file.
     pub(super) fn opened(&self, name: &str, bytes: u64, begun: Instant) -> Value {
-        let range = self.index().range();
+        let index = self.index();
+        let range = index.range();
+        // The end of the column, which has all of its force.
+        let touch = index.time_columns().and_then(TimeColumns::first_touch);
+        let touch_us =
+            touch.zip(range).map(|(column, (first, last))| ((column + 1) * COLUMN_US - 1).clamp(first, last));
         let mut message = json!({
             "type": "opened",
             "name": name,
-            "array": messages::array(self.index().array()),
+            "array": messages::array(index.array()),
             "start_us": range.map(|(first, _)| first),
             "stop_us": range.map(|(_, last)| last),
+            "touch_us": touch_us,
             "bytes": bytes,
             "index_ms": begun.elapsed().as_secs_f64() * 1e3,
         });

@@ -14,6 +14,8 @@ pub struct PanelOptions {
     pub open: Option<String>,
     /// The board's serial line, which the request handler has connected.
     pub control: Option<String>,
+    /// Whether somebody stated the board's registers; otherwise they are assumed until they are read.
+    pub registers_stated: bool,
     /// Labels of the readout that runs, if one does.
     pub readout: Option<Vec<String>>,
 }

@@ -41,7 +41,8 @@ struct ShownColumns<'a> {
     /// First column of `own`; earlier ones come from `whole`.
     first_own: i64,
     whole: Option<&'a TimeColumns>,
-    /// Last stored column.
+    /// Up to when columns are known, us, and the last stored column.
+    latest: Option<i64>,
     last: i64,
     /// Stored columns in one shown column.
     factor: i64,
@@ -59,7 +60,7 @@ impl<'a> ShownColumns<'a> {
         let last = latest.map_or(i64::MIN, |t| column_of(t, stored_us));
         // A view that has played for long has dropped the beginning of its own columns.
         let first_own = first_own.max(own.reach().map_or(i64::MAX, |(first, _)| first));
-        Self { own, first_own, whole, last, factor: column_us / stored_us }
+        Self { own, first_own, whole, latest, last, factor: column_us / stored_us }
     }
 
     /// The first known column.
@@ -80,19 +81,12 @@ impl<'a> ShownColumns<'a> {
         if self.factor == 1 {
             return self.store(column).raster(column, out);
         }
-        let (begin, mut one) = (out.len(), vec![]);
+        let begin = out.len();
         out.resize(begin + self.own.rows(), 0);
-        for part in column * self.factor..((column + 1) * self.factor).min(self.last + 1) {
-            if self.store(part).is_silent(part) {
-                continue;
-            }
-            one.clear();
-            self.store(part).raster(part, &mut one);
-            for (sum, cell) in out[begin..].iter_mut().zip(&one).filter(|(_, cell)| **cell > 0) {
-                let (ups, downs) = ((*sum & 15) + (cell & 15), (*sum >> 4) + (cell >> 4));
-                *sum = ups.min(15) | downs.min(15) << 4;
-            }
-        }
+        let parts = column * self.factor..((column + 1) * self.factor).min(self.last + 1);
+        let own = self.first_own.clamp(parts.start, parts.end.max(parts.start));
+        self.store(parts.start).add_raster(parts.start..own, &mut out[begin..]);
+        self.own.add_raster(own..parts.end, &mut out[begin..]);
     }
 
     fn curve(&self, column: i64) -> Curve {
@@ -126,13 +120,21 @@ pub(super) fn of_state(
     write(state, columns, &shown, history, spikes, about)
 }
 
-/// Picture of a source at the time of playback, and its last column.
-pub(super) fn of_player(player: &mut Player, about: About) -> (Vec<u8>, i64) {
+/// Picture of a source at the time of playback, and its last column. The columns are those of `window`, or else those up to that
+/// time.
+pub(super) fn of_player(player: &mut Player, window: Option<&mut Player>, about: About) -> (Vec<u8>, i64) {
     player.state_mut().update_curve();
     let player = &*player;
-    let (own, first_own, whole) = player.time_columns();
-    let shown = ShownColumns::new(own, first_own, whole, player.state().latest(), about.column_us);
-    write(player.state(), player.index().array().columns, &shown, player.history(), player.spikes(), about)
+    let beside = match window {
+        Some(window) => {
+            window.state_mut().update_curve();
+            &*window
+        }
+        None => player,
+    };
+    let (own, first_own, whole) = beside.time_columns();
+    let shown = ShownColumns::new(own, first_own, whole, beside.state().latest(), about.column_us);
+    write(player.state(), player.index().array().columns, &shown, beside.history(), beside.spikes(), about)
 }
 
 fn write(
@@ -145,7 +147,7 @@ fn write(
 ) -> (Vec<u8>, i64) {
     let taxels = state.held().len();
     let rows = taxels / usize::from(columns.max(1));
-    let last = state.latest().map_or(i64::MIN, |t| column_of(t, about.column_us));
+    let last = shown.latest.map_or(i64::MIN, |t| column_of(t, about.column_us));
     let first = about.from.max(shown.first()).max(last.saturating_add(1 - SPAN));
     let range = if first <= last { first..last + 1 } else { 0..0 };
     let count = usize::try_from(range.end - range.start).unwrap_or(0);

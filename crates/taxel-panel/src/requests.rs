@@ -65,6 +65,9 @@ pub(super) async fn carry_out(
         "delete" => change_label(&hub, shown, LabelChange::Delete { id: label_id(&request)? }).await?,
         "health" => return health(&hub, shown).await.map(Some),
         "cut" => return cut(&hub, shown, &request).await.map(Some),
+        "train" => return train(&hub, shown).await.map(Some),
+        "train_stop" => hub.ask(|handler| handler.end_training()).await?,
+        "read_out" => return read_out(&hub, shown, &request).await,
         "recordings" => return Ok(Some(hub.recordings_message())),
         "rest" => rest(&hub, &request)?,
         "zero" => zero(&hub, &request).await?,
@@ -234,6 +237,34 @@ async fn change_label(hub: &Hub, shown: Option<&Shown>, change: LabelChange) -> 
     }
     hub.clients.send(Broadcast::Labels(name.to_owned()));
     Ok(())
+}
+
+// ---------------------------------------------------------------------------------------------- training
+
+/// Trains a readout on the labels of the recording that is shown.
+async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
+    let name = &shown.ok_or("train: open a recording with labels first")?.name;
+    let readout = format!("{}.readout.json", name.rsplit_once('.').map_or(&**name, |(stem, _)| stem));
+    let (recording, out) = (hub.folder.file(name)?, hub.folder.file(&readout)?);
+    let text = hub.ask(move |handler| handler.train(&recording, &out)).await?;
+    hub.clients.send_json(&hub.recordings_message());
+    Ok(json!({ "type": "trained", "name": name, "readout": readout, "text": text }))
+}
+
+/// Runs a readout: on the recording that is shown, or on the live source from now on.
+async fn read_out(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> Answer<Option<Value>> {
+    let readout = request.text("readout", 110)?;
+    let path = hub.folder.file(readout).map_err(|error| Refusal::of("readout", error))?;
+    let Some(Shown { name, .. }) = shown else {
+        check_restart(hub)?;
+        hub.ask(move |handler| handler.read_out(&path)).await?;
+        return Ok(None);
+    };
+    let recording = hub.folder.file(name)?;
+    let found = hub.ask(move |handler| handler.detect(&recording, &path)).await?;
+    let one = |(label, t, known)| json!({ "label": label, "t_us": t, "known_us": known });
+    let found: Vec<_> = found.into_iter().map(one).collect();
+    Ok(Some(json!({ "type": "detections", "source": name, "readout": readout, "detections": found })))
 }
 
 // ---------------------------------------------------------------------------------------------- health, cutting

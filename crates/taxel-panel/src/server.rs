@@ -103,13 +103,18 @@ impl Panel {
         format!("http://{}/#token={}{open}", shown(self.address), self.token)
     }
 
-    /// Shows another live source from now on.
+    /// Shows another live source from now on; `readout` are the labels of the readout that runs.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` where it has ended.
-    pub fn attach(&self, live: Handle) -> Result<()> {
-        self.hub.attach(live)
+    pub fn attach(&self, live: Handle, readout: Option<Vec<String>>) -> Result<()> {
+        self.hub.attach(live, readout)
+    }
+
+    /// Notes that the request handler has connected the board's serial line, or disconnected it.
+    pub fn connected(&self, control: Option<String>) {
+        self.hub.connected(control);
     }
 
     /// Number of connected clients.

@@ -1,14 +1,15 @@
 //! Raster and contact curves over the last seconds, by columns of time of equal width.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 /// Width of a column of time unless a client asks for another, us.
 pub const COLUMN_US: i64 = 4000;
 
 /// The narrowest and the widest column of time, us; allowed widths double from one to the next.
-pub const COLUMNS_US: (i64, i64) = (125, 256_000);
+pub const COLUMNS_US: (i64, i64) = (125, 125 << 20);
 
-/// Columns of time in a picture: 5 s at the default width, 0.16 s at the narrowest, 320 s at the widest.
+/// Columns of time in a picture: 5 s at the default width, 0.16 s at the narrowest, 45 hours at the widest.
 pub const SPAN: i64 = 1250;
 
 /// A change that arrives at most this late still enters the raster and the curves, us.
@@ -16,6 +17,11 @@ pub const LATE_US: i64 = 120_000;
 
 /// Columns of time in a block of a [`TimeColumns`].
 const BLOCK: i64 = 250;
+
+/// A touch exceeds the quiet force by this part of the greatest excess: one in so many.
+const TOUCH_SHARE: u32 = 4;
+/// The force of one column in so many, the least ones, is that of a sensor at rest.
+const QUIET_SHARE: usize = 5;
 
 /// The contact as a whole at the end of a column of time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -84,12 +90,6 @@ impl TimeColumns {
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
-    }
-
-    /// Whether the block that holds a column has no events.
-    #[must_use]
-    pub fn is_silent(&self, column: i64) -> bool {
-        self.place(column.div_euclid(BLOCK)).is_err()
     }
 
     fn block_bytes(rows: usize) -> usize {
@@ -191,6 +191,60 @@ impl TimeColumns {
             Ok(place) => self.blocks[place].1.curves[k],
             Err(0) => NOTHING,
             Err(place) => self.blocks[place - 1].1.curves.last().copied().unwrap_or(NOTHING),
+        }
+    }
+
+    /// The columns that are stored, each with its curves; a stretch without events is left out.
+    fn stored(&self) -> impl Iterator<Item = (i64, &Curve)> {
+        let (first, last) = self.reach.unwrap_or((0, -1));
+        let all = self.blocks.iter().flat_map(|(key, block)| (key * BLOCK..).zip(&block.curves));
+        all.filter(move |(column, _)| (first..=last).contains(column))
+    }
+
+    /// The greatest sum of ticks above rest in each of `bins` stretches of `step` us, the first of which begins at `start` (us), of
+    /// columns `column_us` wide.
+    #[must_use]
+    pub fn greatest_sums(&self, start: i64, step: i64, bins: usize, column_us: i64) -> Vec<u32> {
+        // At the beginning of a stretch the force is what it was before, also where nothing is stored.
+        let begin = |bin: usize| start + i64::try_from(bin).unwrap_or(0) * step;
+        let mut sums: Vec<u32> = (0..bins).map(|bin| self.curve(column_of(begin(bin), column_us)).sum).collect();
+        for (column, curve) in self.stored() {
+            let bin = (column * column_us - start).div_euclid(step);
+            if let Some(sum) = usize::try_from(bin).ok().and_then(|bin| sums.get_mut(bin)) {
+                *sum = (*sum).max(curve.sum);
+            }
+        }
+        sums
+    }
+
+    /// The column of greatest force in the first touch; `None` where there is no force.
+    #[must_use]
+    pub fn first_touch(&self) -> Option<i64> {
+        let mut sums: Vec<u32> = self.stored().map(|(_, curve)| curve.sum).collect();
+        let most = *sums.iter().max()?;
+        let place = sums.len() / QUIET_SHARE;
+        let (_, &mut quiet, _) = sums.select_nth_unstable(place);
+        let least = quiet + ((most - quiet) / TOUCH_SHARE).max(1);
+        let touch =
+            self.stored().skip_while(|(_, curve)| curve.sum < least).take_while(|(_, curve)| curve.sum >= least);
+        let greatest = |found: Option<(i64, u32)>, (column, curve): (i64, &Curve)| match found {
+            Some((_, sum)) if curve.sum <= sum => found,
+            _ => Some((column, curve.sum)),
+        };
+        touch.take(BLOCK.unsigned_abs() as usize).fold(None, greatest).map(|(column, _)| column)
+    }
+
+    /// Adds the raster of columns to `out`, which has one byte per row; counts stay at 15.
+    pub fn add_raster(&self, columns: Range<i64>, out: &mut [u8]) {
+        let from = self.blocks.partition_point(|(key, _)| (key + 1) * BLOCK <= columns.start);
+        for (key, block) in self.blocks.range(from..).take_while(|(key, _)| key * BLOCK < columns.end) {
+            let within = |column: i64| usize::try_from((column - key * BLOCK).clamp(0, BLOCK)).unwrap_or(0);
+            let cells = &block.raster[within(columns.start) * self.rows..within(columns.end) * self.rows];
+            for (place, cell) in cells.iter().enumerate().filter(|(_, cell)| **cell > 0) {
+                let sum = &mut out[place % self.rows];
+                let (ups, downs) = ((*sum & 15) + (cell & 15), (*sum >> 4) + (cell >> 4));
+                *sum = ups.min(15) | downs.min(15) << 4;
+            }
         }
     }
 

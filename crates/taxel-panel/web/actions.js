@@ -16,7 +16,7 @@ import { showTab } from "./tabs.js";
  * @property {import("./labels.js").Labels} labels
  * @property {import("./view.js").View} view
  * @property {import("./maps.js").Maps} maps
- * @property {import("./zoom.js").Zoom} zoom
+ * @property {import("./window.js").TimeWindow} window
  */
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
@@ -29,7 +29,7 @@ const RASTER_INSET = 44;
  * @param {Parts} parts
  * @param {() => Timeline | null} timeline
  */
-export function bindActions({ server, player, settings, recorder, labels, view, maps, zoom }, timeline) {
+export function bindActions({ server, player, settings, recorder, labels, view, maps, window }, timeline) {
   const help = part("help", HTMLDialogElement);
   const here = () => timeline()?.cursor_us ?? player.t_us;
   const step = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
@@ -66,8 +66,9 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
       last: () => (player.transport.source === null ? player.follow() : player.reach && player.seek(player.reach[1])),
       faster: () => player.faster(1),
       slower: () => player.faster(-1),
-      zoomIn: () => zoom.by(1),
-      zoomOut: () => zoom.by(-1),
+      zoomIn: () => window.by(1),
+      zoomOut: () => window.by(-1),
+      showAll: () => window.showAll(),
       live: () => player.follow(),
       mark: () => labels.markHere(),
       nextLabel: () => labels.go(1),
@@ -98,8 +99,11 @@ export function bindActions({ server, player, settings, recorder, labels, view, 
   onClick("picture", picture);
   onClick("health", health);
   onClick("zero", zero);
-  onClick("zoom-in", () => zoom.by(1));
-  onClick("zoom-out", () => zoom.by(-1));
+  onClick("zoom-in", () => window.by(1));
+  onClick("zoom-out", () => window.by(-1));
+  for (const name of /** @type {const} */ (["pressure", "change"])) {
+    onClick(`${name}-alone`, () => settings.set("maps", settings.values.maps === name ? "both" : name));
+  }
   // Browsers allow sound only after the user has done something.
   for (const kind of ["pointerdown", "keydown"]) document.addEventListener(kind, () => recorder.tones.wake(), { capture: true });
 }

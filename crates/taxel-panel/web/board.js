@@ -258,21 +258,28 @@ export class Board {
     this.select.disabled = !this.writable;
   }
 
-  /** @param {Record<string, number | boolean>} values @param {number | null} frame_us @param {string | null} preset @param {boolean} known */
-  show(values, frame_us, preset, known) {
+  /**
+   * @param {Record<string, number | boolean>} values
+   * @param {number | null} frame_us
+   * @param {string | null} preset
+   * @param {boolean} known read from the board, or from the recording
+   * @param {boolean} stated given by whoever started the panel
+   */
+  show(values, frame_us, preset, known, stated) {
     this.values = Object.fromEntries(Object.entries(values).map(([name, value]) => [name, Number(value)]));
     for (const [name, control] of this.controls) if (this.values[name] !== undefined) control.take(this.values[name]);
     this.preset = preset;
     this.showPresets();
     const rate = frame_us ? `${whole(1e6 / frame_us)} frames/s, a frame takes ${frame_us.toFixed(1)} µs` : "";
-    write(part("frame-rate", HTMLElement), known ? rate : `${rate}${rate ? " " : ""}(assumed: the registers have not been read yet)`);
+    const unread = "the registers have not been read";
+    write(part("frame-rate", HTMLElement), known ? rate : stated ? `${rate} (as stated at the start; ${unread})` : `Frame rate not known: ${unread}.`);
     this.warn();
     this.check();
   }
 
   /** @param {RegistersMessage} message */
   take(message) {
-    this.show(message.values, message.frame_us, message.preset, message.known);
+    this.show(message.values, message.frame_us, message.preset, message.known, message.stated);
   }
 
   /** @param {PresetsMessage} presets */

@@ -19,10 +19,9 @@ const LOSSES = {
 /**
  * Writes the counters.
  * @param {CountersMessage | null} counters of the live source
- * @param {boolean} assumed whether the frame rate follows from registers that were not read from the board
  * @param {number} drawn pictures a second
  */
-export function writeCounters(counters, assumed, drawn) {
+export function writeCounters(counters, drawn) {
   const number = (/** @type {number | null | undefined} */ value, /** @type {(value: number) => string} */ how) => (value === null || value === undefined ? "–" : how(value));
   const put = (/** @type {string} */ id, /** @type {string} */ text) => write(part(id, HTMLElement), text);
   put("drawn", String(drawn));
@@ -30,8 +29,8 @@ export function writeCounters(counters, assumed, drawn) {
   const { lost, latency } = counters;
   put("events", number(counters.events_per_s, whole));
   put("data", number(counters.bytes_per_s, (bytes) => (bytes / 1e6).toFixed(2)));
-  put("frames", number(counters.frames_per_s, whole) + (assumed ? "?" : ""));
-  part("frames", HTMLElement).title = assumed ? "assumed: the board's registers have not been read yet" : "";
+  put("frames", number(counters.frames_per_s, whole));
+  part("frames", HTMLElement).title = counters.frames_per_s === null ? "not known: give --rate-hz and --bits, or --preset, or connect the control line" : "";
   // Events that only the panel lacks are in every recording and in the readout.
   const all = Object.entries(lost).reduce((sum, [place, count]) => sum + (place === "panel" ? 0 : count), 0);
   put("lost", whole(all));

@@ -1,26 +1,35 @@
-// The time cursor over the lanes, and the values of the lanes at it.
+// The time cursor over the lanes, and the values of the lanes at it; what pointer and wheel do there.
 
 import { part, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
-import { counted, seconds, whole } from "./words.js";
+import { counted, rounded, seconds, whole } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
-/** How far a wheel turns for one step of the zoom, pixels. */
-const WHEEL_STEP = 40;
+/** How far a wheel turns to halve the stretch of time, pixels. */
+const WHEEL_HALF = 400;
+/** Pixels of a line, for wheels that count lines. */
+const LINE_PX = 30;
+/** From here on a press is a drag, CSS pixels. */
+const DRAG = 4;
+/** Where a press is for somebody else. */
+const NOT_TIME = "#label-lane, button";
 
 export class Cursor {
   /**
    * @param {() => Timeline | null} timeline
    * @param {(t_us: number) => void} seek
-   * @param {(by: 1 | -1) => Promise<void>} zoom
+   * @param {import("./window.js").TimeWindow} window
    * @param {() => void} moved called when the user has moved the cursor
    */
-  constructor(timeline, seek, zoom, moved) {
+  constructor(timeline, seek, window, moved) {
     this.timeline = timeline;
+    this.window = window;
     this.track = part("track", HTMLElement);
-    this.turned = 0;
-    this.zooming = false;
+    /** Unit of the values, size of a tick in it, and ticks of the value 0. */
+    this.values = { unit: "ticks", step: 1, zero: 0 };
+    /** Where a press began, and whether it has become a drag. @type {{ x: number, drags: boolean } | null} */
+    this.press = null;
     const lanes = part("lanes", HTMLElement);
     /** @param {number | null} t_us */
     const point = (t_us) => {
@@ -28,13 +37,39 @@ export class Cursor {
       if (shown) shown.cursor_us = t_us;
       moved();
     };
-    lanes.addEventListener("pointermove", (event) => point(this.timeAt(event)));
-    lanes.addEventListener("pointerleave", () => point(null));
-    lanes.addEventListener("wheel", (event) => this.turn(event, zoom), { passive: false });
-    lanes.addEventListener("click", (event) => {
-      const t_us = this.timeAt(event);
-      if (t_us !== null && event.target instanceof Element && !event.target.closest("#label-lane, button, h2")) seek(t_us);
+    lanes.addEventListener("pointermove", (event) => {
+      if (this.press) this.drag(event, lanes);
+      point(this.timeAt(event));
     });
+    lanes.addEventListener("pointerleave", () => point(null));
+    lanes.addEventListener("wheel", (event) => this.turn(event), { passive: false });
+    lanes.addEventListener("pointerdown", (event) => {
+      const mine = event.button === 0 && event.target instanceof Element && !event.target.closest(NOT_TIME);
+      this.press = mine ? { x: event.clientX, drags: false } : null;
+    });
+    lanes.addEventListener("pointerup", (event) => {
+      const { press } = this;
+      this.press = null;
+      lanes.classList.remove("dragged");
+      const t_us = this.timeAt(event);
+      if (press && !press.drags && t_us !== null) seek(t_us);
+    });
+    lanes.addEventListener("pointercancel", () => {
+      this.press = null;
+      lanes.classList.remove("dragged");
+    });
+  }
+
+  /** Scrolls with the pointer. @param {PointerEvent} event @param {HTMLElement} lanes */
+  drag(event, lanes) {
+    const { press } = this;
+    const timeline = this.timeline();
+    if (!press || !timeline || (!press.drags && Math.abs(event.clientX - press.x) < DRAG)) return;
+    if (!press.drags) lanes.setPointerCapture(event.pointerId);
+    lanes.classList.add("dragged");
+    press.drags = true;
+    this.window.scroll(((press.x - event.clientX) / this.track.clientWidth) * timeline.span_us);
+    press.x = event.clientX;
   }
 
   /** @param {MouseEvent} event @returns {number | null} */
@@ -45,20 +80,23 @@ export class Cursor {
   }
 
   /**
-   * Zooms with Ctrl, which two fingers on a touch pad send as well; the wheel alone scrolls.
+   * The wheel zooms, with Shift or sideways it scrolls in time. Where the page itself scrolls, zooming takes Ctrl, which two fingers on
+   * a touch pad send as well.
    * @param {WheelEvent} event
-   * @param {(by: 1 | -1) => Promise<void>} zoom
    */
-  turn(event, zoom) {
-    if (!event.ctrlKey && !event.metaKey) return;
+  turn(event) {
+    const timeline = this.timeline();
+    if (!timeline) return;
+    const unit = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? LINE_PX : 1;
+    const [x, y] = event.shiftKey ? [event.deltaX || event.deltaY, 0] : [event.deltaX, event.deltaY];
+    const page = document.scrollingElement ?? document.body;
+    const views = part("lanes", HTMLElement).parentElement ?? page;
+    const scrolls = [page, views].some(({ scrollHeight, clientHeight }) => scrollHeight > clientHeight + 1);
+    const zooms = event.ctrlKey || event.metaKey || !scrolls;
+    if (Math.abs(x) > Math.abs(y)) this.window.scroll(((unit * x) / this.track.clientWidth) * timeline.span_us);
+    else if (zooms) this.window.scale(2 ** ((unit * y) / WHEEL_HALF));
+    else return;
     event.preventDefault();
-    this.turned += event.deltaY;
-    if (this.zooming || Math.abs(this.turned) < WHEEL_STEP) return;
-    this.zooming = true;
-    zoom(this.turned < 0 ? 1 : -1).finally(() => {
-      this.zooming = false;
-      this.turned = 0;
-    });
   }
 
   /** Draws the lines at the cursor and at the time of the picture. */
@@ -71,8 +109,7 @@ export class Cursor {
     };
     place(part("cursor-line", HTMLElement), timeline?.cursor_us ?? null);
     const t_us = timeline?.t_us ?? null;
-    const atEdge = t_us !== null && timeline?.end_us !== null && (timeline?.end_us ?? 0) - t_us < 2 * (timeline?.column_us ?? 0);
-    place(part("time-line", HTMLElement), atEdge ? null : t_us);
+    place(part("time-line", HTMLElement), timeline?.following ? null : t_us);
   }
 
   /** Writes the values at the cursor, or at the time of the picture. */
@@ -86,13 +123,17 @@ export class Cursor {
       return;
     }
     const [least, greatest, last] = timeline.history.subarray(3 * place, 3 * place + 3);
-    write(part("taxel-now", HTMLElement), last === UNKNOWN_VALUE ? "" : least === greatest ? `${last} ticks` : `${last} ticks (${least} to ${greatest})`);
-    write(part("force-sum", HTMLElement), `${whole(timeline.sum[place])} ticks`);
+    const { unit, step, zero } = this.values;
+    const value = (/** @type {number} */ ticks) => rounded((ticks - zero) * step);
+    const now = `${value(last)} ${unit}`;
+    write(part("taxel-now", HTMLElement), last === UNKNOWN_VALUE ? "" : least === greatest ? now : `${now} (${value(least)} to ${value(greatest)})`);
+    const sum = step === 1 ? whole(timeline.sum[place]) : rounded(timeline.sum[place] * step);
+    write(part("force-sum", HTMLElement), `${sum} ${unit}`);
     write(part("force-area", HTMLElement), counted(timeline.area[place], "taxel"));
     const [x, y] = [timeline.x[place], timeline.y[place]];
     const centre = Number.isNaN(x) ? "nothing pressed" : `column ${x.toFixed(1)}, row ${y.toFixed(1)}`;
     write(part("centre-now", HTMLElement), centre);
-    const force = `${whole(timeline.sum[place])} ticks over ${counted(timeline.area[place], "taxel")}`;
+    const force = `${sum} ${unit} over ${counted(timeline.area[place], "taxel")}`;
     write(part("picture-info", HTMLElement), `${force}, centre: ${centre}`);
   }
 }

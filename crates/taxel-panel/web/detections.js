@@ -6,6 +6,9 @@ import { seconds, short, whole } from "./words.js";
 /** @typedef {{ label: string, t_us: number, latency_us: number | null }} Detection */
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
+/** Detections of a recording, newest first. @param {{ label: string, t_us: number }[]} found @returns {Detection[]} */
+export const recorded = (found) => found.map(({ label, t_us }) => ({ label, t_us, latency_us: null })).reverse();
+
 /** Detections of the live source that are stored, and the number of those that are listed and marked. */
 const MOST_STORED = 300;
 const LISTED = 100;

@@ -18,6 +18,7 @@ export const KEYS = [
   { keys: ["-"], shown: "-", text: "slower", action: "slower" },
   { keys: ["z"], shown: "Z", text: "lanes: half the stretch of time, around the cursor", action: "zoomIn" },
   { keys: ["x"], shown: "X", text: "lanes: twice the stretch of time", action: "zoomOut" },
+  { keys: ["a"], shown: "A", text: "lanes: all of the time", action: "showAll" },
   { keys: ["l"], shown: "L", text: "follow the board live", action: "live" },
   { keys: ["m"], shown: "M", text: "mark a label at the cursor, else at the picture's time", action: "mark" },
   { keys: ["n"], shown: "N", text: "to the next label", action: "nextLabel" },

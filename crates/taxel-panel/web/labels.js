@@ -1,6 +1,7 @@
 // Labels by click: mark, name, move and delete events on the time line.
 
 import { make, part, write } from "./dom.js";
+import { notify } from "./notice.js";
 import { counted, seconds } from "./words.js";
 
 /** @typedef {import("./protocol.js").Label} Label */
@@ -13,7 +14,13 @@ import { counted, seconds } from "./words.js";
 /** How far an arrow key moves a label, us. */
 const STEP_US = 1000;
 /** From here on a press is a drag, CSS pixels. */
-const DRAG = 3;
+const DRAG = 4;
+/** Levels on which handles are stacked where they would cover each other; more labels than fit are lines alone. */
+const LEVELS = 3;
+/** Width of a handle, CSS pixels. */
+const HANDLE = { mouse: 11, touch: 16 };
+/** Width of a letter of a flag's name, CSS pixels, about. */
+const LETTER = 7;
 
 /** The lane of flags above the raster, and the tab with all of them. */
 export class Labels {
@@ -24,14 +31,16 @@ export class Labels {
    * @param {() => Timeline | null} timeline
    * @param {(error: unknown) => void} failed
    * @param {() => void} shown called to bring the tab to the front
+   * @param {(file: string) => void} counted called when the number of a recording's labels may have changed
    */
-  constructor(server, settings, player, timeline, failed, shown) {
+  constructor(server, settings, player, timeline, failed, shown, counted) {
     this.server = server;
     this.settings = settings;
     this.player = player;
     this.timeline = timeline;
     this.failed = failed;
     this.shown = shown;
+    this.counted = counted;
     /** @type {Map<string, LabelsMessage>} by recording */
     this.files = new Map();
     /** The recording whose labels are shown. @type {string | null} */
@@ -40,6 +49,10 @@ export class Labels {
     this.flags = new Map();
     /** @type {number | null} */
     this.chosen = null;
+    /** The name that was marked by the last click. */
+    this.clicked = "";
+    /** A click without a name: it is marked as soon as there is one. @type {number | null} */
+    this.waiting_us = null;
     /** The one being dragged, and where to. @type {{ label_id: number, t_us: number } | null} */
     this.dragged = null;
     this.name = part("label-name", HTMLInputElement);
@@ -47,13 +60,15 @@ export class Labels {
     this.name.oninput = () => settings.set("label", this.name.value);
     this.lane = part("label-lane", HTMLElement);
     this.lane.addEventListener("click", (event) => {
-      if (event.target === this.lane) this.mark(this.timeAt(event.clientX));
+      if (event.target === this.lane) this.click(event);
     });
     part("mark", HTMLButtonElement).onclick = () => this.markHere();
     part("label-form", HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();
-      this.markHere();
+      if (this.waiting_us === null) this.markHere();
+      else this.mark(this.waiting_us);
     };
+    new ResizeObserver(() => this.place()).observe(this.lane);
   }
 
   /** @returns {Label[]} of the recording shown, by time */
@@ -65,13 +80,19 @@ export class Labels {
   take(message) {
     this.files.set(message.name, { ...message, labels: [...message.labels].sort((a, b) => a.t_us - b.t_us) });
     if (message.name === this.file) this.show();
+    this.counted(message.name);
+  }
+
+  /** @param {string} file @returns {number | null} how many labels it has, where they have been read */
+  count(file) {
+    return this.files.get(file)?.labels.length ?? null;
   }
 
   /** @param {string | null} file */
   choose(file) {
     if (this.file === file) return;
     this.file = file;
-    this.chosen = null;
+    this.chosen = this.waiting_us = null;
     this.show();
   }
 
@@ -87,6 +108,13 @@ export class Labels {
     return this.timeline()?.time(Math.max(0, Math.min(1, (clientX - box.left) / box.width))) ?? null;
   }
 
+  /** Marks where the pointer is; the second click of a double one is no label of its own. @param {MouseEvent} event */
+  click({ clientX, detail }) {
+    const name = this.name.value.trim();
+    if (detail < 2 || name !== this.clicked) this.mark(this.timeAt(clientX));
+    this.clicked = name;
+  }
+
   /** Marks at the cursor, or at the picture. */
   markHere() {
     const timeline = this.timeline();
@@ -96,9 +124,11 @@ export class Labels {
   /** @param {number | null} t_us */
   mark(t_us) {
     const label = this.name.value.trim();
+    this.waiting_us = label ? null : t_us;
     if (!label) {
       this.shown();
       this.name.focus();
+      notify("type the label's name, then Enter");
       return;
     }
     if (t_us !== null) this.server.request({ type: "mark", label, t_us }).catch(this.failed);
@@ -114,7 +144,11 @@ export class Labels {
 
   /** @param {number} label_id */
   remove(label_id) {
-    this.server.request({ type: "delete", label_id }).catch(this.failed);
+    const gone = this.labels.find((label) => label.label_id === label_id);
+    if (!gone) return;
+    const { label, t_us } = gone;
+    const undo = () => this.server.request({ type: "mark", label, t_us }).catch(this.failed);
+    this.server.request({ type: "delete", label_id }).then(() => notify(`deleted ${label} at ${seconds(t_us)}`, false, { text: "Undo", action: undo }), this.failed);
   }
 
   /** @param {number} by 1: the next label after the picture's time, -1: the one before */
@@ -192,27 +226,43 @@ export class Labels {
     };
   }
 
-  /** Puts each flag in the window where its time is. */
+  /** Puts each flag in the window where its time is; its handle on the first level where it covers no other. */
   place() {
     const timeline = this.timeline();
+    const { clientWidth } = this.lane;
     const seen = new Set();
-    for (const label of this.labels) {
+    const handle = HANDLE[matchMedia("(max-width: 860px)").matches ? "touch" : "mouse"];
+    const inside = this.labels.flatMap((label) => {
       const t_us = this.dragged?.label_id === label.label_id ? this.dragged.t_us : label.t_us;
       const share = timeline?.share(t_us) ?? null;
-      if (share === null) continue;
-      seen.add(label.label_id);
-      let flag = this.flags.get(label.label_id);
+      return share === null ? [] : [{ ...label, t_us, share }];
+    });
+    /** @type {number[]} where the last handle of each level ends */
+    const ends = new Array(LEVELS).fill(-Infinity);
+    inside.forEach(({ label_id, label, t_us, share }, i) => {
+      seen.add(label_id);
+      let flag = this.flags.get(label_id);
       if (!flag) {
-        flag = this.flag(label.label_id);
-        this.flags.set(label.label_id, flag);
+        flag = this.flag(label_id);
+        this.flags.set(label_id, flag);
         this.lane.append(flag);
       }
+      const x = share * clientWidth;
+      const level = ends.findIndex((end) => end <= x);
+      if (level >= 0) ends[level] = x + handle;
+      // The name stands where no other handle of its level follows.
+      const next = inside.slice(i + 1, i + 1 + LEVELS).reduce((least, other) => Math.min(least, other.share * clientWidth), clientWidth + handle);
+      const named = level === 0 && next - x > handle + LETTER * Math.min(label.length, 14);
+      if (named) ends.fill(x + handle + LETTER * Math.min(label.length, 14));
       flag.style.left = `${(100 * share).toFixed(3)}%`;
-      write(/** @type {HTMLElement} */ (flag.firstElementChild), label.label);
-      const name = `label ${label.label} at ${seconds(t_us)}`;
+      flag.dataset.level = String(level);
+      flag.classList.toggle("line", level < 0 && label_id !== this.chosen);
+      write(/** @type {HTMLElement} */ (flag.lastElementChild), named ? label : "");
+      const name = `label ${label} at ${seconds(t_us)}`;
       if (flag.getAttribute("aria-label") !== name) flag.setAttribute("aria-label", name);
-      flag.classList.toggle("chosen", label.label_id === this.chosen);
-    }
+      if (flag.title !== name) flag.title = name;
+      flag.classList.toggle("chosen", label_id === this.chosen);
+    });
     for (const [id, flag] of this.flags) {
       if (seen.has(id)) continue;
       flag.remove();
@@ -222,7 +272,7 @@ export class Labels {
 
   /** @param {number} label_id @returns {HTMLButtonElement} */
   flag(label_id) {
-    const flag = make("button", { type: "button", class: "flag" }, make("span"));
+    const flag = make("button", { type: "button", class: "flag" }, make("i"), make("span"));
     const mine = () => this.labels.find((label) => label.label_id === label_id);
     let from = 0;
     flag.addEventListener("pointerdown", (event) => {
@@ -231,7 +281,7 @@ export class Labels {
     });
     flag.addEventListener("pointermove", (event) => {
       if (!flag.hasPointerCapture(event.pointerId)) return;
-      if (!this.dragged && Math.abs(event.clientX - from) < DRAG) return;
+      if (!this.dragged && !(Math.abs(event.clientX - from) >= DRAG)) return;
       const t_us = this.timeAt(event.clientX);
       if (t_us === null) return;
       this.dragged = { label_id, t_us };
@@ -247,6 +297,7 @@ export class Labels {
     });
     flag.addEventListener("pointercancel", () => {
       this.dragged = null;
+      this.place();
     });
     flag.addEventListener("focus", () => {
       this.chosen = label_id;
@@ -254,6 +305,12 @@ export class Labels {
     });
     flag.addEventListener("keydown", (event) => {
       const label = mine();
+      if (event.key === "Escape" && this.dragged) {
+        // The press goes on, but moves nothing.
+        this.dragged = null;
+        from = NaN;
+        return this.place();
+      }
       if (!label || event.ctrlKey || event.altKey || event.metaKey) return;
       const far = event.shiftKey ? 100 * STEP_US : STEP_US;
       if (event.key === "ArrowLeft") this.move(label_id, label.t_us - far);

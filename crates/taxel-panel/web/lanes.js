@@ -3,7 +3,6 @@
 import uPlot from "./vendor/uPlot.js";
 import { part, themed } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
-import { SPAN } from "./timeline.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 /** @typedef {(number | null)[]} Curve */
@@ -11,19 +10,25 @@ import { SPAN } from "./timeline.js";
 
 /** Room for the numbers on either side, CSS pixels; the raster has the same. */
 const SIDE = 44;
+/** CSS pixels between two lines of the grid. */
+const GRID_PX = 96;
 /** @type {readonly Name[]} */
 const NAMES = ["taxel", "force", "centre"];
 
-/** Curves of the last five seconds, drawn by uPlot. */
+/** Curves of the window, drawn by uPlot. */
 export class Lanes {
   constructor() {
     /** @type {Map<Name, uPlot>} */
     this.plots = new Map();
     this.limits = { rows: 64, columns: 64 };
-    const x = Array.from({ length: SPAN }, (_, i) => i - SPAN + 1);
-    const curve = () => /** @type {Curve} */ (new Array(SPAN).fill(null));
-    /** @type {Record<Name, [number[], ...Curve[]]>} */
-    this.data = { taxel: [x, curve(), curve(), curve()], force: [x, curve(), curve()], centre: [x, curve(), curve()] };
+    /** Times from the left edge of the window, s, and curves at them. @type {Record<Name, [number[], ...Curve[]]>} */
+    /** Size of a tick in the unit of the values, and ticks of the value 0. */
+    this.values = { step: 1, zero: 0 };
+    this.data = { taxel: [[], [], [], []], force: [[], [], []], centre: [[], [], []] };
+    /** The length of the window, s, and where the axis has numbers, s from its left edge. */
+    this.span_s = 1;
+    /** @type {number[]} */
+    this.splits = [];
     this.observer = new ResizeObserver(() => this.fit());
     for (const name of NAMES) this.observer.observe(part(`${name}-lane`, HTMLElement));
     this.make();
@@ -51,19 +56,19 @@ export class Lanes {
       values: (_, marks) => marks.map((mark) => (mark >= 10_000 ? `${mark / 1000}k` : String(mark))),
     });
     /** @type {uPlot.Axis} */
-    const time = { show: true, size: 0, values: () => [], grid: { stroke: grid, width: 1 }, ticks: { show: false }, splits: () => [-1000, -750, -500, -250] };
+    const time = { show: true, size: 0, values: () => [], grid: { stroke: grid, width: 1 }, ticks: { show: false }, splits: () => this.splits };
     /** @param {string} stroke @param {string} scale @param {number[]} [dash] @returns {uPlot.Series} */
     const line = (stroke, scale, dash) => ({ stroke, scale, width: 1.25, points: { show: false }, ...(dash ? { dash } : {}) });
     /** @type {uPlot.Series} the edge of a band */
     const bound = { scale: "value", points: { show: false } };
     /** @type {uPlot.Scale.Range} */
-    const fromZero = (_, __, most) => [0, Math.max(8, (most ?? 0) * 1.1)];
+    const fromZero = (_, __, most) => [0, Math.max(8 * this.values.step, (most ?? 0) * 1.1)];
     const { rows, columns } = this.limits;
     const extent = Math.max(rows, columns);
     /** @type {Record<Name, { scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }>} */
     const plans = {
       taxel: {
-        scales: { value: { range: (_, least, most) => (least === null ? [0, 10] : [Math.floor(least) - 2, Math.ceil(most) + 2]) } },
+        scales: { value: { range: (_, least, most) => (least === null ? [0, 10] : [least - 2 * this.values.step, most + 2 * this.values.step]) } },
         series: [{}, bound, bound, line(one, "value")],
         bands: [{ series: [2, 1], fill: band }],
         axes: [time, axis("value", 3, text)],
@@ -93,7 +98,7 @@ export class Lanes {
           padding: [7, right, 4, 0],
           legend: { show: false },
           cursor: { show: false },
-          scales: { x: { time: false, range: [-SPAN, 0] }, ...scales },
+          scales: { x: { time: false, range: () => [0, this.span_s] }, ...scales },
         },
         this.data[name],
         place,
@@ -119,17 +124,28 @@ export class Lanes {
 
   /** @param {Timeline} timeline */
   draw(timeline) {
-    const { end, history, sum, area, x, y } = timeline;
-    const [, least, greatest, last] = this.data.taxel;
+    const { columns, window, column_us, history, sum, area, x, y } = timeline;
+    const { step, zero } = this.values;
+    if (!columns || !window) return;
+    this.span_s = timeline.span_us / 1e6;
+    this.splits = timeline.ticks(part("force-lane", HTMLElement).clientWidth / GRID_PX).map(({ share }) => share * this.span_s);
+    const [first, end] = columns;
+    // A column more on the left, so that curves begin at the edge.
+    const count = end - first + 2;
+    const [times, least, greatest, last] = this.data.taxel;
     const [, force, touched] = this.data.force;
     const [, column, row] = this.data.centre;
-    for (let i = 0; i < SPAN; i++) {
-      const place = end === null ? -1 : timeline.known(end - SPAN + 1 + i);
+    this.data.force[0] = this.data.centre[0] = times;
+    for (const curve of [times, least, greatest, last, force, touched, column, row]) curve.length = count;
+    for (let i = 0; i < count; i++) {
+      const place = timeline.known(first - 1 + i);
+      // A curve has the value at the end of its column.
+      times[i] = ((first + i) * column_us - window[0]) / 1e6;
       const known = place >= 0 && history[3 * place + 2] !== UNKNOWN_VALUE;
-      least[i] = known ? history[3 * place] : null;
-      greatest[i] = known ? history[3 * place + 1] : null;
-      last[i] = known ? history[3 * place + 2] : null;
-      force[i] = place >= 0 ? sum[place] : null;
+      least[i] = known ? (history[3 * place] - zero) * step : null;
+      greatest[i] = known ? (history[3 * place + 1] - zero) * step : null;
+      last[i] = known ? (history[3 * place + 2] - zero) * step : null;
+      force[i] = place >= 0 ? sum[place] * step : null;
       touched[i] = place >= 0 ? area[place] : null;
       const pressed = place >= 0 && !Number.isNaN(x[place]);
       column[i] = pressed ? x[place] : null;

@@ -4,11 +4,12 @@ import { bindActions } from "./actions.js";
 import { Board } from "./board.js";
 import { writeCounters } from "./counters.js";
 import { Cursor } from "./cursor.js";
-import { Detections } from "./detections.js";
+import { Detections, recorded } from "./detections.js";
 import { make, part, write } from "./dom.js";
 import { showKeys } from "./keys.js";
 import { Labels } from "./labels.js";
 import { Lanes } from "./lanes.js";
+import { Layout } from "./layout.js";
 import { Maps } from "./maps.js";
 import { failed, notify } from "./notice.js";
 import { Player } from "./player.js";
@@ -21,9 +22,10 @@ import { showState } from "./state.js";
 import { Strip } from "./strip.js";
 import { showTab } from "./tabs.js";
 import { Timeline } from "./timeline.js";
+import { Training } from "./training.js";
 import { View } from "./view.js";
-import { counted, seconds } from "./words.js";
-import { Zoom } from "./zoom.js";
+import { TimeWindow } from "./window.js";
+import { counted, numbering, seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Message} Message */
 /** @typedef {import("./protocol.js").Hello} Hello */
@@ -43,12 +45,19 @@ const fragment = new URLSearchParams(location.hash.slice(1));
 const server = new Server(fragment.get("token") ?? "", receive, receivePicture, showConnection);
 const player = new Player(server, failed);
 const detections = new Detections((t_us) => player.seek(t_us));
-const zoom = new Zoom(server, player, () => timeline, () => hello?.columns_us ?? null);
-const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), (by) => zoom.by(by), mark);
+const timeWindow = new TimeWindow(server, player, () => timeline, () => hello?.columns_us ?? null, () => {
+  lanesDue = marksDue = true;
+});
+const cursor = new Cursor(() => timeline, (t_us) => player.seek(t_us), timeWindow, mark);
 const maps = new Maps(settings, watch);
 const raster = new Raster(part("raster", HTMLCanvasElement));
 const lanes = new Lanes();
-const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"));
+const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"), listRecordings);
+const training = new Training(server);
+const layout = new Layout(arrangement, () => {
+  lanes.fit();
+  lanesDue = true;
+});
 const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
@@ -68,8 +77,8 @@ let registers = null;
 let zeroed = [];
 /** Whether the server is connected, and why not. */
 let connection = { connected: false, why: "" };
-/** The lanes begin anew with the next picture: another source, or a new connection. */
-let restarts = true;
+/** @type {import("./protocol.js").Recordings | null} */
+let recordings = null;
 /** What is to be drawn again: the maps, the lanes, the marks over the lanes. */
 let mapsDue = false;
 let lanesDue = true;
@@ -82,36 +91,71 @@ let drawn = 0;
 /** @param {"open" | "lost"} state @param {string} why */
 function showConnection(state, why) {
   connection = { connected: state === "open", why };
-  restarts = true;
   if (state === "open") {
     // The server knows nothing of the view after a new connection.
     if (maps.taxel) watch(maps.taxel);
     view.encode();
-    if (timeline && timeline.column_us !== (hello?.column_us ?? timeline.column_us)) server.send({ type: "zoom", column_us: timeline.column_us });
+    timeWindow.forget();
+    timeWindow.ask();
   }
   writeState();
 }
 
 function writeState() {
-  showState(connection, player.transport, hello, opened, recorder.status);
+  showState(connection, player.transport, hello, opened, recorder.status, counters);
+}
+
+/** The maps that are shown: of pictures there are no events, so that only their values are. */
+function mapsShown() {
+  return opened?.pictures ? "pressure" : settings.values.maps;
+}
+
+/** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of pictures. */
+function showUnits() {
+  const pictures = opened?.pictures;
+  const { unit, step, zero } = pictures ?? { unit: "ticks", step: 1, zero: 0 };
+  maps.values = { unit, step, zero, pictures: pictures !== null && pictures !== undefined };
+  lanes.values = { step, zero };
+  cursor.values = { unit, step, zero };
+  numbering.picture_us = pictures?.picture_us ?? null;
+  const trials = part("trials", HTMLSelectElement);
+  trials.hidden = !pictures?.trials.length;
+  trials.replaceChildren(...(pictures?.trials ?? []).map((name) => make("option", { value: name }, name)));
+  trials.value = pictures?.trial ?? "";
+  part("pressure-alone", HTMLButtonElement).hidden = maps.values.pictures;
+  showLanes();
+}
+
+/** What the page has to place: see `Layout`. */
+function arrangement() {
+  const { values } = settings;
+  /** @type {["raster" | "taxel" | "force" | "centre", boolean][]} */
+  const all = [["raster", values.showRaster && !opened?.pictures], ["taxel", values.showTaxel && maps.taxel !== null], ["force", values.showForce], ["centre", values.showCentre]];
+  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: all.flatMap(([name, shown]) => (shown ? [name] : [])) };
+}
+
+/** Lists the recordings, with the labels as the page knows them. */
+function listRecordings() {
+  if (recordings) recorder.list(recordings, player.transport.source, (file) => labels.count(file));
 }
 
 /** @param {[number, number] | null} taxel */
 function watch(taxel) {
   server.send({ type: "watch", taxel });
   timeline?.unwatch();
-  lanesDue = true;
+  showLanes();
 }
 
 /** @param {ArrayInfo} array */
 function resize(array) {
   if (!timeline || timeline.rows !== array.rows || maps.columns !== array.columns) {
     timeline = new Timeline(array.rows, hello?.column_us ?? 4000);
-    restarts = true;
+    timeWindow.forget();
   }
   maps.size(array.rows, array.columns, array.exists);
   lanes.size(array.rows, array.columns);
   write(part("raster-rows", HTMLElement), String(array.rows - 1));
+  layout.arrange();
 }
 
 /** @param {ArrayBuffer} buffer */
@@ -121,12 +165,10 @@ function receivePicture(buffer) {
     resize({ rows: picture.rows, columns: picture.columns, pitch_mm: 0, name: "", exists: null });
   }
   if (!timeline) return;
-  const ends = zoom.endsAt(picture);
-  // A restart of a view that follows is a board that began anew; any other follows a seek of this page, and the window stays.
-  timeline.put(picture, restarts || (picture.restart && picture.following), ends);
-  if (ends) zoom.awaited?.arrived();
-  restarts = false;
-  zoom.show(picture.column_us);
+  const followed = timeline.following;
+  timeline.put(picture);
+  timeWindow.follow(picture);
+  if (followed !== picture.following) timeWindow.ask();
   maps.take(picture);
   player.t_us = picture.t_us;
   if (picture.following && player.transport.state !== "following" && player.transport.source === null) move({ ...player.transport, source: null, state: "following" });
@@ -142,13 +184,14 @@ function receive(message) {
       return greet(message);
     case "registers":
       registers = message;
+      showAssumed();
       return showRegisters();
     case "presets":
       return board.takePresets(message);
     case "counters":
       counters = message;
       if (player.transport.source === null) player.reach = message.reach_us;
-      return;
+      return writeState();
     case "detection":
       detections.add(message);
       marksDue = true;
@@ -161,7 +204,14 @@ function receive(message) {
       if (player.transport.source === null) labels.choose(message.state === "recording" || message.state === "finishing" ? message.file : null);
       return writeState();
     case "recordings":
-      return recorder.list(message, player.transport.source);
+      recordings = message;
+      training.list(message);
+      return listRecordings();
+    case "trained":
+      return training.take(message);
+    case "detections":
+      if (message.source === player.transport.source) showDetections(recorded(message.detections));
+      return;
     case "opened":
       return open(message);
     case "overview":
@@ -186,6 +236,8 @@ function receive(message) {
       return board.connection.offer(message);
     case "cut":
       return notify(`wrote ${message.name}${message.lost.length ? `; left out: ${message.lost.join(", ")}` : ""}`);
+    case "loading":
+      return notify(message.share < 1 ? `${message.name}: ${Math.round(100 * message.share)} % read; its beginning is shown` : `${message.name} is read`);
     case "warning":
       return notify(message.text, true);
     case "refused":
@@ -213,13 +265,14 @@ function greet(message) {
   board.greet(message);
   view.greet(message);
   labels.offer(message.readout ?? []);
+  showAssumed();
   recorder.able = message.live;
-  for (const id of ["record", "record-start"]) part(id, HTMLButtonElement).disabled = !message.live;
+  part("record", HTMLButtonElement).hidden = !message.live;
+  part("record-start", HTMLButtonElement).disabled = !message.live;
   part("live-counters", HTMLElement).hidden = !message.live;
   showDetections(detections.shown);
   document.title = message.live ? "taxel · live" : "taxel · view";
   if (maps.taxel) watch(maps.taxel);
-  else if (message.array) maps.point([message.array.columns >> 1, message.array.rows >> 1]);
   server.send({ type: "recordings" });
   if (message.live) server.send({ type: "overview" });
   const asked = fragment.get("open") ?? message.open;
@@ -228,32 +281,47 @@ function greet(message) {
   writeState();
 }
 
+/** A readout that runs live assumes a frame, where nobody has stated the registers or read them. */
+function showAssumed() {
+  const assumes = hello?.readout && registers && !registers.known && !registers.stated && !opened;
+  write(part("assumed", HTMLElement), assumes ? `The readout assumes frames of ${short(registers?.frame_us ?? 0)}: the registers are not known.` : "");
+}
+
 /** Shows the registers of the board, or of the recording that is shown. */
 function showRegisters() {
   const values = opened ? opened.registers : (registers?.values ?? null);
   maps.floor = Number(values?.noise_floor ?? 0);
   if (opened) {
-    if (!hello?.live) board.show(opened.registers ?? {}, opened.frame_us, null, true);
+    if (!hello?.live) board.show(opened.registers ?? {}, opened.frame_us, null, true, false);
   } else if (registers && hello?.live) board.take(registers);
 }
 
 /** @param {Opened} message */
 function open(message) {
+  const again = opened?.name === message.name;
   opened = message;
-  restarts = true;
   player.transport = { ...player.transport, source: message.name, state: "paused" };
   player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
   player.t_us = message.start_us;
   strip.overview = null;
+  showUnits();
   resize(message.array);
-  if (!maps.taxel) maps.point([message.array.columns >> 1, message.array.rows >> 1]);
+  timeWindow.forget();
+  if (timeline && !again) {
+    timeline.following = false;
+    timeWindow.showAll();
+    // It opens on something: the first touch.
+    if (message.touch_us !== null) player.seek(message.touch_us);
+  }
+  if (!hello?.live && !again) showTab("labels");
+  training.choose(message.name);
   board.array = message.array;
   maps.health = null;
   showZeroed();
   part("files", HTMLSelectElement).value = message.name;
   labels.choose(message.name);
   view.choose(message.name);
-  showDetections(message.detections.map(({ label, t_us }) => ({ label, t_us, latency_us: null })).reverse());
+  showDetections(recorded(message.detections));
   part("notes-block", HTMLElement).hidden = !message.notes.length;
   part("note-list", HTMLElement).replaceChildren(
     ...message.notes.map(({ t_us, text }) => {
@@ -285,8 +353,10 @@ function move(transport) {
   player.take(transport);
   if (transport.source === null && (opened || changed)) {
     opened = null;
-    restarts = true;
+    showUnits();
     strip.overview = null;
+    timeline = null;
+    training.choose(null);
     if (hello?.array) resize(hello.array);
     maps.health = null;
     showZeroed();
@@ -304,7 +374,9 @@ function move(transport) {
 
 /** @param {import("./detections.js").Detection[]} shown newest first */
 function showDetections(shown) {
-  detections.show(shown, opened ? "None in this recording." : hello?.readout ? "None yet." : "No readout runs: start taxel live with one to see its detections.");
+  const none = opened ? "None in this recording: train on labels, or choose a readout." : hello?.readout ? "None yet." : "No readout runs: start taxel live with one, or choose one here.";
+  detections.show(shown, none);
+  marksDue = true;
 }
 
 // ------------------------------------------------------------------------------------------------ drawing
@@ -361,7 +433,9 @@ function drawLanes(shown) {
 
 function writeText() {
   maps.write();
-  writeCounters(counters, registers?.known === false, drawn);
+  writeCounters(counters, drawn);
+  timeWindow.write();
+  if (training.since !== null) training.write();
   cursor.write();
   player.write();
   strip.draw();
@@ -384,11 +458,15 @@ function applyTheme() {
 
 function showLanes() {
   const { values } = settings;
-  for (const [id, shown] of Object.entries({ raster: values.showRaster, taxel: values.showTaxel, force: values.showForce, centre: values.showCentre })) {
-    part(`${id}-block`, HTMLElement).hidden = !shown;
+  const { lanes: shown } = arrangement();
+  for (const id of /** @type {const} */ (["raster", "taxel", "force", "centre"])) part(`${id}-block`, HTMLElement).hidden = !shown.includes(id);
+  for (const name of ["pressure", "change"]) {
+    part(`${name}-figure`, HTMLElement).hidden = mapsShown() !== "both" && mapsShown() !== name;
+    part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
   }
   part("raster-changes", HTMLElement).hidden = values.raster === "spikes";
   part("raster-spikes", HTMLElement).hidden = values.raster !== "spikes";
+  layout.arrange();
   lanes.fit();
   lanesDue = true;
 }
@@ -398,25 +476,34 @@ settings.watch((name) => {
   if (name === "map" || name === "gamma") maps.colour();
   if (name === "flipX" || name === "flipY") maps.mark();
   if (name === "tones") recorder.tones.on = settings.values.tones;
-  if (name.startsWith("show") || name === "raster") showLanes();
+  if (name.startsWith("show") || name === "raster" || name === "maps") showLanes();
   mapsDue = true;
 });
 matchMedia("(prefers-color-scheme: light)").addEventListener("change", applyTheme);
 
 // ------------------------------------------------------------------------------------------------ start
 
-bindActions({ server, player, settings, recorder, labels, view, maps, zoom }, () => timeline);
+bindActions({ server, player, settings, recorder, labels, view, maps, window: timeWindow }, () => timeline);
 part("files", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
   if (value) server.request({ type: "open", name: value }).catch(failed);
   else player.follow();
 };
+part("trials", HTMLSelectElement).onchange = ({ target }) => {
+  const { value } = /** @type {HTMLSelectElement} */ (target);
+  if (opened) server.request({ type: "open", name: opened.name, trial: value }).catch(failed);
+};
 
-// A narrow page has the choice of recordings above the maps, so that its footer stays low.
+// A narrow page has only what must stay in sight in its header and footer, so that these stay low.
 const narrow = matchMedia("(max-width: 860px)");
 const arrange = () => {
-  if (narrow.matches) part("opening", HTMLElement).append(part("files", HTMLElement), part("speed", HTMLElement));
-  else {
+  if (narrow.matches) {
+    part("opening", HTMLElement).append(part("files", HTMLElement), part("speed", HTMLElement));
+    part("strip-place", HTMLElement).append(part("strip", HTMLElement));
+    part("aside", HTMLElement).prepend(part("counters", HTMLElement));
+  } else {
+    part("clock-place", HTMLElement).before(part("strip", HTMLElement));
+    part("corner", HTMLElement).before(part("counters", HTMLElement));
     part("record", HTMLElement).after(part("files", HTMLElement));
     part("step-on", HTMLElement).after(part("speed", HTMLElement));
   }

@@ -8,8 +8,19 @@ const SHOWN_MS = 8000;
 /** @type {number | undefined} */
 let timer;
 
-/** @param {string} text @param {boolean} [bad] */
-export function notify(text, bad = false) {
+/**
+ * @param {string} text
+ * @param {boolean} [bad]
+ * @param {{ text: string, action: () => void }} [offer] a button beside the text
+ */
+export function notify(text, bad = false, offer) {
+  const button = part("notice-offer", HTMLButtonElement);
+  button.hidden = !offer;
+  write(button, offer?.text ?? "");
+  button.onclick = () => {
+    part("notice", HTMLElement).hidden = true;
+    offer?.action();
+  };
   const place = part("notice", HTMLElement);
   place.hidden = false;
   place.classList.toggle("bad", bad);

@@ -10,13 +10,14 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayInfo | null, udp: string | null, control: string | null,
  *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, columns_us: [number, number], time_columns: number,
  *   delta_intensity: boolean | null }} Hello
- * @typedef {{ type: "registers", known: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
+ * @typedef {{ type: "registers", known: boolean, stated: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
  *   warnings: string[] }} RegistersMessage
  * @typedef {{ type: "presets", built_in: string[], own: Record<string, Record<string, number>>, path: string }} Presets
  * @typedef {{ count: number, p50_us: number | null, p99_us: number | null, max_us: number | null }} Latency
- * @typedef {{ type: "counters", board_us: number | null, events: number, events_per_s: number | null, bytes_per_s: number | null,
+ * @typedef {{ state: "nothing" | "arriving" | "quiet" | "lost", since_ns: number | null, silent_s: number, heartbeat_us: number | null }} Arrival
+ * @typedef {{ type: "counters", seconds: number, board_us: number | null, events: number, events_per_s: number | null, bytes_per_s: number | null,
  *   frames_per_s: number | null, lost: Record<string, number>, queue: number | null, latency: Record<string, Latency>, detections: number,
- *   wire_version: number | null, taring: boolean, reach_us: [number, number] | null, reach_bytes: number, viewers: number }} Counters
+ *   wire_version: number | null, taring: boolean, arrival: Arrival, reach_us: [number, number] | null, reach_bytes: number, viewers: number }} Counters
  * @typedef {{ type: "detection", label: string, t_us: number, known_us: number, latency_us: number | null }} Detection
  * @typedef {{ type: "spikes", encoder: string, trains: number, signed: boolean, t_ms: number[], train: number[], value: number[] | null,
  *   left_out: number, latency_ms: number }} Spikes
@@ -24,12 +25,17 @@ export const UNKNOWN_VALUE = 65535;
  *   file: string | null, label: string | null, advance: boolean, left_s: number | null, seconds: number | null, length_s: number | null,
  *   last: { file: string, verdict: string } | null, error: string | null }} Recorder
  * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileInfo
- * @typedef {{ type: "recordings", folder: string, files: FileInfo[] }} Recordings
- * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null, events: number, bytes: number,
+ * @typedef {{ type: "recordings", folder: string, files: FileInfo[], readouts: string[] }} Recordings
+ * @typedef {{ count: number, unit: string, step: number, zero: number, picture_us: number | null,
+ *   sources: { name: string, left: number, rows: number, columns: number }[], trial: string | null, trials: string[], left_s: number | null }} Pictures
+ * @typedef {{ type: "loading", name: string, share: number }} Loading
+ * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null,
+ *   touch_us: number | null, events: number, bytes: number, pictures: Pictures | null,
  *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null,
  *   frame_us: number | null, markers: { t_us: number, start: boolean }[],
  *   notes: { t_us: number | null, text: string }[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
- * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[] }} Overview
+ * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[],
+ *   force: number[] }} Overview
  * @typedef {{ type: "transport", source: string | null, state: "following" | "playing" | "paused", speed: number, t_us: number | null }} Transport
  * @typedef {{ label_id: number, label: string, t_us: number }} Label
  * @typedef {{ type: "labels", name: string, path: string, labels: Label[] }} Labels
@@ -37,6 +43,8 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "health", source: string | null, taxels: number, heard: number, dead: Taxel[], stuck: Taxel[], noisy: Taxel[] }} Health
  * @typedef {{ taxel: Taxel, t_us: number, rest: number, before: number | null }} Zeroing
  * @typedef {{ type: "zeroed", taxels: Zeroing[] }} Zeroed
+ * @typedef {{ type: "trained", name: string, readout: string, text: string }} Trained
+ * @typedef {{ type: "detections", source: string, readout: string, detections: { label: string, t_us: number, known_us: number }[] }} DetectionsMessage
  * @typedef {{ type: "board_line", at_ns: number, text: string }} BoardLine
  * @typedef {{ type: "cut", name: string, lost: string[] }} Cut
  * @typedef {{ place: string, kind: string, product: string | null, maker: string | null, serial: string | null }} Port
@@ -45,7 +53,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "refused", id?: number, what: string | null, reason: string, field: string | null }} Refused
  * @typedef {{ type: "warning", text: string }} Warning
  * @typedef {Hello | RegistersMessage | Presets | Counters | Detection | Spikes | Recorder | Recordings | Opened | Overview | Transport | Labels |
- *   Health | Zeroed | BoardLine | Cut | Places | Done | Refused | Warning} Message
+ *   Health | Zeroed | Trained | DetectionsMessage | BoardLine | Cut | Places | Loading | Done | Refused | Warning} Message
  */
 
 /**

@@ -1,7 +1,6 @@
 // Ups and downs of each row over time; or an encoder's spikes.
 
 import { fitted, ground, themed } from "./dom.js";
-import { SPAN } from "./timeline.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
@@ -40,14 +39,15 @@ export class Raster {
    */
   draw(timeline, what) {
     const { width, height } = fitted(this.canvas);
-    const { end, rows } = timeline;
-    if (end === null || !width || !height) {
+    const { columns: shown, window, column_us, span_us, rows } = timeline;
+    if (!shown || !window || !width || !height) {
       this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
       return;
     }
-    const columns = Math.ceil(SPAN / this.canvas.width);
+    const [begin, end] = shown;
+    const columns = Math.ceil((end - begin + 1) / this.canvas.width);
     const gathered = Math.ceil(rows / this.canvas.height);
-    const [wide, high] = [Math.ceil(SPAN / columns) + 1, Math.ceil(rows / gathered)];
+    const [wide, high] = [Math.ceil((end - begin + 1) / columns) + 1, Math.ceil(rows / gathered)];
     if (this.image.width !== wide || this.image.height !== high) {
       this.image = new ImageData(wide, high);
       this.pixels = new Uint32Array(this.image.data.buffer);
@@ -55,7 +55,6 @@ export class Raster {
     const values = what === "spikes" ? timeline.spikes : timeline.raster;
     this.pixels.fill(this.words[0]);
     // Groups begin at whole multiples of their width, so that what is seen moves and does not flicker.
-    const begin = end - SPAN + 1;
     const group = Math.floor(begin / columns);
     const seen = new Uint8Array(high);
     for (let i = 0; i < wide; i++) {
@@ -76,7 +75,7 @@ export class Raster {
     if (this.unscaled.width !== wide || this.unscaled.height !== high) [this.unscaled.width, this.unscaled.height] = [wide, high];
     ground(this.unscaled).putImageData(this.image, 0, 0);
     this.context.imageSmoothingEnabled = false;
-    const scale = this.canvas.width / SPAN;
-    this.context.drawImage(this.unscaled, -(begin - group * columns) * scale, 0, wide * columns * scale, this.canvas.height);
+    const scale = (this.canvas.width * column_us) / span_us;
+    this.context.drawImage(this.unscaled, (group * columns - window[0] / column_us) * scale, 0, wide * columns * scale, this.canvas.height);
   }
 }

@@ -1,12 +1,15 @@
 // Recording: names with an index, countdown with tones, length, advance, label of the trial.
 
 import { make, part, write } from "./dom.js";
-import { size } from "./words.js";
+import { counted, size } from "./words.js";
 import { Tones } from "./tones.js";
 
 /** @typedef {import("./protocol.js").Recorder} RecorderMessage */
 /** @typedef {import("./protocol.js").Recordings} Recordings */
 /** @typedef {import("./server.js").Server} Server */
+
+/** @param {number | null} labels @returns {string[]} */
+const labelled = (labels) => (labels ? [counted(labels, "label")] : []);
 
 /** The tab of recordings, and the button at the foot of the page. */
 export class Recorder {
@@ -152,12 +155,12 @@ export class Recorder {
     if (length_s && seconds !== null) bar.value = Math.min(1, seconds / length_s);
   }
 
-  /** @param {Recordings} message @param {string | null} open */
-  list(message, open) {
+  /** @param {Recordings} message @param {string | null} open @param {(file: string) => number | null} count labels that the page knows */
+  list(message, open, count) {
     const select = part("files", HTMLSelectElement);
     const files = [...message.files].sort((a, b) => b.modified_ns - a.modified_ns);
     const option = (/** @type {typeof files[0]} */ { name, bytes, labels }) =>
-      make("option", { value: name }, `${name} (${size(bytes)}${labels ? `, ${labels} labelled` : ""})`);
+      make("option", { value: name }, `${name} (${[size(bytes), ...labelled(count(name) ?? labels)].join(", ")})`);
     const first = make("option", { value: "" }, files.length ? "Open a recording…" : "No recordings yet");
     select.replaceChildren(first, ...files.map(option));
     select.value = open ?? "";

@@ -10,6 +10,7 @@ const DEFAULTS = {
   flipX: false,
   flipY: false,
   raster: "changes",
+  maps: "both",
   showRaster: true,
   showTaxel: true,
   showForce: true,

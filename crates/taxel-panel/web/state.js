@@ -1,11 +1,34 @@
-// The header's first words: what is shown, and which board or recording it is.
+// The header's first words: what is shown, and which board or recording it is; and whether anything arrives.
 
 import { part, write } from "./dom.js";
+import { seconds, short } from "./words.js";
 
+/** @typedef {import("./protocol.js").Counters} Counters */
 /** @typedef {import("./protocol.js").Hello} Hello */
 /** @typedef {import("./protocol.js").Opened} Opened */
 /** @typedef {import("./protocol.js").Recorder} Recorder */
 /** @typedef {import("./protocol.js").Transport} Transport */
+
+/** How long a board may take to send its first datagram, s. */
+const FIRST_WITHIN_S = 1;
+
+/**
+ * Whether anything arrives from the live source, in words.
+ * @param {Counters | null} counters
+ * @param {string} place where it should arrive
+ * @returns {{ word: string, text: string } | null} null: it does
+ */
+function silence(counters, place) {
+  if (!counters) return null;
+  const { arrival, board_us, seconds: listening, taring } = counters;
+  const since = `since ${seconds(board_us)} of the board, for ${short(1e6 * arrival.silent_s)}`;
+  if (arrival.state === "nothing") {
+    return listening < FIRST_WITHIN_S ? null : { word: "Nothing arrives", text: `Nothing has arrived at ${place} so far. Is the board on, and does it send to this address and port?` };
+  }
+  if (arrival.state === "lost") return { word: "Lost", text: `The board is lost: nothing ${since}, though it sent a heartbeat every ${short(arrival.heartbeat_us ?? 0)} or sooner.` };
+  if (taring) return { word: "Tare", text: "Taking a tare: leave the sensor at rest." };
+  return arrival.state === "quiet" ? { word: "Quiet", text: `Quiet: nothing ${since}.` } : null;
+}
 
 /**
  * Writes them.
@@ -14,20 +37,27 @@ import { part, write } from "./dom.js";
  * @param {Hello | null} hello
  * @param {Opened | null} opened
  * @param {Recorder | null} recorder
+ * @param {Counters | null} counters
  */
-export function showState({ connected, why }, { source, state }, hello, opened, recorder) {
+export function showState({ connected, why }, { source, state }, hello, opened, recorder, counters) {
   const recording = recorder?.state === "recording" ? recorder : null;
+  const silent = connected && source === null && hello?.live ? silence(counters, hello.udp ? `UDP ${hello.udp}` : "the bridge's address") : null;
   const [kind, word] = !connected
     ? ["lost", why ? "No connection" : "Connecting"]
     : source !== null || !hello?.live
       ? ["replay", source === null ? "No recording" : "Replay"]
-      : state === "following"
-        ? ["live", "Live"]
-        : ["held", state === "playing" ? "Earlier" : "Held"];
-  part("zero", HTMLButtonElement).hidden = kind !== "live";
+      : state !== "following"
+        ? ["held", state === "playing" ? "Earlier" : "Held"]
+        : silent
+          ? ["quiet", silent.word]
+          : ["live", "Live"];
+  part("zero", HTMLButtonElement).hidden = source !== null || !hello?.live || state !== "following";
   const pill = part("state", HTMLElement);
   pill.dataset.kind = recording && kind !== "lost" ? "rec" : kind;
   write(part("state-word", HTMLElement), recording && kind !== "lost" ? `${word === "Live" ? "" : `${word}, `}Recording ${recording.file ?? ""}` : word);
+  const banner = part("silence", HTMLElement);
+  banner.hidden = !silent;
+  write(banner, silent?.text ?? "");
   const array = opened?.array ?? hello?.array;
   const shape = array ? `${array.rows} × ${array.columns}` : "";
   const place = !connected ? why : source !== null ? `${source} · ${opened?.verdict ?? ""}` : hello?.live ? `${hello.udp ?? ""}` : "Open a recording below";

@@ -1,4 +1,4 @@
-// The whole recording, or the past of the live source as far as it can be viewed: event rate and marks; click or drag to move there.
+// The whole recording, or the past of the live source as far as it can be viewed: force and marks; click or drag to move there.
 
 import { fitted, ground, part, themed } from "./dom.js";
 import { seconds } from "./words.js";
@@ -73,10 +73,10 @@ export class Strip {
     if (!reach || reach[1] <= reach[0]) return;
     const x = (/** @type {number} */ t) => ((t - reach[0]) / (reach[1] - reach[0])) * width;
     const timeline = this.timeline();
-    if (timeline && timeline.end_us !== null) {
+    if (timeline?.window) {
       context.fillStyle = themed("shade");
-      const left = Math.max(0, x(timeline.end_us - timeline.span_us));
-      context.fillRect(left, 0, Math.min(width, x(timeline.end_us)) - left, height);
+      const [left, right] = timeline.window.map((t) => Math.max(0, Math.min(width, x(t))));
+      context.fillRect(left, 0, right - left, height);
     }
     const { labels, detections, notes, cut } = this.marks();
     const [begin, end] = cut;
@@ -86,13 +86,15 @@ export class Strip {
       context.fillRect(left, 0, right - left, height);
     }
     if (overview) {
-      const most = overview.events.reduce((a, b) => Math.max(a, b), 1);
+      // The force, whose scale is that of touches; of a board without intensities, the number of events.
+      const heights = overview.force.some((sum) => sum > 0) ? overview.force : overview.events;
+      const most = heights.reduce((a, b) => Math.max(a, b), 1);
       context.fillStyle = themed("rate");
       const wide = Math.max(1, (overview.step_us / (reach[1] - reach[0])) * width);
-      overview.events.forEach((events, i) => {
-        if (!events) return;
-        // The root of the share: an impact has thousands of times the events of a hand at rest.
-        const high = Math.max(1, Math.sqrt(events / most) * (height - 10));
+      heights.forEach((value, i) => {
+        if (!value) return;
+        // The root of the share: an impact has thousands of times the force of a finger.
+        const high = Math.max(1, Math.sqrt(value / most) * (height - 10));
         context.fillRect(x(overview.start_us + i * overview.step_us), height - high, wide, high);
       });
     }

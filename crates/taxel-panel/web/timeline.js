@@ -1,11 +1,15 @@
-// What the lanes show, by columns of time, and the one time cursor that every view shares.
+// What the lanes show, by columns of time; the window of time that is shown, and the one time cursor that every view shares.
 
 import { UNKNOWN_VALUE } from "./protocol.js";
+import { seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
+/** @typedef {{ share: number, text: string }} Tick */
 
-/** Columns that are stored and shown. */
+/** Columns that are stored; the window shows one less at most, as it need not begin where a column does. */
 export const SPAN = 1250;
+/** Steps between the numbers of the axis, of each power of ten. */
+const STEPS = [1, 2, 5];
 
 /** What each column of time holds, in a ring by its number; the window that is shown, and the times in it. */
 export class Timeline {
@@ -24,19 +28,17 @@ export class Timeline {
     this.y = new Float32Array(SPAN);
     this.history = new Uint16Array(SPAN * 3);
     this.number = new Float64Array(SPAN);
-    /** Number of the last column shown. @type {number | null} */
-    this.end = null;
+    /** The window, us from its left edge to its right one; null before the first picture. @type {[number, number] | null} */
+    this.window = null;
+    /** Length of the window, us. */
+    this.span_us = (SPAN - 1) * column_us;
+    /** Whether the window ends at the newest. */
+    this.following = false;
     /** Time of the picture. @type {number | null} */
     this.t_us = null;
     /** Where a person points. @type {number | null} */
     this.cursor_us = null;
-    this.clear();
-  }
-
-  /** Forgets every column. */
-  clear() {
     this.number.fill(NaN);
-    this.end = this.t_us = this.cursor_us = null;
   }
 
   /** @param {number} number @returns {number} its place in the ring */
@@ -50,27 +52,28 @@ export class Timeline {
     return this.number[place] === number ? place : -1;
   }
 
+  /** @param {[number, number]} window us */
+  show(window) {
+    this.window = window;
+    this.span_us = window[1] - window[0];
+  }
+
   /**
-   * Stores the columns of a picture. A time within the window leaves the window where it is, so that the view can move back and
-   * forth in it; any other moves it.
+   * Stores the columns of a picture. The window moves only while it follows the newest.
    * @param {Picture} picture
-   * @param {boolean} anew discard earlier columns
-   * @param {boolean} ends the window ends at it, wherever that lay
    */
-  put(picture, anew, ends) {
-    if (anew || picture.column_us !== this.column_us) {
-      // Where a person points stays the same time.
-      const cursor_us = this.cursor_us;
-      this.clear();
-      if (!anew) this.cursor_us = cursor_us;
-    }
+  put(picture) {
+    if (picture.restart || picture.column_us !== this.column_us) this.number.fill(NaN);
     this.column_us = picture.column_us;
     this.t_us = picture.t_us;
+    this.following = picture.following;
     if (picture.t_us === null) return;
-    const now = Math.floor(picture.t_us / this.column_us);
-    if (this.end === null || ends || picture.following || now > this.end || now <= this.end - SPAN) this.end = now;
+    if (picture.following || !this.window) {
+      const end = (Math.floor(picture.t_us / this.column_us) + 1) * this.column_us;
+      this.window = [end - this.span_us, end];
+    }
     const { first, count, raster, spikes, sums, centres, history } = picture;
-    for (let i = Math.max(0, this.end - SPAN + 1 - first); i < count && first + i <= this.end; i++) {
+    for (let i = 0; i < count; i++) {
       const place = this.place(first + i);
       this.number[place] = first + i;
       if (raster) this.raster.set(raster.subarray(i * this.rows, (i + 1) * this.rows), place * this.rows);
@@ -92,33 +95,47 @@ export class Timeline {
     this.history.fill(UNKNOWN_VALUE);
   }
 
-  /** @returns {number | null} us at the right edge of the window */
-  get end_us() {
-    return this.end === null ? null : (this.end + 1) * this.column_us;
-  }
-
-  /** @returns {number} us from edge to edge */
-  get span_us() {
-    return SPAN * this.column_us;
+  /** @returns {[number, number] | null} the numbers of the first and the last column in the window */
+  get columns() {
+    return this.window && [Math.floor(this.window[0] / this.column_us), Math.ceil(this.window[1] / this.column_us) - 1];
   }
 
   /** @param {number} t_us @returns {number | null} 0 at the left edge to 1 at the right; null outside */
   share(t_us) {
-    const { end_us } = this;
-    if (end_us === null) return null;
-    const share = 1 - (end_us - t_us) / this.span_us;
+    if (!this.window) return null;
+    const share = (t_us - this.window[0]) / this.span_us;
     return share >= 0 && share <= 1 ? share : null;
   }
 
   /** @param {number} share @returns {number | null} the time there */
   time(share) {
-    const { end_us } = this;
-    return end_us === null ? null : Math.round(end_us - (1 - share) * this.span_us);
+    return this.window && Math.round(this.window[0] + share * this.span_us);
   }
 
   /** @returns {number} the place of the column that the cursor points at, or of the picture; -1: not known */
   get pointed() {
     const t = this.cursor_us ?? this.t_us;
     return t === null ? -1 : this.known(Math.floor(t / this.column_us));
+  }
+
+  /**
+   * Where the axis has numbers: on the source's own time; behind the newest where the window follows it.
+   * @param {number} most about so many of them
+   * @returns {Tick[]}
+   */
+  ticks(most) {
+    if (!this.window) return [];
+    const [from, to] = this.window;
+    const zero = this.following ? to : 0;
+    const least = this.span_us / Math.max(2, most);
+    const power = 10 ** Math.floor(Math.log10(least));
+    const step = Math.max(1, (STEPS.find((times) => times * power >= least) ?? 10) * power);
+    const places = Math.max(0, 6 - Math.floor(Math.log10(step) + 1e-9));
+    const ticks = [];
+    for (let k = Math.ceil((from - zero) / step); k * step + zero <= to; k++) {
+      const behind = -k * step;
+      ticks.push({ share: (k * step + zero - from) / this.span_us, text: this.following ? (behind ? `−${short(behind)}` : "now") : seconds(k * step, places) });
+    }
+    return ticks;
   }
 }

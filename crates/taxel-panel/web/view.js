@@ -30,7 +30,7 @@ export class View {
     /** What is shown: a recording or, null, the live board. @type {string | null} */
     this.source = null;
     part("colour-map", HTMLSelectElement).append(...MAPS.map((name) => make("option", { value: name }, name)));
-    for (const [id, name] of /** @type {const} */ ([["colour-map", "map"], ["theme", "theme"], ["raster-what", "raster"]])) {
+    for (const [id, name] of /** @type {const} */ ([["colour-map", "map"], ["theme", "theme"], ["raster-what", "raster"], ["map-choice", "maps"]])) {
       const select = part(id, HTMLSelectElement);
       select.value = settings.values[name];
       select.onchange = () => settings.set(name, select.value);
@@ -55,6 +55,7 @@ export class View {
     settings.watch(() => {
       part("theme", HTMLSelectElement).value = settings.values.theme;
       part("raster-what", HTMLSelectElement).value = settings.values.raster;
+      part("map-choice", HTMLSelectElement).value = settings.values.maps;
     });
     this.encoder = part("encoder", HTMLSelectElement);
     this.encoder.onchange = () => this.encode();

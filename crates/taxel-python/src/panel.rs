@@ -113,6 +113,22 @@ impl RequestHandler for PythonHandler {
         self.call(|handler| handler.call_method1("cut", (path, trial, out, start_us, stop_us))?.extract())
     }
 
+    fn train(&self, recording: &Path, out: &Path) -> Reply<String> {
+        self.call(|handler| handler.call_method1("train", (recording, out))?.extract())
+    }
+
+    fn end_training(&self) -> Reply<()> {
+        self.call(|handler| handler.call_method0("end_training").map(drop))
+    }
+
+    fn detect(&self, recording: &Path, readout: &Path) -> Reply<Vec<(String, i64, i64)>> {
+        self.call(|handler| handler.call_method1("detect", (recording, readout))?.extract())
+    }
+
+    fn read_out(&self, readout: &Path) -> Reply<()> {
+        self.call(|handler| handler.call_method1("read_out", (readout,)).map(drop))
+    }
+
     fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>> {
         let rows: Vec<(String, i64, String)> =
             self.call(|handler| handler.call_method1("read_labels", (table, recording))?.extract())?;
@@ -219,13 +235,15 @@ impl Panel {
         folder: PathBuf,
         opened: Option<String>,
         control: Option<String>,
+        registers_stated: bool,
         readout: Option<Vec<String>>,
         live: Option<&Live>,
         requests: Py<PyAny>,
     ) -> PyResult<Self> {
         let handle = live.map(|live| live.handle(py)).transpose()?;
         let server = enter(py, |_| {
-            let options = PanelOptions { address: of_host(host, port)?, folder, open: opened, control, readout };
+            let address = of_host(host, port)?;
+            let options = PanelOptions { address, folder, open: opened, control, registers_stated, readout };
             Server::start(options, handle, Box::new(PythonHandler(requests)))
         })?;
         Ok(Self(Threaded::new("panel", "panel: has been stopped; begin a new one", server)))
@@ -253,9 +271,17 @@ impl Panel {
     }
 
     /// Shows another live source from now on.
-    fn attach(&self, py: Python<'_>, live: &Live) -> PyResult<()> {
+    fn attach(&self, py: Python<'_>, live: &Live, readout: Option<Vec<String>>) -> PyResult<()> {
         let handle = live.handle(py)?;
-        self.0.with(py, |server| server.attach(handle))
+        self.0.with(py, |server| server.attach(handle, readout))
+    }
+
+    /// Notes that the handler has connected the board's serial line, or disconnected it.
+    fn connected(&self, py: Python<'_>, control: Option<String>) -> PyResult<()> {
+        self.0.with(py, |server| {
+            server.connected(control);
+            Ok(())
+        })
     }
 
     /// Ends the server; does nothing once it has ended.

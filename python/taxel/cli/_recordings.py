@@ -280,15 +280,8 @@ def open_all(paths: Sequence[Path], array: str | None = None, rate_hz: float | N
 
     Each sensor of a file with several is a recording of its own (`Recording.title`).
     """
-    from taxel.recording.opening import open_any  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.opening import open_any, sensors  # noqa: PLC0415  the command line starts quickly
 
     opened = (open_any(path, array=None if array is None else geometry(array)) for path in paths)
     every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
     return [timed(of_array(one, array), rate_hz) for each in every for one in sensors(each)]
-
-
-def sensors(recording: Recording) -> list[Recording]:
-    """Return each sensor of a file with several as a recording; any other recording itself."""
-    if not recording._contents.is_several:
-        return [recording]
-    return [one for one in recording.sources.values() if not one.is_stream]

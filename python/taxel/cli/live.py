@@ -18,6 +18,7 @@ from rich.text import Text
 from taxel._base.files import try_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
+from taxel.array import Array
 from taxel.cli._app import SecondsOption, app, with_typed
 from taxel.cli._array import geometry
 from taxel.cli._board import (
@@ -51,6 +52,7 @@ from taxel.live import Live, Panel, Summary, Viewer, delays
 from taxel.live.options import LiveOptions
 from taxel.spikes import to_ms
 from taxel.tare import Tare
+from taxel.wire import Registers
 
 __all__ = ["live"]
 
@@ -70,6 +72,17 @@ class _Typed:
         ),
     ] = None
     preset: PresetOption = None
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            help="Frames a second of a sensor of your own, whose events taxel.live.Source sends, with --bits: the "
+            "registers are those that it makes.",
+        ),
+    ] = None
+    bits: Annotated[
+        int | None, typer.Option(min=1, max=16, help="With --rate-hz: bits of the sensor's values, as of the Source.")
+    ] = None
     differences: DifferencesOption = LiveOptions.differences
     address: FromOption = None
     congestion: CongestionOption = None
@@ -127,6 +140,7 @@ def live(typed: _Typed) -> None:
     """
     spikes = spikes_of(typed.to, typed.encoder, typed.values)
     _together(typed)
+    registers = _registers(typed)
     trained = None if typed.readout is None else load(typed.readout)
     rest = rest_of(typed.tare)
     _fresh(typed, rest)
@@ -145,7 +159,7 @@ def live(typed: _Typed) -> None:
             host=typed.host,
             remote=board,
             array=None if typed.array is None else geometry(typed.array),
-            registers=typed.preset,
+            registers=registers,
             differences=typed.differences,
             readout=trained,
             tare=rest,
@@ -154,6 +168,13 @@ def live(typed: _Typed) -> None:
             lines=typed.as_json,
             send=typed.send or (),
         ) as pipeline:
+            if trained is not None and registers is None and board is None:
+                assumed = pipeline._options.registers
+                console.print(
+                    f"the readout assumes frames of {assumed.frame_us:g} us, as of a board at reset; state others by "
+                    "--preset, or by --rate-hz and --bits",
+                    soft_wrap=True,
+                )
             if spikes is not None and isinstance(rest, Tare):
                 spikes = spikes.with_tare(rest)
             last, external = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
@@ -193,20 +214,18 @@ def _shown(
     """Show the board in terminal, panel and viewers until the end; return the last receiver, and the viewers."""
     shows: Panel | None = None
     external: list[Viewer] = []
+    # A serial line has one user at a time: first the tare, then the panel.
+    later = typed.control if fresh and typed.panel else None
     # A reader of the lines that ends (BrokenPipeError) ends the command as Ctrl-C does.
     with contextlib.ExitStack() as shown, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
         if typed.panel:
-            if fresh:
-                # A serial line has one user at a time: first the tare, then the panel.
-                _tared(pipeline, at_rest, console)
+            control = None if later is not None else typed.control
             shows = shown.enter_context(
-                Panel(
-                    pipeline, control=typed.control, folder=typed.folder, host=typed.panel_host, port=typed.panel_port
-                )
+                Panel(pipeline, control=control, folder=typed.folder, host=typed.panel_host, port=typed.panel_port)
             )
             announce(shows, typed.opens, console)
         external = viewers(shown, pipeline if shows is None else shows, typed.to or (), spikes)
-        _watch(pipeline, shows, external, typed.seconds, console, at_rest, fresh=fresh and not typed.panel)
+        _watch(pipeline, shows, external, typed.seconds, console, at_rest, fresh=fresh, control=later)
     return pipeline if shows is None or shows.live is None else shows.live, external
 
 
@@ -274,14 +293,19 @@ def _fresh(typed: _Typed, rest: Tare | float | None) -> None:
         raise ProblemError("--control without a fresh tare: give --tare SECONDS, or --panel")
 
 
-def _tared(pipeline: Live, at_rest: contextlib.ExitStack, console: Console) -> None:
-    """Wait for the tare: a serial line has one user at a time, so the panel gets it afterwards."""
-    console.print("taking a tare: leave the sensor at rest")
-    while pipeline.counters["taring"] and not pipeline._core.is_over():
-        pipeline.next(REDRAW_S)
-    at_rest.close()
-    if pipeline.tare is not None:
-        _warn_of_unknown(pipeline.tare)
+def _registers(typed: _Typed) -> str | Registers | None:
+    """Return the registers that the options state; None if they state none."""
+    if typed.rate_hz is None and typed.bits is None:
+        return typed.preset
+    if typed.rate_hz is None or typed.bits is None:
+        raise ProblemError("--rate-hz and --bits belong together: both are those of the taxel.live.Source that sends")
+    if typed.preset is not None or typed.address is not None:
+        other = "--preset" if typed.preset is not None else "--from"
+        raise ProblemError(f"--rate-hz and {other}: both state the board's registers; give one of them")
+    array = geometry(typed.array) if typed.array is not None else None
+    if array is None and typed.readout is not None:
+        array = load(typed.readout).array
+    return Registers._of_source(Array._of(array), typed.rate_hz, typed.bits)[0]
 
 
 def _warn_of_unknown(tare: Tare) -> None:
@@ -305,8 +329,12 @@ def _watch(
     at_rest: contextlib.ExitStack,
     *,
     fresh: bool,
+    control: str | None,
 ) -> None:
-    """Show rates and detections until the time is over; with a `fresh` tare, close `at_rest` when it is complete."""
+    """Show rates and detections until the time is over.
+
+    When a `fresh` tare is complete, `at_rest` is closed, and the panel gets the serial line, if `control` names it.
+    """
     # If both go to one terminal, detections are printed above the display; else they go to standard output.
     above = console.is_terminal and sys.stdout.isatty()
     echo: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else typer.echo
@@ -333,6 +361,9 @@ def _watch(
                 continue
             if not now["taring"]:
                 at_rest.close()
+                if panel is not None and control is not None:
+                    panel._connect(control)
+                    control = None
                 if fresh and pipeline.tare is not None:
                     fresh = False
                     _warn_of_unknown(pipeline.tare)

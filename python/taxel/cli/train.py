@@ -165,7 +165,12 @@ def _examples(
 
     needs_rest = tare is None and getattr(plan.encoder, "tare", True) is None
     return [
-        Example(one, events, tare_before(events, one) if needs_rest else tare_of(tare, one))
+        Example(
+            one,
+            events,
+            tare_before(events, one) if needs_rest else tare_of(tare, one),
+            one.title.removesuffix(one.label),
+        )
         for one, events in zip(opened, labelled, strict=True)
     ]
 

@@ -8,6 +8,8 @@ import json
 import os
 import socket
 import struct
+import subprocess
+import sys
 import threading
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,18 +21,32 @@ from numpy.typing import NDArray
 from taxel._base.files import whole_file
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.detect import load, run
 from taxel.device import Cable
 from taxel.labels import Labels, write_labels
 from taxel.live._shown_files import ReadPictures, ShownFiles
+from taxel.recorded import recorded
+from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.health import TaxelStatistics, judged
+from taxel.recording.opening import sensors
+from taxel.tare import Tare
 from taxel.wire import Command
 
 __all__ = ["RequestHandler", "own_addresses", "presets_path"]
 
 #: SIOCGIFADDR of Linux (netdevice(7)).
 _ADDRESS_OF = 0x8915
+
+#: Code with which a command ends after Ctrl-C.
+_INTERRUPTED = 130
+
+#: A label that a person set may be late: the rest before it ends so much earlier, and lasts so long at least, us.
+_BEFORE_US, _LEAST_REST_US = 20_000, 10_000
+
+#: Rest at the beginning of a recording without labels, us.
+_REST_US = 50_000
 
 #: Taxels as (column, row).
 _Taxels = list[tuple[int, int]]
@@ -66,6 +82,16 @@ def _reasons() -> Iterator[None]:
         raise ProblemError(f"{where}{error.strerror or error}") from None
 
 
+def _rest(recording: Recording) -> Tare:
+    """Return the rest of a recording's taxels: before its first label and the start marker, or at its beginning."""
+    source = recorded(recording)
+    first = int(source.t[0]) if len(source) else 0
+    ends = [note.t - _BEFORE_US for note in recording.notes if note.t is not None]
+    ends += [t for t, start in getattr(source, "markers", ()) if start]
+    stop = min((t for t in ends if t - first >= _LEAST_REST_US), default=first + _REST_US)
+    return Tare.take(source, stop_us=stop, note=str(recording.path))
+
+
 class RequestHandler:
     """Handle the requests of a panel's server, which calls from several threads at a time.
 
@@ -77,19 +103,28 @@ class RequestHandler:
         Receives the board's datagrams on another address.
     delta_intensity : function of a bool
         Interprets intensities as differences, or as values.
+    read_out : function of a path
+        Reads the board out with another readout.
     cable : Cable or None
         The board's serial line. The handler closes it.
     """
 
     def __init__(
-        self, listen: Callable[[str, int], None], delta_intensity: Callable[[bool], None], cable: Cable | None
+        self,
+        listen: Callable[[str, int], None],
+        delta_intensity: Callable[[bool], None],
+        read_out: Callable[[Path], None],
+        cable: Cable | None,
     ) -> None:
-        self._listen, self._delta_intensity, self._cable = listen, delta_intensity, cable
+        self._listen, self._delta_intensity, self._read_out, self._cable = listen, delta_intensity, read_out, cable
+        self._training: subprocess.Popen[str] | None = None
+        self._training_lock = threading.Lock()
         self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
         self._files = ShownFiles()
 
     def close(self) -> None:
-        """Close the serial line, and remove temporary files."""
+        """Close the serial line, end a training that runs, and remove temporary files."""
+        self.end_training()
         self._files.close()
         self._disconnect()
 
@@ -197,6 +232,51 @@ class RequestHandler:
             recording, _ = self._files.opened(path, trial)
             (part,) = cut(recording, start_us=start_us, stop_us=stop_us)
             return list(convert(part, out))
+
+    def train(self, recording: Path, out: Path) -> str:
+        """Train a readout on the labels of a recording, as ``taxel train`` does; return what it prints."""
+        command = [sys.executable, "-m", "taxel", "train", str(recording), "--labels", "notes", "-o", str(out)]
+        with self._training_lock:
+            if self._training is not None:
+                raise ProblemError("a training runs already: stop it first, or wait for its end")
+            # A process of its own, so that it takes no time from what arrives.
+            self._training = subprocess.Popen(
+                [*command, "--overwrite"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
+        try:
+            printed, errors = self._training.communicate()
+            code = self._training.returncode
+        finally:
+            self._training = None
+        if code < 0 or code == _INTERRUPTED:
+            raise ProblemError("the training was stopped: nothing was written")
+        if code:
+            lines = [line for line in errors.splitlines() if line.strip()]
+            raise ProblemError(lines[-1].removeprefix("taxel: ") if lines else f"the training ended with code {code}")
+        return printed.strip()
+
+    def end_training(self) -> None:
+        """End the training that runs, if one does."""
+        training = self._training
+        if training is not None:
+            training.terminate()
+
+    def detect(self, recording: Path, readout: Path) -> list[tuple[str, int, int]]:
+        """Return the detections of a readout in a recording: label, time and when it was known, us."""
+        with _reasons():
+            loaded = load(readout)
+            opened, _ = self._files.opened(recording, None)
+            found = []
+            for one in sensors(opened):
+                registers = one.registers
+                frame_us = None if registers is None else registers.frame_us
+                found += run(loaded, one, frame_us=frame_us, tare=_rest(one))
+        return sorted(((one.label, one.t, one.known) for one in found), key=lambda one: one[2])
+
+    def read_out(self, readout: Path) -> None:
+        """Read the board out with another readout."""
+        with _reasons():
+            self._read_out(readout)
 
     def read_labels(self, table: Path, recording: str) -> list[tuple[str, int, str]]:
         """Return the labels of a recording, each with its time (us) and its source, from a table."""

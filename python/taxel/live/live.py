@@ -132,6 +132,8 @@ class Live:
 
     @with_fields_of(LiveOptions)
     def __init__(self, options: LiveOptions) -> None:
+        #: Whether somebody stated the registers; the panel shows no frame rate that is only assumed.
+        self._registers_stated = options.registers is not None or options.remote is not None
         options = options.completed()
         remote, readout, tare, say = options.remote, options.readout, options.tare, options.say
         self.array = Array._of(options.array)
@@ -229,7 +231,9 @@ class Live:
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
         `taxel.wire.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
-        `wire_late` (events of version 2 that arrived after time had passed theirs), `bridged` (None, or of a board
+        `wire_late` (events of version 2 that arrived after time had passed theirs), `arrived_ns` (when the latest
+        datagram arrived, ns since 1970, or None), `heartbeat_us` (the longest interval between heartbeats of a board of
+        version 2, or None), `bridged` (None, or of a board
         of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
         ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
         `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those output in a

@@ -11,10 +11,13 @@ from taxel import _core
 from taxel._base.arguments import flag, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
+from taxel.detect import load
 from taxel.device import Cable
+from taxel.frames import Frames
 from taxel.live._requests import RequestHandler
 from taxel.live.live import Live
 from taxel.recording.opening import check_recording, recordings_in
+from taxel.tare import Tare
 
 __all__ = ["Panel"]
 
@@ -73,8 +76,9 @@ class Panel:
                 raise ProblemError("folder: is the recording's own")
             folder, opened = _shown(place)
         cable = None if control is None else Cable(text("control", control))
-        self._requests = RequestHandler(self.listen, self.delta_intensity, cable)
+        self._requests = RequestHandler(self.listen, self.delta_intensity, self.read_out, cable)
         readout = None if self._live is None else self._live._labels
+        stated = self._live is not None and self._live._registers_stated
         try:
             self._core = _core.Panel(
                 text("host", host),
@@ -82,6 +86,7 @@ class Panel:
                 Path.cwd() if folder is None else Path(checked_path("folder", folder)),
                 opened,
                 control,
+                stated,
                 readout,
                 None if self._live is None else self._live._core,
                 self._requests,
@@ -136,9 +141,7 @@ class Panel:
         """
         with self._restarting:
             before = self._restartable("listen")
-            after = before._again(port, host)
-            self._core.attach(after._core)
-            self._live = after
+            self._attach(before._again(port, host))
             before.stop()
 
     def delta_intensity(self, on: bool) -> None:
@@ -163,9 +166,50 @@ class Panel:
                 return
             host, port = before.address
             before.stop()
-            after = before._again(port, host, differences=on)
-            self._core.attach(after._core)
-            self._live = after
+            self._attach(before._again(port, host, differences=on))
+
+    def read_out(self, readout: str | os.PathLike[str]) -> None:
+        """Read the board out with another readout from now on: time, picture and past restart, on the same address.
+
+        A readout that needs a tare uses that of the board, if there is one; else the values that the taxels hold now
+        are their rest, so the sensor must be unloaded.
+
+        Parameters
+        ----------
+        readout : path
+            A file of a readout or of a plain rule.
+
+        Raises
+        ------
+        ProblemError : as `listen`; the readout does not fit the board
+        FormatError : the file holds no readout
+        OSError : there is no such file; another program has opened the port in the meantime
+        """
+        with self._restarting:
+            before = self._restartable("read_out")
+            loaded = load(checked_path("readout", readout))
+            host, port = before.address
+            tare = before.tare or (before._options.tare if before._options.readout is not None else None)
+            if tare is None:
+                tare = _held(before)
+            before.stop()
+            try:
+                after = before._again(port, host, readout=loaded, tare=tare)
+            except Exception:
+                # The board stays in sight, whatever the readout lacks.
+                self._attach(before._again(port, host))
+                raise
+            self._attach(after)
+
+    def _attach(self, live: Live) -> None:
+        """Show another `Live` from now on."""
+        self._core.attach(live._core, live._labels)
+        self._live = live
+
+    def _connect(self, control: str) -> None:
+        """Connect the board's serial line, which something else has used until now."""
+        self._requests.connect(control)
+        self._core.connected(control)
 
     def _restartable(self, what: str) -> Live:
         if self._live is None:
@@ -214,3 +258,11 @@ def _shown(place: Path) -> tuple[Path, str]:
         raise FileNotFoundError(2, "no such recording", str(place))
     check_recording(place)
     return place.resolve().parent, place.resolve().name
+
+
+def _held(live: Live) -> Tare:
+    """Return the values that the taxels of a board hold now as their rest."""
+    held = live.picture.astype(float)
+    if not held.any():
+        raise ProblemError("read_out: no value has arrived yet that could be the taxels' rest; wait for the board")
+    return Tare.take(Frames([held, held], [0, 1], unit="ticks", array=live.array), note="held when the readout began")

@@ -108,10 +108,10 @@ def convert(
                 write_h5(part, written)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                several = {name: _counts(one, written.sources[name]) for name, one in whole.sources.items()}
-                counts = several if written.is_several else _counts(whole, written)
-                alone = not written.is_several and not written.has_events and written.samples is None
-                write_mcap(part, written, compression, {written.label: counts} if alone else counts)
+                sources = {written.label: (whole, written)}
+                if written.is_several:
+                    sources = {name: (whole.sources[name], one) for name, one in written.sources.items()}
+                write_mcap(part, written, compression, {name: _counts(*both) for name, both in sources.items()})
                 lost += _read_otherwise(part, whole)
     return lost
 

@@ -26,7 +26,7 @@ from taxel.recording.read_mcap import read_mcap
 from taxel.recording.recording import Recording
 from taxel.recording.sidecars import with_sidecars
 
-__all__ = ["check_recording", "joined", "open_any", "open_joined", "open_recording", "recordings_in"]
+__all__ = ["check_recording", "joined", "open_any", "open_joined", "open_recording", "recordings_in", "sensors"]
 
 #: The sources of a trial of both feet.
 FEET = ("left", "right")
@@ -236,18 +236,28 @@ def joined(opened: Sequence[Recording]) -> list[Recording]:
     list of Recording
         In their order; all others unchanged.
     """
-    groups: dict[tuple[Path, str], dict[str, Contents]] = {}
+    groups: dict[tuple[str, str], dict[str, Contents]] = {}
     for recording in opened:
         own = recording._contents
-        groups.setdefault((own.path, own.name.removesuffix(f" {own.label}")), {})[own.label or own.name] = own
+        # In a folder the path of a trial ends with its name, and so with its foot.
+        key = (str(own.path).removesuffix(f" {own.label}"), own.name.removesuffix(f" {own.label}"))
+        groups.setdefault(key, {})[own.label or own.name] = own
     together: list[Recording] = []
-    for sources in groups.values():
+    for (path, _), sources in groups.items():
         if set(sources) == set(FEET):
-            sources.update({foot: sources[foot].but(sources=sources) for foot in FEET})
-            together.append(Recording(several({foot: sources[foot] for foot in FEET})))
+            both: dict[str, Contents] = {}
+            both.update({foot: sources[foot].but(path=Path(path), sources=both) for foot in FEET})
+            together.append(Recording(several(both)))
         else:
             together += [Recording(one) for one in sources.values()]
     return together
+
+
+def sensors(recording: Recording) -> list[Recording]:
+    """Return each sensor of a file with several as a recording; any other recording itself."""
+    if not recording._contents.is_several:
+        return [recording]
+    return [one for one in recording.sources.values() if not one.is_stream]
 
 
 def open_joined(path: str | os.PathLike[str], **how: Any) -> list[Recording]:

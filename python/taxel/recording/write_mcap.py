@@ -23,7 +23,7 @@ __all__ = ["cut_raw", "encoded", "write_mcap"]
 _BLOCK = 1 << 18
 
 
-def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[str, Any]) -> None:
+def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping[str, dict[str, Any]]) -> None:
     """Write a .mcap of contents as it can hold them (`taxel.recording.stored`).
 
     Parameters
@@ -32,8 +32,8 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
     contents : Contents
         With datagrams, or the lines of a stream.
     compression : {"none", "lz4", "zstd"}
-    counts : dict
-        The numbers of what was received and lost, under the names of the live format; of pictures by their sources.
+    counts : mapping from str to dict
+        For each source the numbers of what was received and lost, under the names of the live format.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
         header = {**samples.about, "sources": [], "lost": contents.lost}
         writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
-        writer.finish(json.dumps(counts))
+        writer.finish(json.dumps(counts[contents.label]))
         return
     datagrams, events = contents.datagrams, contents.events
     assert datagrams is not None and events is not None  # noqa: PT018  `stored` sets both
@@ -74,7 +74,7 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
     _add_remarks(writer, events, contents)
-    writer.finish(json.dumps(counts))
+    writer.finish(json.dumps(counts[contents.label]))
 
 
 def _header(contents: Contents) -> dict[str, Any]:
@@ -90,7 +90,9 @@ def _header(contents: Contents) -> dict[str, Any]:
     }
 
 
-def _write_pictures(part: Path, sources: Mapping[str, Contents], compression: str, counts: dict[str, Any]) -> None:
+def _write_pictures(
+    part: Path, sources: Mapping[str, Contents], compression: str, counts: Mapping[str, dict[str, Any]]
+) -> None:
     """Write sources of pictures, all by one clock; times in the file are those of the board, from 0 on."""
     tables = {name: one.frames for name, one in sources.items()}
     begins = [int(one.t[0]) for one in tables.values() if one is not None and len(one)]

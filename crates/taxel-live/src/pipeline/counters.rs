@@ -65,6 +65,10 @@ pub struct Counters {
     pub output_latency: Quantiles,
     /// The relation of the host's clock to the board's; from the first datagram on.
     pub offset: Option<Offset>,
+    /// When the latest datagram arrived, ns since 1970.
+    pub arrived_ns: Option<i64>,
+    /// The longest interval between two heartbeats of a board of version 2 since it began or was reset, us.
+    pub heartbeat_us: Option<i64>,
     /// The latest stamp, us.
     pub board_us: Option<i64>,
     /// Number of start and stop markers.

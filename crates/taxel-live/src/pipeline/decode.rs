@@ -19,6 +19,7 @@ const TICK: Duration = Duration::from_micros(500);
 pub(super) struct DecodeStage {
     decoder: SenderDecoder,
     promise: Promise,
+    arrivals: Arrivals,
     clock: BoardClock,
     /// Events that were decoded and not passed on yet.
     events: Events,
@@ -70,6 +71,32 @@ impl Promise {
     }
 }
 
+/// The latest arrival, and the heartbeats of a board of version 2.
+#[derive(Debug, Clone, Copy, Default)]
+struct Arrivals {
+    latest_ns: Option<i64>,
+    /// The board's time of the latest datagram, us, and missing sequence numbers up to there.
+    now: Option<i64>,
+    missing: u64,
+    /// The longest interval that a heartbeat has ended, us.
+    heartbeat_us: Option<i64>,
+}
+
+impl Arrivals {
+    /// Notes a datagram; `empty`: without events, which in version 2 is a heartbeat.
+    fn note(&mut self, info: &DatagramInfo, arrived_ns: i64, empty: bool) {
+        self.latest_ns = self.latest_ns.max(Some(arrived_ns));
+        if info.reset || info.version != 2 {
+            (self.now, self.heartbeat_us) = (None, None);
+        }
+        // A gap in the sequence is no interval that the board chose.
+        if let Some((before, now)) = self.now.zip(info.now).filter(|_| empty && info.missing == self.missing) {
+            self.heartbeat_us = self.heartbeat_us.max(Some(now - before).filter(|&interval| interval > 0));
+        }
+        (self.now, self.missing) = (info.now.filter(|_| info.version == 2), info.missing);
+    }
+}
+
 /// A decoder of either version of the wire in its initial state.
 pub(super) fn fresh_decoder(options: &LiveOptions) -> SenderDecoder {
     SenderDecoder::new(Decoder::new(options.array.clone()).differences(options.differences), 1)
@@ -80,6 +107,7 @@ impl DecodeStage {
         Self {
             decoder: fresh_decoder(options),
             promise: Promise::default(),
+            arrivals: Arrivals::default(),
             clock: BoardClock::default(),
             events: Events::empty(options.array.clone()),
             held: Held::unknown(options.array.len()),
@@ -121,6 +149,7 @@ impl DecodeStage {
         let Decoded { info, arrived_ns, bytes, first: (row, _) } = decoded;
         self.decoded += 1;
         self.latest = info.now.or(self.latest);
+        self.arrivals.note(info, *arrived_ns, self.events.len() == *row);
         if info.version == 2 {
             let announced = announced.filter(|_| !info.reset);
             let late = self.events.t[*row..].iter().filter(|&&t| announced.is_some_and(|until| t < until));
@@ -181,6 +210,8 @@ impl DecodeStage {
         counters.wire_changes = self.decoder.changes();
         counters.wire_late = self.late;
         counters.events += self.events.len() as u64;
+        counters.arrived_ns = self.arrivals.latest_ns;
+        counters.heartbeat_us = self.arrivals.heartbeat_us;
         counters.offset = self.clock.offset();
         counters.board_us = counters.board_us.max(self.events.t.iter().max().copied());
         counters.markers += self.events.markers.len() as u64;

@@ -135,8 +135,6 @@ pub struct PictureIndex {
     pub zero: u16,
     /// Number of pictures.
     pub pictures: u64,
-    /// The largest sum over time, in ticks above `zero`: start and width of a bin (us), sums.
-    pub load: (i64, i64, Vec<u32>),
     array: Array,
     sources: Vec<Source>,
     time_columns: Option<TimeColumns>,
@@ -161,7 +159,6 @@ impl PictureIndex {
             step: steps.size,
             zero: steps.zero,
             pictures: sources.iter().map(|source| source.t.len() as u64).sum(),
-            load: (0, COLUMN_US, vec![]),
             range: first.copied().zip(last.copied()),
             array,
             sources,
@@ -183,31 +180,28 @@ impl PictureIndex {
         ahead.min_by_key(|&(_, _, t)| t)
     }
 
-    /// Computes the curves and the overview of the whole recording.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    /// Start and width of a bin of the overview, us, and the number of bins.
+    #[must_use]
+    pub fn bins(&self) -> (i64, i64, usize) {
+        let Some((first, last)) = self.range else { return (0, COLUMN_US, 0) };
+        let step = COLUMN_US.max((last - first) / BINS + 1);
+        (first, step, usize::try_from((last - first) / step).unwrap_or(0) + 1)
+    }
+
+    /// Computes the curves of the whole recording.
     fn measure(&mut self) {
-        let Some((first, last)) = self.range else { return };
+        let Some((first, _)) = self.range else { return };
         let mut columns = TimeColumns::new(self.array.rows.into(), TIME_COLUMN_BYTES);
-        let bin_us = COLUMN_US.max((last - first) / BINS + 1);
-        let mut load = vec![0_u32; ((last - first) / bin_us) as usize + 1];
         let mut cursor = vec![0; self.sources.len()];
         let mut loads = vec![Load::default(); self.sources.len()];
-        let (mut bin, mut latest) = (0, 0);
         while let Some((source, k, t)) = self.next(&cursor) {
             cursor[source] += 1;
             loads[source] = Load::of(&self.sources[source], k, self.zero);
-            let curve = loads.iter().fold(Load::default(), Load::plus).curve();
-            let now = ((t - first) / bin_us) as usize;
-            // Without a picture the last one holds.
-            load[bin..=now].iter_mut().skip(1).for_each(|sum| *sum = latest);
-            (bin, latest) = (now, curve.sum);
-            load[bin] = load[bin].max(latest);
             let column = column_of(t, COLUMN_US);
             columns.extend_to(column);
-            columns.set_curve(column, curve);
+            columns.set_curve(column, loads.iter().fold(Load::default(), Load::plus).curve());
         }
         let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
-        self.load = (first, bin_us, load);
         self.time_columns = whole.then_some(columns);
     }
 }

@@ -66,8 +66,6 @@ pub struct RecordingIndex {
     keys: Vec<Key>,
     time_columns: Option<TimeColumns>,
     range: Option<(i64, i64)>,
-    /// Size of the file, bytes.
-    pub bytes: u64,
     /// Number of events.
     pub events: u64,
     /// Number of events over time: start and width of a bin (us), counts.
@@ -122,7 +120,6 @@ impl RecordingIndex {
             keys: vec![],
             time_columns: None,
             range: None,
-            bytes,
             events: 0,
             event_rate: (0, COLUMN_US, vec![]),
             activity: Activity::new(taxels),
@@ -132,17 +129,6 @@ impl RecordingIndex {
         };
         index.build()?;
         Ok(Arc::new(index))
-    }
-
-    /// The largest sum of ticks above rest in each bin of the event rate; `None` where the curves are not stored.
-    #[must_use]
-    pub fn load(&self) -> Option<Vec<u32>> {
-        let (columns, (start, step, events)) = (self.time_columns.as_ref()?, &self.event_rate);
-        let bin = |k: i64| {
-            let range = column_of(start + k * step, COLUMN_US)..=column_of(start + (k + 1) * step - 1, COLUMN_US);
-            range.map(|column| columns.curve(column).sum).max().unwrap_or(0)
-        };
-        Some((0..).take(events.len()).map(bin).collect())
     }
 
     /// The header of the file.

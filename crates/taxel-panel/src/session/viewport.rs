@@ -29,8 +29,15 @@ const MOST_STEPS: i64 = 1000;
 enum Position {
     /// At the newest state of the live source.
     Following,
-    /// At a time of a recording or of the live source; empty while the player works in another thread.
-    At(Option<Box<Player>>),
+    /// At a time of a recording or of the live source; empty while another thread works on it.
+    At(Option<Box<Place>>),
+}
+
+/// A time of a source, and the columns of time beside it.
+struct Place {
+    player: Player,
+    /// The columns of the window that the client chose; `None`: those up to the time.
+    window: Option<Player>,
 }
 
 /// See the module.
@@ -41,6 +48,8 @@ pub(super) struct Viewport {
     position: Position,
     playback: Playback,
     options: ViewOptions,
+    /// Where the window of columns ends, us; `None`: at the time of the view.
+    window_us: Option<i64>,
     following: Following,
     delivered: Delivered,
     /// A new picture can be shown.
@@ -57,6 +66,7 @@ impl Viewport {
             position: Position::Following,
             playback: Playback::paused(),
             options: ViewOptions::plain(COLUMN_US),
+            window_us: None,
             following: Following::default(),
             delivered: Delivered::nothing(),
             dirty: true,
@@ -116,20 +126,24 @@ impl Viewport {
 
     /// The `overview` message.
     pub(super) fn overview_message(&self) -> Answer<Value> {
-        let (start, step, events) = match (&self.recording, &self.live) {
+        let (start, step, events, force) = match (&self.recording, &self.live) {
             (Some(shown), _) => return Ok(shown.indexed.overview(&shown.name)),
-            (None, Some(live)) => live.index.event_rate(),
+            (None, Some(live)) => {
+                let (start, step, events) = live.index.event_rate();
+                let force = lock(&live.state).time_columns().greatest_sums(start, step, events.len(), COLUMN_US);
+                (start, step, events, force)
+            }
             (None, None) => return Err("nothing is shown".into()),
         };
         Ok(json!({
-            "type": "overview", "source": null, "start_us": start, "step_us": step, "events": events, "load": null,
+            "type": "overview", "source": null, "start_us": start, "step_us": step, "events": events, "force": force,
         }))
     }
 
     /// Board time of the view, us.
     fn t(&self) -> Option<i64> {
         match &self.position {
-            Position::At(Some(player)) => Some(player.t()),
+            Position::At(Some(place)) => Some(place.player.t()),
             Position::At(None) => None,
             Position::Following => self.live.as_ref().and_then(|live| lock(&live.state).latest()),
         }
@@ -148,9 +162,17 @@ impl Viewport {
     /// Moves a playing view on; returns whether it has arrived to the end of its recording.
     pub(super) async fn play_on(&mut self) -> bool {
         let Some(t) = self.playback.now() else { return false };
-        match self.with_player(move |player| player.advance(t)).await {
+        let moved = self.with_place(move |place| {
+            // A window that the view leaves moves with it.
+            if let Some(window) = place.window.as_mut().filter(|window| window.t() < t) {
+                window.advance(t)?;
+            }
+            place.player.advance(t)
+        });
+        match moved.await {
             Ok(more) => {
                 self.dirty = true;
+                self.window_us = self.window_us.map(|end| end.max(t));
                 if more || self.recording.is_none() {
                     return false;
                 }
@@ -197,10 +219,11 @@ impl Viewport {
         let needs_rest = |rests: u64| self.delivered.needs_rest(rests);
         let (bytes, last, rests) = match &mut self.position {
             Position::Following => self.following.picture(self.live.as_ref()?, about, needs_rest),
-            Position::At(player) => {
-                let player = player.as_mut()?;
+            Position::At(place) => {
+                let Place { player, window } = &mut **place.as_mut()?;
                 let rests = Some(player.state().rests()).filter(|rests| needs_rest(*rests));
-                let (bytes, last) = picture::of_player(player, About { with_rest: rests.is_some(), ..about });
+                let about = About { with_rest: rests.is_some(), ..about };
+                let (bytes, last) = picture::of_player(player, window.as_mut(), about);
                 (bytes, last, rests)
             }
         };
@@ -213,7 +236,10 @@ impl Viewport {
         self.options.encoder.as_ref()?;
         let spikes = match &mut self.position {
             Position::Following => self.following.encode(self.live.as_ref()?),
-            Position::At(player) => player.as_mut().and_then(|player| player.spikes_mut()),
+            Position::At(place) => {
+                let place = place.as_mut()?;
+                place.window.as_mut().unwrap_or(&mut place.player).spikes_mut()
+            }
         }?;
         let (message, failed) = (spikes.message(), spikes.failed().map(str::to_owned));
         if let Some(reason) = failed {
@@ -226,20 +252,20 @@ impl Viewport {
 
     // ------------------------------------------------------------------------------------------ moving
 
-    /// Works on the player in another thread: a disk may be slow.
-    async fn with_player<T: Send + 'static>(
+    /// Works on the place in another thread: a disk may be slow.
+    async fn with_place<T: Send + 'static>(
         &mut self,
-        work: impl FnOnce(&mut Player) -> taxel_live::Result<T> + Send + 'static,
+        work: impl FnOnce(&mut Place) -> taxel_live::Result<T> + Send + 'static,
     ) -> Answer<T> {
         let Position::At(place) = &mut self.position else { return Err("the view follows the newest".into()) };
-        let Some(mut player) = place.take() else { return Err("the view is gone: open it again".into()) };
+        let Some(mut place) = place.take() else { return Err("the view is gone: open it again".into()) };
         let worked = tokio::task::spawn_blocking(move || {
-            let outcome = work(&mut player);
-            (player, outcome)
+            let outcome = work(&mut place);
+            (place, outcome)
         });
         match worked.await {
-            Ok((player, outcome)) => {
-                self.position = Position::At(Some(player));
+            Ok((place, outcome)) => {
+                self.position = Position::At(Some(place));
                 Ok(outcome?)
             }
             Err(_) => {
@@ -264,10 +290,27 @@ impl Viewport {
             Arc::new(state.time_columns().clone())
         });
         let options = ViewOptions { whole, ..self.options.clone() };
-        let opened = tokio::task::spawn_blocking(move || Player::open(index, t, options)).await;
-        let player = opened.map_err(|_| Refusal::bug("the view"))??;
-        self.position = Position::At(Some(Box::new(player)));
-        self.restart();
+        // A window whose columns the client has already stays as it is.
+        let same = match &mut self.position {
+            Position::At(Some(place)) if !self.delivered.is_restart() => place.window.take(),
+            _ => None,
+        };
+        let end = self.window_us;
+        if end.is_none() || same.is_none() {
+            self.restart();
+        }
+        let opened = tokio::task::spawn_blocking(move || -> taxel_live::Result<Place> {
+            let Some(end) = end else { return Ok(Place { player: Player::open(index, t, options)?, window: None }) };
+            let player = Player::open(Arc::clone(&index), t, ViewOptions::plain(COLUMN_US))?;
+            let window = same.map_or_else(|| Player::open(index, end, options), Ok)?;
+            Ok(Place { player, window: Some(window) })
+        });
+        let place = opened.await.map_err(|_| Refusal::bug("the view")).and_then(|opened| Ok(opened?));
+        if place.is_err() {
+            self.restart();
+        }
+        self.position = Position::At(Some(Box::new(place?)));
+        self.dirty = true;
         self.following.stop_encoding();
         Ok(())
     }
@@ -281,7 +324,7 @@ impl Viewport {
 
     /// Shows the newest state of the live source from now on.
     fn follow(&mut self) {
-        (self.position, self.recording) = (Position::Following, None);
+        (self.position, self.recording, self.window_us) = (Position::Following, None, None);
         self.playback.pause();
         self.restart();
         self.start_encoding();
@@ -357,7 +400,9 @@ impl Viewport {
         if !is_column(column_us) {
             return Err(Refusal::of("column_us", format!("must be {least} times a power of two, up to {most}")));
         }
+        let end = if request.has("end_us") { Some(request.time("end_us")?) } else { None };
         self.options.column_us = column_us;
+        self.window_us = end.filter(|_| !matches!(self.position, Position::Following));
         self.reopen().await
     }
 
@@ -398,13 +443,13 @@ impl Viewport {
         self.pause().await?;
         for _ in 0..steps.unsigned_abs() {
             let moved = if steps > 0 {
-                self.with_player(|player| {
-                    let next = player.next_stamp()?;
-                    next.map_or(Ok(None), |t| player.advance(t).map(|_| Some(t)))
+                self.with_place(|place| {
+                    let next = place.player.next_stamp()?;
+                    next.map_or(Ok(None), |t| place.player.advance(t).map(|_| Some(t)))
                 })
                 .await?
             } else {
-                let before = self.with_player(|player| player.last_stamp()).await?;
+                let before = self.with_place(|place| place.player.last_stamp()).await?;
                 if let Some(t) = before {
                     self.seek(t).await?;
                 }
@@ -460,7 +505,7 @@ impl Viewport {
         let mut answer = vec![indexed.opened(&name, bytes, begun)];
         let index = indexed.index();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
-        self.recording = Some(Shown { name: name.clone(), trial, indexed });
+        (self.recording, self.window_us) = (Some(Shown { name: name.clone(), trial, indexed }), None);
         self.playback.pause();
         match index.range() {
             Some((first, _)) => self.seek(t.unwrap_or(first)).await?,

@@ -1,0 +1,67 @@
+// Where maps and lanes stand, so that both use the room: maps above the lanes or beside them, one or two, as large as fits.
+
+import { part } from "./dom.js";
+
+/** Room around a map: title, colour bar, scale, CSS pixels. */
+const AROUND_MAP = 50;
+/** The line below the maps. */
+const UNDER = 30;
+const GAP = 20;
+/** The least that lanes need: the flags, the axis, and each lane with its title. */
+const FLAGS_AND_AXIS = 64;
+const LANE = { raster: 96, taxel: 72, force: 72, centre: 62 };
+/** The least width of lanes that stand beside maps. */
+const LANES_WIDE = 460;
+/** Part of the width that maps beside the lanes may take. */
+const BESIDE = 0.5;
+/** A narrow page has one column, which scrolls. */
+const NARROW = "(max-width: 860px)";
+
+/** @typedef {"above" | "beside" | "column"} Place maps above lanes; two maps side by side, or in a column, beside the lanes */
+
+/** Chooses the arrangement in which the maps are largest. */
+export class Layout {
+  /**
+   * @param {() => { aspect: number, maps: number, lanes: (keyof typeof LANE)[] }} shown width over height of a map, how many maps
+   *   there are, and the lanes
+   * @param {() => void} arranged called after the sizes have changed
+   */
+  constructor(shown, arranged) {
+    this.shown = shown;
+    this.arranged = arranged;
+    this.views = part("views", HTMLElement);
+    this.done = "";
+    new ResizeObserver(() => this.arrange()).observe(this.views);
+  }
+
+  /** @returns {{ place: Place, width: number }} of the maps, and of one map, CSS pixels */
+  best() {
+    const { aspect, maps, lanes } = this.shown();
+    const { clientWidth: wide, clientHeight: high } = this.views;
+    const low = FLAGS_AND_AXIS + lanes.reduce((sum, lane) => sum + LANE[lane], 0);
+    const beside = Math.min(BESIDE * wide, wide - LANES_WIDE - GAP);
+    /** @type {[Place, number][]} */
+    const widths = [
+      ["above", Math.min((wide - (maps - 1) * GAP) / maps, Math.max(120, high - low - UNDER - AROUND_MAP) * aspect)],
+      ["beside", Math.min((beside - (maps - 1) * GAP) / maps, (high - UNDER - AROUND_MAP) * aspect)],
+      ["column", Math.min(beside, ((high - UNDER) / maps - AROUND_MAP) * aspect)],
+    ];
+    const [place, width] = widths.reduce((one, other) => (other[1] > one[1] * 1.05 ? other : one));
+    return { place, width };
+  }
+
+  arrange() {
+    const { place, width } = matchMedia(NARROW).matches ? { place: /** @type {Place} */ ("above"), width: 0 } : this.best();
+    const chosen = `${place} ${Math.floor(width)}`;
+    if (chosen === this.done) return;
+    this.done = chosen;
+    this.views.dataset.place = place;
+    const { maps } = this.shown();
+    const row = place === "beside" ? maps : 1;
+    for (const [name, value] of [["--map", Math.floor(width)], ["--maps", row * Math.floor(width) + (row - 1) * GAP]]) {
+      if (width) this.views.style.setProperty(String(name), `${value}px`);
+      else this.views.style.removeProperty(String(name));
+    }
+    this.arranged();
+  }
+}

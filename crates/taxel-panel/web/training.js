@@ -1,0 +1,94 @@
+// From labels to a readout: trains on the labels of the recording that is shown, and lets a readout of the folder read what is shown.
+
+import { make, part, write } from "./dom.js";
+import { failed, notify } from "./notice.js";
+
+/** @typedef {import("./protocol.js").Recordings} Recordings */
+/** @typedef {import("./protocol.js").Trained} Trained */
+/** @typedef {import("./server.js").Server} Server */
+
+/** The button that trains, what the training prints, and the choice of the readout. */
+export class Training {
+  /** @param {Server} server */
+  constructor(server) {
+    this.server = server;
+    /** When the training began, ms; null while none runs. @type {number | null} */
+    this.since = null;
+    /** The recording that is shown; null: the live source. @type {string | null} */
+    this.source = null;
+    this.button = part("train", HTMLButtonElement);
+    this.button.onclick = () => (this.since === null ? this.begin() : this.end());
+    this.readout = part("readout", HTMLSelectElement);
+    this.readout.onchange = () => this.read(this.readout.value);
+  }
+
+  async begin() {
+    this.since = performance.now();
+    this.text("");
+    this.write();
+    try {
+      await this.server.request({ type: "train" });
+    } catch (error) {
+      this.text(error instanceof Error ? error.message : String(error));
+      part("train-text", HTMLElement).classList.add("bad");
+    }
+    this.since = null;
+    this.write();
+  }
+
+  end() {
+    this.server.request({ type: "train_stop" }).catch(failed);
+  }
+
+  /** @param {string} text what the training has printed */
+  text(text) {
+    const place = part("train-text", HTMLElement);
+    place.hidden = !text;
+    place.classList.remove("bad");
+    write(place, text);
+  }
+
+  /** @param {Trained} trained */
+  take({ name, readout, text }) {
+    this.text(text);
+    if (name === this.source) this.read(readout);
+  }
+
+  /** Lets a readout read what is shown. @param {string} readout */
+  async read(readout) {
+    this.readout.value = readout;
+    if (!readout) return this.server.request(this.source === null ? { type: "live" } : { type: "open", name: this.source }).catch(failed);
+    notify(`${readout} reads ${this.source ?? "the board: leave it at rest for the tare"}`);
+    return this.server.request({ type: "read_out", readout }).catch(failed);
+  }
+
+  /** @param {Recordings} message */
+  list({ readouts }) {
+    const now = this.readout.value;
+    this.readout.replaceChildren(make("option", { value: "" }, "as recorded"), ...readouts.map((value) => make("option", { value }, value)));
+    this.readout.value = readouts.includes(now) ? now : "";
+    this.show();
+  }
+
+  /** @param {string | null} source a recording, or null: the live source */
+  choose(source) {
+    if (source === this.source) return;
+    this.source = source;
+    this.readout.value = "";
+    if (this.since === null) this.text("");
+    this.show();
+  }
+
+  show() {
+    const [first, ...readouts] = this.readout.options;
+    write(first, this.source === null ? "as started" : "as recorded");
+    // A readout that runs live is replaced by another; only a restart of the program is without one.
+    this.readout.hidden = readouts.length === 0;
+  }
+
+  /** Writes how long the training has run. */
+  write() {
+    const running = this.since === null ? null : Math.round((performance.now() - this.since) / 1000);
+    write(this.button, running === null ? "Train on these labels" : `Stop the training (${running} s)`);
+  }
+}
