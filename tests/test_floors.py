@@ -66,6 +66,7 @@ def test_no_module_imports_itself_by_way_of_a_package() -> None:
 THOUSANDS = {
     "taxel.spikes.units": "the home of us and ms",
     "taxel.spikes.exchange": "NWB counts in seconds",
+    "taxel.formats.ros": "ns of stamps and bags",
     "taxel.recording": "ns of the host's clock",
     "taxel.cli.emulate": "seconds; ns of the host's clock",
     "taxel.cli.information": "seconds",

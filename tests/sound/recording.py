@@ -8,7 +8,17 @@ from sound.things import ARRAY, EVENTS, TARE, Sound, plain
 
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
-    "taxel.open": plain(taxel.open, path="here_events.npz", array=ARRAY, pairing="direct", differences=False),
+    "taxel.open": plain(
+        taxel.open,
+        path="here_events.npz",
+        array=ARRAY,
+        pairing="direct",
+        differences=False,
+        topic=None,
+        field=None,
+        types=None,
+        ros=None,
+    ),
     "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
     "taxel.Recording.frames": lambda: (taxel.open("here_events.npz").frames, {"rate_hz": 1000.0}),
     "taxel.Recording.calibrated": lambda: (

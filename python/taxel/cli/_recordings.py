@@ -7,14 +7,13 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import typer
 
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.cli._array import geometry, of_array
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -231,40 +230,6 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
             typer.echo(f"taxel: warning: {warning.message}", err=True)
 
 
-#: Option of the commands that need times.
-RateOption = Annotated[
-    float | None,
-    typer.Option(
-        "--rate-hz",
-        help="Pictures a second, for recordings without times (their pictures are numbered), and only those.",
-    ),
-]
-
-
-def timed(recording: Recording, rate_hz: float | None) -> Recording:
-    """Return a recording with the times of ``--rate-hz``; refuse it for one that has times."""
-    return recording if rate_hz is None else recording.at_rate(rate_hz)
-
-
-def open_one(path: Path, array: str | None = None, rate_hz: float | None = None) -> Recording:
-    """Open a file that holds one recording, with its feet joined, with the sensor of ``--array``."""
-    every = open_joined(path, array, rate_hz)
-    if len(every) > 1:
-        names = ", ".join(one.name for one in every[:5]) + " ..." * (len(every) > 5)
-        raise ProblemError(
-            f"{path}: holds {len(every)} recordings ({names}); taxel convert {path} FOLDER separates them"
-        )
-    return every[0]
-
-
-def open_joined(path: Path, array: str | None = None, rate_hz: float | None = None) -> list[Recording]:
-    """Open a file or a folder, with the feet of each trial joined, with the sensor of ``--array``."""
-    from taxel.recording.opening import open_joined  # noqa: PLC0415  the command line starts quickly
-
-    every = open_joined(path, array=None if array is None else geometry(array))
-    return [timed(of_array(one, array), rate_hz) for one in every]
-
-
 def of_source(recording: Recording, name: str | None) -> Recording:
     """Return the source that ``--source`` names; without a name the recording itself."""
     if name is None:
@@ -273,15 +238,3 @@ def of_source(recording: Recording, name: str | None) -> Recording:
     if name not in sources:
         raise ProblemError(f"--source {name}: {recording.path} holds {', '.join(sources)}")
     return sources[name]
-
-
-def open_all(paths: Sequence[Path], array: str | None = None, rate_hz: float | None = None) -> list[Recording]:
-    """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
-
-    Each sensor of a file with several is a recording of its own (`Recording.title`).
-    """
-    from taxel.recording.opening import open_any, sensors  # noqa: PLC0415  the command line starts quickly
-
-    opened = (open_any(path, array=None if array is None else geometry(array)) for path in paths)
-    every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
-    return [timed(of_array(one, array), rate_hz) for each in every for one in sensors(each)]

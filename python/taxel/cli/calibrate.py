@@ -12,6 +12,7 @@ import typer
 
 from taxel._core import FormatError, ProblemError
 from taxel.cli._app import app
+from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import TARE_HELP, assignments, progress, tare_of
 
 if TYPE_CHECKING:
@@ -26,10 +27,12 @@ __all__ = ["calibrate"]
 
 
 @app.command()
+@with_file_options
 def calibrate(
     recording: Annotated[
         Path, typer.Argument(help="A recording of the sensor, with the loads on it if there are any.")
     ],
+    files: FileOptions,
     load: Annotated[float | None, typer.Option(help="A known load, on the sensor from --from to --to.")] = None,
     start: Annotated[
         float | None, typer.Option("--from", metavar="S", help="Start of the load, board time, s.")
@@ -95,7 +98,7 @@ def calibrate(
     ):
         if wrong:
             raise ProblemError(why)
-    opened = _opened(recording)
+    opened = files.one(recording)
     place = recording.with_name(f"{recording.stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)
     with progress(as_json):
@@ -137,17 +140,6 @@ class _Read:
     frames: Frames
     rest: NDArray[np.float64] | None
     floor: float
-
-
-def _opened(path: Path) -> Recording:
-    import taxel  # noqa: PLC0415  the command line starts quickly
-
-    opened = taxel.open(path)
-    every = opened if isinstance(opened, list) else [opened]
-    if len(every) != 1:
-        raise ProblemError(f"{path}: holds {len(every)} recordings; a calibration is made of one")
-    one: Recording = every[0]
-    return one
 
 
 def _read(recording: Recording, tare: str | None) -> _Read:

@@ -12,8 +12,8 @@ from rich.console import Console
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._array import FileArrayOption
-from taxel.cli._recordings import RateOption, of_source, open_joined
+from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._recordings import of_source
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
@@ -22,6 +22,7 @@ __all__ = ["convert"]
 
 
 @app.command()
+@with_file_options
 def convert(
     source: Annotated[Path, typer.Argument(help="A recording, a file of another maker, or a folder.")],
     target: Annotated[
@@ -31,7 +32,7 @@ def convert(
             "which a .mcap of each is written."
         ),
     ],
-    array: FileArrayOption = None,
+    files: FileOptions,
     frames: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Write frames at this rate instead of events (not .lsa)."),
@@ -39,7 +40,6 @@ def convert(
     part: Annotated[
         str | None, typer.Option("--source", metavar="NAME", help="The source to convert, of a recording with several.")
     ] = None,
-    rate_hz: RateOption = None,
     compression: Annotated[str, typer.Option(help="Compression of a .mcap: none, lz4 or zstd.")] = "none",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
@@ -58,7 +58,7 @@ def convert(
         try_whole(target, overwrite=overwrite)
     # The status line is shown on a terminal only, and removed at the end.
     with Console(stderr=True).status(f"{source} to {target}") as status:
-        opened = [of_source(one, part) for one in open_joined(source, array, rate_hz)]
+        opened = [of_source(one, part) for one in files.joined(source)]
         if target.suffix and len(opened) > 1:
             raise ProblemError(
                 f"{source}: holds {len(opened)} recordings; {target} must be a folder, without an ending"

@@ -12,6 +12,7 @@ import typer
 from taxel import _core
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import of_source, span_us
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ __all__ = ["cut"]
 
 
 @app.command()
+@with_file_options
 def cut(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
     out: Annotated[
@@ -29,6 +31,7 @@ def cut(
             help="The new file; its extension gives the format. With --label a number is appended to the name."
         ),
     ],
+    files: FileOptions,
     start: Annotated[
         float | None, typer.Option("--from", metavar="S", help="Start of the part, board time, s.")
     ] = None,
@@ -53,9 +56,8 @@ def cut(
     Example: taxel cut walk.mcap heel.mcap --from 1.5 --to 3 --rows 0:20
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
-    from taxel.recording import open_recording  # noqa: PLC0415
 
-    whole = of_source(open_recording(recording), source)
+    whole = of_source(files.one(recording), source)
     parts = taxel.cut(
         whole,
         start_us=float("-inf") if start is None else start * 1e6,

@@ -12,7 +12,8 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._recordings import TARE_HELP, RateOption, new_report, open_all, progress, references, tare_of
+from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._recordings import TARE_HELP, new_report, progress, references, tare_of
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -30,13 +31,14 @@ _ROWS = 40
 
 
 @app.command()
+@with_file_options
 def detect(
     recording: Annotated[
         Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5, or a folder of them.")
     ],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote, or a plain rule.")],
+    files: FileOptions,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
-    rate_hz: RateOption = None,
     frame_us: Annotated[
         float | None,
         typer.Option(help="Length of the board's frame, us. Default: by the registers or the frames, else 192."),
@@ -67,7 +69,7 @@ def detect(
         if place is not None:
             try_whole(place, overwrite=overwrite and place == csv)
     loaded = load(readout)
-    opened = open_all([recording], rate_hz=rate_hz)
+    opened = files.all([recording])
     outcomes = []
     with progress(as_json) as update:
         events = [None] * len(opened) if truth is None else references(truth, "--truth", opened)

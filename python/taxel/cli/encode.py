@@ -13,19 +13,21 @@ from taxel._base.files import try_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import app
-from taxel.cli._recordings import SET_HELP, TARE_HELP, RateOption, encoder_of, open_one, progress, tare_of
+from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, progress, tare_of
 
 __all__ = ["encode"]
 
 
 @app.command()
+@with_file_options
 def encode(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
     out: Annotated[Path, typer.Argument(help="The new file, a .npz that SpikeTrains.load reads.")],
     encoder: Annotated[str, typer.Option(help=f"One of {', '.join(encoder_names())}.")],
+    files: FileOptions,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
-    rate_hz: RateOption = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -37,7 +39,7 @@ def encode(
         raise ProblemError(f"{out}: spikes are written to a .npz")
     try_whole(out, overwrite=overwrite)
     chosen = encoder_of(encoder, values or [])
-    opened = open_one(recording, rate_hz=rate_hz)
+    opened = files.one(recording)
     with progress(as_json) as update:
         update(f"reading {recording}")
         source = opened.events if opened.has_events else opened.frames()

@@ -14,7 +14,8 @@ from rich.console import Console
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._array import FileArrayOption, geometry, of_array
+from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._topics import listed
 
 if TYPE_CHECKING:
     from taxel.recording import Recording
@@ -26,12 +27,13 @@ _PICTURES = (".png", ".svg", ".pdf")
 
 
 @app.command()
+@with_file_options
 def info(
     file: Annotated[
         Path,
         typer.Argument(help="A recording, a file of another maker, or a folder."),
     ],
-    array: FileArrayOption = None,
+    files: FileOptions,
     picture: Annotated[
         Path | None,
         typer.Option(help="Write rates, a map of the taxels and the pressure over time to this .png, .svg or .pdf."),
@@ -47,10 +49,14 @@ def info(
 ) -> None:
     """Summarise a recording: contents, losses, rates, pressure, and dead, stuck or noisy taxels.
 
+    Of a ROS bag without --topic: the topics that hold numbers, with shapes and rates.
+
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
+    Example: taxel info grasp.db3 --topic /palm --field taxels --array 24x32
     """
     from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
-    from taxel.recording.pressure import above_rest, series  # noqa: PLC0415
+    from taxel.formats.ros import is_bag, topics  # noqa: PLC0415
+    from taxel.recording.pressure import series  # noqa: PLC0415
     from taxel.recording.summary import summary  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
@@ -62,7 +68,12 @@ def info(
             try_whole(place, overwrite=overwrite)
     # The status line is shown on a terminal only, and removed at the end.
     with Console(stderr=True).status(f"reading {file}"):
-        opened = _opened(file, array)
+        if not files.topic and file.exists() and is_bag(file):
+            typer.echo(listed(file, topics(file, files.types, files.ros), as_json))
+            return
+        opened = files.open(file)
+        # A file of another maker may hold several recordings; many hold one.
+        opened = opened[0] if isinstance(opened, list) and len(opened) == 1 else opened
         if isinstance(opened, list):
             if picture is not None or table is not None:
                 raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")
@@ -76,7 +87,7 @@ def info(
         recording = opened
         pressed = series(recording)
         facts = summary(recording, pressed)
-        facts["array_assumed"] &= array is None
+        facts["array_assumed"] &= not files.array
     if table is not None:
         if pressed is None:
             raise ProblemError(f"{file}: holds events without intensities, so there is no pressure to write")
@@ -84,25 +95,32 @@ def info(
         write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
         facts["table"] = str(table)
     if picture is not None:
-        import matplotlib as mpl  # noqa: PLC0415  loads slowly
-
-        from taxel.plot import overview, pressure  # noqa: PLC0415
-
-        mpl.use("Agg")
-        import matplotlib.pyplot as plt  # noqa: PLC0415
-
-        figure, kind = plt.figure(figsize=(11, 4 if pressed is None else 10), layout="constrained"), picture.suffix[1:]
-        if pressed is None:
-            overview(recording, figure)
-        else:
-            grid = figure.add_gridspec(2, 1, height_ratios=(2, 3))
-            overview(recording, figure.add_subfigure(grid[0]))
-            above = above_rest(recording)
-            assert above is not None  # there are series
-            pressure(*above, figure=figure.add_subfigure(grid[1]))
-        write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
+        _draw(picture, recording, pressed, overwrite)
         facts["picture"] = str(picture)
     typer.echo(json.dumps(facts) if as_json else _page(facts))
+
+
+def _draw(picture: Path, recording: Recording, pressed: Series | None, overwrite: bool) -> None:
+    """Write rates, a map of the taxels and the pressure over time as a picture."""
+    import matplotlib as mpl  # noqa: PLC0415  loads slowly
+
+    from taxel._base.files import write_whole  # noqa: PLC0415
+    from taxel.plot import overview, pressure  # noqa: PLC0415
+    from taxel.recording.pressure import above_rest  # noqa: PLC0415
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt  # noqa: PLC0415
+
+    figure, kind = plt.figure(figsize=(11, 4 if pressed is None else 10), layout="constrained"), picture.suffix[1:]
+    if pressed is None:
+        overview(recording, figure)
+    else:
+        grid = figure.add_gridspec(2, 1, height_ratios=(2, 3))
+        overview(recording, figure.add_subfigure(grid[0]))
+        above = above_rest(recording)
+        assert above is not None  # there are series
+        pressure(*above, figure=figure.add_subfigure(grid[1]))
+    write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
 
 
 def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
@@ -141,18 +159,6 @@ def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
 
 def _pages(several: dict[str, Any]) -> str:
     return "\n".join(f"{name}: {_page(facts)}" for name, facts in several["sources"].items())
-
-
-def _opened(file: Path, array: str | None) -> Recording | list[Recording]:
-    import taxel  # noqa: PLC0415  the command line starts quickly
-
-    opened = taxel.open(file, array=None if array is None else geometry(array))
-    if not isinstance(opened, list):
-        return of_array(opened, array)
-    for one in opened:
-        of_array(one, array)
-    # A file of another maker may hold several recordings; many hold one.
-    return opened[0] if len(opened) == 1 else opened
 
 
 def _lines(pressed: Series) -> Iterator[str]:

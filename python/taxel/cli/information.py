@@ -12,9 +12,9 @@ from taxel._base.arguments import whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._array import FileArrayOption
 from taxel.cli._bar import bar, duration
-from taxel.cli._recordings import SET_HELP, RateOption, open_all, progress
+from taxel.cli._opening import FileOptions, with_file_options
+from taxel.cli._recordings import SET_HELP, progress
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, LabelledTrial, Point
@@ -24,12 +24,12 @@ __all__ = ["information"]
 
 
 @app.command()
+@with_file_options
 def information(
     recordings: Annotated[
         list[Path], typer.Argument(help="Recordings, or folders of them: .mcap, .lsa, .npz, .csv, other makers' files.")
     ],
-    array: FileArrayOption = None,
-    rate_hz: RateOption = None,
+    files: FileOptions,
     labels: Annotated[
         str | None,
         typer.Option(
@@ -81,7 +81,7 @@ def information(
             opened = []
             for path in recordings:
                 update(f"reading {path}", 0, 0)
-                opened += open_all([path], array, rate_hz)
+                opened += files.all([path])
             trials = _trials(labels, opened, window_ms)
             if labels is None and len({trial.label for trial in trials}) == 1:
                 raise ProblemError(

@@ -9,14 +9,17 @@ from typing import Annotated
 import typer
 
 from taxel.cli._app import app
+from taxel.cli._opening import FileOptions, with_file_options
 
 __all__ = ["merge"]
 
 
 @app.command()
+@with_file_options
 def merge(
     recordings: Annotated[list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The new file; its extension gives the format.")],
+    files: FileOptions,
     gap: Annotated[
         float | None,
         typer.Option(
@@ -37,9 +40,8 @@ def merge(
     Example: taxel merge left.mcap right.mcap -o both.mcap --beside
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
-    from taxel.recording import open_recording  # noqa: PLC0415
 
-    opened = [open_recording(path) for path in recordings]
+    opened = [files.one(path) for path in recordings]
     parts = opened if label is None else [part for each in opened for part in taxel.cut(each, label=label)]
     merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6, beside=beside)
     lost = taxel.convert(merged, out, overwrite=overwrite)

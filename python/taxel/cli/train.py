@@ -14,13 +14,12 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import (
     SET_HELP,
     TARE_HELP,
-    RateOption,
     assignments,
     new_report,
-    open_all,
     progress,
     references,
     tare_before,
@@ -38,10 +37,12 @@ __all__ = ["train"]
 
 
 @app.command()
+@with_file_options
 def train(
     recordings: Annotated[
         list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5, or folders of them.")
     ],
+    files: FileOptions,
     labels: Annotated[
         str, typer.Option(help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own notes.")
     ] = "notes",
@@ -59,7 +60,6 @@ def train(
     ] = None,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Default: the time before the first label.")] = None,
-    rate_hz: RateOption = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="The file that the readout is written to.")] = Path(
         "readout.json"
     ),
@@ -109,7 +109,7 @@ def train(
     changes = assignments(values or [])
     changes |= {key: value for key, value in (("encoder.name", encoder), ("align", align)) if value is not None}
     _planned(recipe, changes)  # reports errors of the recipe before the recordings are read
-    opened = open_all(recordings, rate_hz=rate_hz)
+    opened = files.all(recordings)
     with progress(as_json) as update:
         update("reading")
         labelled = references(labels, "--labels", opened)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from taxel._core import FormatError
+from taxel.formats.ros import is_bag
 from taxel.recording.contents import Contents
 
 __all__ = ["ENDINGS", "kind_of", "kind_of_file", "verdict_of"]
@@ -28,8 +29,6 @@ _STRANGERS = {
     b"\xfd7zXZ": "xz; unpack it first",
     b"\x89PNG": "a PNG picture, no recording",
     b"%PDF": "a PDF document, no recording",
-    b"SQLite": "SQLite (a ROS 2 bag?); convert it to MCAP first",
-    b"#ROSBAG": "a ROS 1 bag; convert it to MCAP first",
     b"\x93NUMPY": "a single NumPy array; save its columns t, x, y, p with numpy.savez",
 }
 
@@ -59,6 +58,8 @@ def kind_of(path: Path) -> str:
     FormatError : not a recording (names the kind of file if it is known)
     OSError : the file is not there, or cannot be read
     """
+    if is_bag(path):
+        return "ros"
     with path.open("rb") as file:
         head = file.read(16)
     ending = ENDINGS.get(path.suffix.lower())

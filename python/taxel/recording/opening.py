@@ -11,10 +11,11 @@ from typing import Any
 from taxel import _core, formats
 from taxel._base import arguments
 from taxel._base.arguments import flag, instance, text
-from taxel._core import FormatError
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import Trial
+from taxel.formats.ros import is_bag
 from taxel.labels import Labels, Note
 from taxel.recording.contents import Contents, several
 from taxel.recording.csv import read_csv
@@ -23,6 +24,7 @@ from taxel.recording.kinds import ENDINGS, kind_of
 from taxel.recording.npz import read_npz
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
+from taxel.recording.read_ros import Topics, read_ros
 from taxel.recording.recording import Recording
 from taxel.recording.sidecars import with_sidecars
 
@@ -36,7 +38,15 @@ LABELS = "labels.csv"
 
 
 def open_any(
-    path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
+    path: str | os.PathLike[str],
+    *,
+    array: Array | Sequence[Array] | None = None,
+    pairing: str = "direct",
+    differences: bool = False,
+    topic: str | Sequence[str] | None = None,
+    field: str | Sequence[str] | None = None,
+    types: str | os.PathLike[str] | None = None,
+    ros: str | None = None,
 ) -> Any:
     r"""Open a recording, or a folder of trials.
 
@@ -46,14 +56,20 @@ def open_any(
     ----------
     path : path
         A .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged; a file of another format
-        that `taxel.formats` reads; or a folder of either kind.
-    array : Array, optional
+        that `taxel.formats` reads; a ROS bag; or a folder of either kind.
+    array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
-        a larger one if events lie outside it.
+        a larger one if events lie outside it. Of a ROS bag rows and columns, for messages that do not state them.
     pairing : {"direct", "taxel"}
         Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
     differences : bool
         Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
+    topic, field : str, or list of str, optional
+        What of a ROS bag is opened as pictures: a topic, and the path of a field of its messages, as "left.taxels"
+        (default: the only one with numbers). Of lists each entry becomes a source, with its own `array` if that is a
+        list too.
+    types, ros : path and str, optional
+        For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
 
     Returns
     -------
@@ -86,7 +102,8 @@ def open_any(
     """
     place = Path(arguments.path("path", path))
     how: dict[str, Any] = {"array": array, "pairing": pairing, "differences": differences}
-    if place.is_dir():
+    how |= {"topic": topic, "field": field, "types": types, "ros": ros}
+    if place.is_dir() and not is_bag(place):
         return _folder(place, how)
     # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
     if place.exists() and (names := _formats(place)) and not _is_own(place):
@@ -95,20 +112,34 @@ def open_any(
 
 
 def open_recording(
-    path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
+    path: str | os.PathLike[str],
+    *,
+    array: Array | Sequence[Array] | None = None,
+    pairing: str = "direct",
+    differences: bool = False,
+    topic: str | Sequence[str] | None = None,
+    field: str | Sequence[str] | None = None,
+    types: str | os.PathLike[str] | None = None,
+    ros: str | None = None,
 ) -> Recording:
     """Open one .mcap, .lsa, .npz, .csv or .h5 as taxel writes it, finished or not, whole or damaged.
 
     Parameters
     ----------
     path : path
-    array : Array, optional
+    array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
-        a larger one if events lie outside it.
+        a larger one if events lie outside it. Of a ROS bag rows and columns, for messages that do not state them.
     pairing : {"direct", "taxel"}
         Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
     differences : bool
         Whether the intensities of a .lsa are differences (the board's option); a .mcap stores this itself.
+    topic, field : str, or list of str, optional
+        What of a ROS bag is opened as pictures: a topic, and the path of a field of its messages, as "left.taxels"
+        (default: the only one with numbers). Of lists each entry becomes a source, with its own `array` if that is a
+        list too.
+    types, ros : path and str, optional
+        For a ROS bag that does not define its messages: a folder of .msg or .idl files, and a release, as "humble".
 
     Returns
     -------
@@ -124,12 +155,17 @@ def open_recording(
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel.
     """
     place = Path(arguments.path("path", path))
-    if array is not None:
-        instance("array", array, Array)
     text("pairing", pairing, ("direct", "taxel"))
     flag("differences", differences)
+    topics = Topics(topic, field, types, ros)
     kind = kind_of(place)
     try:
+        if kind == "ros":
+            return Recording(with_sidecars(read_ros(place, topics, array)))
+        if topics:
+            raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
+        if array is not None:
+            instance("array", array, Array)
         return Recording(with_sidecars(_read(place, kind, array, pairing, differences)))
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
@@ -146,7 +182,10 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
 
 def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
-    own = sorted((f for f in folder.iterdir() if f.is_file() and f.name != LABELS and _is_own(f)), key=_order)
+    there = sorted((file for file in folder.iterdir() if file.name != LABELS), key=_order)
+    own = [file for file in there if _is_own(file)]
+    if how["topic"] or not own:
+        own = [file for file in there if file in own or is_bag(file)]
     if own:
         opened = [open_recording(file, **how) for file in own]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
@@ -272,12 +311,14 @@ def _formats(place: Path) -> list[str]:
 
 def _holds_own(folder: Path) -> bool:
     there = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
-    return there and any(file.is_file() and _is_own(file) for file in folder.iterdir())
+    return there and any(_is_own(file) for file in folder.iterdir())
 
 
 def _is_own(file: Path) -> bool:
     """Return whether a file is of a kind that taxel writes, by its ending and, for shared endings, by its content."""
     ending = file.suffix.lower()
+    if not file.is_file():
+        return False
     if ending == ".csv":
         with file.open("rb") as table:
             return table.read(16).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"t_us")

@@ -1,0 +1,127 @@
+"""The options that say how files are opened, one home for all commands that read files, and the opening."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from taxel._core import ProblemError
+from taxel.cli._array import geometry
+
+if TYPE_CHECKING:
+    from taxel.recording import Recording
+
+__all__ = ["FileOptions", "with_file_options"]
+
+
+@dataclass(frozen=True)
+class FileOptions:
+    """Hold the options that say of files what they do not hold themselves."""
+
+    array: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROWSxCOLUMNS[xMM]",
+            help="Rows, columns and pitch of the sensor, as 24x20x5, for files without them (events as .csv, .lsa, ROS "
+            "bags). Default: 64x64x2.67, or a larger array if events lie outside it; of a bag as its messages say.",
+        ),
+    ] = None
+    topic: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Open this topic of a ROS bag as pictures; taxel info lists them. Repeated, with --field and --array "
+            "once or as often: each is a source.",
+        ),
+    ] = None
+    field: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="The topic's field, as left.taxels. Default: the only one with numbers."),
+    ] = None
+    types: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="A folder of .msg or .idl files, for a ROS bag that lacks definitions."),
+    ] = None
+    ros: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="The release of ROS, as humble, whose messages a bag holds undefined."),
+    ] = None
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(help="Pictures a second, for recordings without times, whose pictures are numbered."),
+    ] = None
+
+    def open(self, path: Path) -> Recording | list[Recording]:
+        """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
+
+        Raises
+        ------
+        ProblemError : an ``--array`` that differs from the sensor that a file holds
+        """
+        from taxel.recording import open_any  # noqa: PLC0415  the command line starts quickly
+
+        arrays = [geometry(size) for size in self.array or ()]
+        named = {"topic": self.topic, "field": self.field, "types": self.types, "ros": self.ros}
+        opened = open_any(path, array=arrays if len(arrays) > 1 else arrays[0] if arrays else None, **named)
+        for one in opened if isinstance(opened, list) else [opened]:
+            # A bag holds no sensor, so that its messages are of the given one or are left out.
+            if arrays and one.kind != "ros" and one.array != arrays[0]:
+                given = ", ".join(self.array or ())
+                raise ProblemError(f"--array {given}: {one.path} holds its own sensor, {one.array!r}; leave it out")
+        return opened  # type: ignore[no-any-return]
+
+    def joined(self, path: Path) -> list[Recording]:
+        """Open a file or a folder, with the feet of each trial joined as its sources."""
+        from taxel.recording.opening import joined  # noqa: PLC0415  the command line starts quickly
+
+        opened = self.open(path)
+        return [self._timed(one) for one in joined(opened if isinstance(opened, list) else [opened])]
+
+    def all(self, paths: Sequence[Path]) -> list[Recording]:
+        """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
+
+        Each sensor of a file with several is a recording of its own (`Recording.title`).
+        """
+        from taxel.recording.opening import sensors  # noqa: PLC0415  the command line starts quickly
+
+        opened = (self.open(path) for path in paths)
+        every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
+        return [self._timed(one) for each in every for one in sensors(each)]
+
+    def _timed(self, recording: Recording) -> Recording:
+        return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
+
+    def one(self, path: Path) -> Recording:
+        """Open a file that holds one recording, with its feet joined.
+
+        Raises
+        ------
+        ProblemError : it holds several
+        """
+        every = self.joined(path)
+        if len(every) != 1:
+            some = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
+            raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")
+        return every[0]
+
+
+def with_file_options(work: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `FileOptions` in place of its argument `files`, which holds them."""
+    options = inspect.signature(FileOptions, eval_str=True).parameters
+    own = inspect.signature(work, eval_str=True).parameters.values()
+
+    def command(**typed: Any) -> None:
+        work(files=FileOptions(**{name: typed.pop(name) for name in options}), **typed)
+
+    functools.update_wrapper(command, work)
+    parameters = [one for each in own for one in (options.values() if each.name == "files" else [each])]
+    # The options have defaults, and may stand before arguments without one.
+    keywords = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in parameters]
+    command.__signature__ = inspect.Signature(keywords)  # type: ignore[attr-defined]
+    return command

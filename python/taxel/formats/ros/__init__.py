@@ -1,0 +1,10 @@
+"""ROS bags: which topics hold numbers, and the pictures of chosen ones; by the library rosbags, without ROS.
+
+A bag is a ``.bag`` of ROS 1, a ``.db3`` or ``.mcap`` of ROS 2, or a folder with ``metadata.yaml`` and its files.
+"""
+
+from taxel.formats.ros.bag import is_bag
+from taxel.formats.ros.listing import Topic, topics
+from taxel.formats.ros.reading import Chosen, Read, read
+
+__all__ = ["Chosen", "Read", "Topic", "is_bag", "read", "topics"]

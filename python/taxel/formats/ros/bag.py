@@ -1,0 +1,220 @@
+"""A ROS bag: recognised by its content, and opened with the definitions of its messages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from taxel._base.messages import first_line
+from taxel._core import Error, FormatError, ProblemError
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection
+    from rosbags.typesys.store import Typestore
+
+__all__ = ["Bag", "is_bag", "opened"]
+
+#: The first bytes of a .bag and of a .db3, which is a database of SQLite.
+_ROS1, _SQLITE = b"#ROSBAG V", b"SQLite format 3\0"
+#: The first bytes of a .mcap: its magic and the code of the header, before the header's length and its profile.
+_MCAP = b"\x89MCAP0\r\n\x01"
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a path is a ROS bag, by its content.
+
+    Raises
+    ------
+    OSError : the file is not there, or cannot be read
+    """
+    if path.is_dir():
+        return (path / "metadata.yaml").is_file()
+    head = _begins(path, 64)
+    if head.startswith(_MCAP):
+        profile = head[len(_MCAP) + 8 :]
+        return profile[4 : 4 + int.from_bytes(profile[:4], "little")] in (b"ros1", b"ros2")
+    return head.startswith((_ROS1, _SQLITE))
+
+
+def _begins(path: Path, count: int) -> bytes:
+    with path.open("rb") as file:
+        return file.read(count)
+
+
+@dataclass(frozen=True)
+class Bag:
+    """Hold an open bag: its reader, and the definitions of its messages."""
+
+    path: Path
+    is_ros1: bool
+    reader: Any
+    store: Typestore
+
+    def of_topic(self, topic: str) -> list[Connection]:
+        """Return the connections of a topic, which have messages of one type.
+
+        Raises
+        ------
+        FormatError : no such topic, messages of several types, or a type without a definition
+        """
+        found = [one for one in self.reader.connections if one.topic == topic]
+        types = sorted({one.msgtype for one in found})
+        if not found:
+            there = ", ".join(sorted({one.topic for one in self.reader.connections})) or "none"
+            raise FormatError(f"{self.path}: has no topic {topic}; its topics are {there}")
+        if len(types) > 1:
+            raise FormatError(f"{self.path}: topic {topic} has messages of several types ({', '.join(types)})")
+        undefined = self.undefined(types[0])
+        if undefined:
+            raise FormatError(
+                f"{self.path}: holds no definition of {undefined} (topic {topic}); give it by --types DIR (types=), a "
+                f"folder of .msg or .idl files, or by --ros NAME (ros=), one of {', '.join(_stores())}"
+            )
+        for one in found:
+            self._check_digest(one)
+        return found
+
+    def undefined(self, name: str) -> str:
+        """Return the name of a type that is not defined: this one, or one that it is made of; "" if none."""
+        if name not in self.store.fielddefs:
+            return name
+        from rosbags.interfaces import Nodetype  # noqa: PLC0415  an extra
+
+        for _, described in self.store.fielddefs[name][1]:
+            kind, of = described
+            if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                kind, of = of[0]
+            missing = self.undefined(str(of)) if kind == Nodetype.NAME else ""
+            if missing:
+                return missing
+        return ""
+
+    def messages(self, connections: Sequence[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
+        """Yield the messages of some connections: connection, the bag's time in ns, bytes."""
+        if connections:  # rosbags reads none as all
+            yield from self.reader.messages(connections=connections)
+
+    def decoded(self, connection: Connection, data: bytes) -> Any:
+        """Return a message."""
+        decode = self.store.deserialize_ros1 if self.is_ros1 else self.store.deserialize_cdr
+        return decode(data, connection.msgtype)
+
+    def _check_digest(self, one: Connection) -> None:
+        """Refuse a definition that was given for messages of another one, if the bag holds the digest of its own."""
+        if one.msgdef.data or not one.digest:
+            return
+        given = self.store.generate_msgdef(one.msgtype)[1] if self.is_ros1 else self.store.hash_rihs01(one.msgtype)
+        if given != one.digest:
+            raise FormatError(
+                f"{self.path}: was recorded with another definition of {one.msgtype} than the one given; its digest is "
+                f"{one.digest}"
+            )
+
+
+@contextmanager
+def opened(path: Path, types: Path | None, ros: str | None) -> Iterator[Bag]:
+    """Open a bag.
+
+    Parameters
+    ----------
+    path : Path
+    types : Path, optional
+        A folder of .msg or .idl files, for types that the bag does not define.
+    ros : str, optional
+        A release of ROS, as "humble", whose types are used for those that neither defines.
+
+    Raises
+    ------
+    ImportError : rosbags is not installed
+    ProblemError : an unknown release, or a folder without definitions
+    FormatError : damaged, or of a kind that rosbags does not read
+    """
+    try:
+        from rosbags import rosbag1, rosbag2  # noqa: PLC0415  an extra
+    except ImportError:
+        raise ImportError(f"{path}: a ROS bag, and rosbags is not installed: pip install taxel[ros]") from None
+    try:
+        is_ros1 = path.is_file() and _begins(path, len(_ROS1)) == _ROS1
+        reader: Any = (rosbag1 if is_ros1 else rosbag2).Reader(path)
+        with reader:
+            yield Bag(path, is_ros1, reader, _store(reader.connections, types, ros))
+    except (Error, OSError, MemoryError):
+        raise
+    # Damaged files also raise errors of rosbags' parts: of struct, of SQLite, of YAML, of zstd.
+    except Exception as error:
+        raise FormatError(f"{path}: cannot be read as a ROS bag: {first_line(error)}") from None
+
+
+def _store(connections: Sequence[Connection], types: Path | None, ros: str | None) -> Typestore:
+    """Return the definitions of messages: the bag's own, before those of `types`, before those of `ros`."""
+    from rosbags.interfaces import MessageDefinitionFormat  # noqa: PLC0415  an extra
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: PLC0415
+
+    stores = _stores()
+    if ros is not None and ros not in stores:
+        raise ProblemError(f"ros is {ros}: must be one of {', '.join(stores)}")
+    defined: dict[str, Any] = {} if ros is None else dict(get_typestore(stores[ros]).fielddefs)
+    if types is not None:
+        defined |= _of_folder(types, [one.msgtype for one in connections])
+    for one in connections:
+        if one.msgdef.format == MessageDefinitionFormat.MSG:
+            defined |= get_types_from_msg(one.msgdef.data, one.msgtype)
+        elif one.msgdef.format == MessageDefinitionFormat.IDL:
+            defined |= _of_idl(one.msgdef.data)
+    store = get_typestore(Stores.EMPTY)
+    store.register(defined)
+    return store
+
+
+def _stores() -> dict[str, Any]:
+    """Return the releases of ROS whose types rosbags knows, by name."""
+    from rosbags.typesys import Stores  # noqa: PLC0415  an extra
+
+    return {one.value.partition("_")[2]: one for one in Stores if "_" in one.value}
+
+
+def _of_folder(folder: Path, needed: Iterable[str]) -> dict[str, Any]:
+    """Return the types that the .msg and .idl files of a folder, or below it, define."""
+    from rosbags.typesys import get_types_from_msg  # noqa: PLC0415  an extra
+
+    files = sorted(file for file in folder.rglob("*") if file.suffix in (".msg", ".idl"))
+    if not files:
+        raise ProblemError(f"{folder}: no folder with .msg or .idl files")
+    defined: dict[str, Any] = {}
+    for file in files:
+        try:
+            text = file.read_text()
+            if file.suffix == ".idl":
+                defined |= _of_idl(text)
+            else:
+                defined |= get_types_from_msg(text, f"{_package(file, needed)}/msg/{file.stem}")
+        except Exception as error:  # of the parser, and of text that is not UTF-8
+            raise FormatError(f"{file}: cannot be read as a definition of messages: {first_line(error)}") from None
+    return defined
+
+
+def _package(file: Path, needed: Iterable[str]) -> str:
+    """Return the package of a .msg file: of PACKAGE/msg/NAME.msg, or else the one that the bag's types name."""
+    if file.parent.name == "msg":
+        return file.resolve().parent.parent.name
+    beside = {other.stem for other in file.parent.glob("*.msg")}
+    packages = {name.split("/")[0] for name in needed if name.split("/")[-1] in beside}
+    return packages.pop() if len(packages) == 1 else file.resolve().parent.name
+
+
+def _of_idl(text: str) -> dict[str, Any]:
+    """Return the types of a definition in IDL, which may be that of several files."""
+    from rosbags.typesys import get_types_from_idl  # noqa: PLC0415  an extra
+
+    # The parser of rosbags knows no preprocessor; what a file includes is found by its name.
+    text = re.sub(r"(?m)^[ \t]*#.*$", "", text)
+    line = "=" * 80 + "\n"
+    parts = [part.partition("\n")[2] for part in text.split(line)[1:]] if text.startswith(f"{line}IDL: ") else [text]
+    defined: dict[str, Any] = {}
+    for part in parts:
+        defined |= get_types_from_idl(part)
+    return defined

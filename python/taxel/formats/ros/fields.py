@@ -1,0 +1,109 @@
+"""Numbers in a message: found by the path of a field, and as the pictures of an image."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError
+
+__all__ = ["IMAGE", "grid", "leaves", "values"]
+
+IMAGE = "sensor_msgs/msg/Image"
+#: Types whose numbers are no readings: times, and the bytes of compressed images and of points.
+_WITHOUT_READINGS = (
+    "std_msgs/msg/Header",
+    "builtin_interfaces/msg/Time",
+    "builtin_interfaces/msg/Duration",
+    "sensor_msgs/msg/CompressedImage",
+    "sensor_msgs/msg/PointCloud2",
+)
+#: What one pixel is, by encoding (sensor_msgs/image_encodings), of those with one channel.
+_PIXELS = {
+    **dict.fromkeys(("mono8", "8UC1"), "u1"),
+    **dict.fromkeys(("mono16", "16UC1"), "u2"),
+    **dict(zip(("8SC1", "16SC1", "32SC1", "32FC1", "64FC1"), ("i1", "i2", "i4", "f4", "f8"), strict=True)),
+}
+
+
+def leaves(message: Any, path: str = "", *, listed: bool = False) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Yield the fields of a message that hold numbers, each with its path; a single number only in a list of messages.
+
+    A part of the messages of a list is one field: ``sensors.taxels`` are the taxels of all sensors, in their order.
+    """
+    if isinstance(message, np.ndarray) or _type(message) == IMAGE:
+        yield path, values(message, "")
+    elif isinstance(message, list):
+        for inner, _ in leaves(message[0], listed=True) if message and is_dataclass(message[0]) else ():
+            yield f"{path}.{inner}", values(message, inner)
+    elif is_dataclass(message):
+        for one in fields(message) if _type(message) not in _WITHOUT_READINGS else ():
+            yield from leaves(getattr(message, one.name), f"{path}.{one.name}".lstrip("."), listed=listed)
+    elif listed and isinstance(message, int | float | np.number):
+        yield path, values(message, "")
+
+
+def values(message: Any, path: str) -> NDArray[Any]:
+    """Return the numbers of a field, shape (n,), or (rows, columns) of an image.
+
+    Raises
+    ------
+    LookupError : there is no such field, or it holds no numbers
+    """
+    step, _, rest = path.partition(".")
+    if isinstance(message, list):
+        if step.isdigit():
+            return values(message[int(step)], rest)
+        each = [values(one, path).reshape(-1) for one in message]
+        return np.concatenate(each) if each else np.empty(0)
+    if step:
+        if not is_dataclass(message) or not hasattr(message, step):
+            raise LookupError(step)
+        return values(getattr(message, step), rest)
+    if isinstance(message, np.ndarray) and message.dtype.kind in "uifb":
+        return message
+    if isinstance(message, int | float | np.number):
+        return np.array([message])
+    if _type(message) == IMAGE:
+        return _pixels(message)
+    raise LookupError(path)
+
+
+def grid(message: Any, path: str) -> tuple[int, int] | None:
+    """Return rows and columns of a field, if the message states them: of an image, or of a std_msgs multi-array."""
+    parent, _, last = path.rpartition(".")
+    try:
+        for step in filter(None, parent.split(".")):
+            message = message[int(step)] if isinstance(message, list) else getattr(message, step)
+        inner = getattr(message, last) if last else message
+    except (LookupError, AttributeError, ValueError):  # of a list of messages
+        return None
+    if _type(inner) == IMAGE:
+        return int(inner.height), int(inner.width)
+    if _type(message).startswith("std_msgs/msg/") and _type(message).endswith("MultiArray"):
+        sizes = tuple(int(dimension.size) for dimension in message.layout.dim)
+        if len(sizes) == 2 and sizes[0] * sizes[1] == len(message.data) and not message.layout.data_offset:
+            return sizes
+    return None
+
+
+def _pixels(image: Any) -> NDArray[Any]:
+    """Return an image's pixels, shape (rows, columns); none if its data are shorter than it says."""
+    if image.encoding not in _PIXELS:
+        raise FormatError(
+            f"images of encoding {image.encoding}; must have one channel and be one of {', '.join(_PIXELS)}"
+        )
+    kind = np.dtype(_PIXELS[image.encoding]).newbyteorder(">" if image.is_bigendian else "<")
+    width = image.width * kind.itemsize
+    if image.step < width or len(image.data) < image.height * image.step:
+        return np.empty((0, 0))
+    lines = np.asarray(image.data[: image.height * image.step], np.uint8).reshape(image.height, image.step)
+    return np.ascontiguousarray(lines[:, :width]).view(kind).reshape(image.height, image.width)
+
+
+def _type(value: Any) -> str:
+    return str(getattr(value, "__msgtype__", ""))

@@ -1,0 +1,114 @@
+"""Makes small ROS bags with rosbags itself: a palm, a hand of fingers, images."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags import rosbag1, rosbag2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+#: 2026-11-23 in ns, near to what robots write.
+BEGIN_NS = 1_795_000_000_000_000_000
+PALM, HAND, SKIN = "skins_msgs/msg/Palm", "skins_msgs/msg/Hand", "skins_msgs/msg/Skin"
+#: Custom messages: a palm of 24 x 32 where less means more pressure, fingers, and a list of sensors.
+DEFINITIONS = {
+    PALM: "std_msgs/Header header\nint16[768] taxels\n",
+    HAND: "std_msgs/Header header\nfloat64[] thumb\nfloat64[] index\nstring note\n",
+    SKIN: "skins_msgs/Patch[] patches\n",
+    "skins_msgs/msg/Patch": "uint8 number\nuint16[] taxels\nskins_msgs/Force[] forces\n",
+    "skins_msgs/msg/Force": "float32 x\nfloat32 z\n",
+}
+
+#: A message, by the types of a store: what its constructor is called with.
+Make = Callable[[dict[str, Any], int], Any]
+
+
+def store(ros: Stores = Stores.ROS2_HUMBLE) -> Typestore:
+    """Return the types of a release of ROS and the custom ones."""
+    made = get_typestore(ros)
+    types: dict[str, Any] = {}
+    for name, text in DEFINITIONS.items():
+        types |= get_types_from_msg(text, name)
+    made.register(types)
+    return made
+
+
+def header(types: dict[str, Any], ns: int) -> Any:
+    """Return a header with a stamp; of ROS 1 it has a number too."""
+    stamp = types["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9)
+    make = types["std_msgs/msg/Header"]
+    number = {"seq": 0} if "seq" in make.__dataclass_fields__ else {}
+    return make(**number, stamp=stamp, frame_id="palm")
+
+
+def palm(values: Any) -> Make:
+    """Return the maker of a message of a palm."""
+    return lambda types, ns: types[PALM](header(types, ns), np.asarray(values, np.int16).reshape(-1))
+
+
+def hand(thumb: Sequence[float], index: Sequence[float]) -> Make:
+    """Return the maker of a message of a hand."""
+    return lambda types, ns: types[HAND](header(types, ns), np.array(thumb, float), np.array(index, float), "")
+
+
+def image(pixels: Any, encoding: str, *, padding: int = 0, big: bool = False) -> Make:
+    """Return the maker of an image, with so many unused bytes at the end of each row."""
+    pixels = np.asarray(pixels)
+    lines = pixels.astype(pixels.dtype.newbyteorder(">" if big else "<")).view(np.uint8).reshape(len(pixels), -1)
+    data = np.pad(lines, ((0, 0), (0, padding)), constant_values=255)
+
+    def make(types: dict[str, Any], ns: int) -> Any:
+        rows, columns = pixels.shape[:2]
+        of = types["sensor_msgs/msg/Image"]
+        return of(header(types, ns), rows, columns, encoding, int(big), data.shape[1], data.reshape(-1))
+
+    return make
+
+
+def skin(patches: Sequence[tuple[Sequence[int], Sequence[float]]]) -> Make:
+    """Return the maker of a message of several sensors, each of taxels and of forces along z."""
+
+    def make(types: dict[str, Any], _: int) -> Any:
+        force, patch = types["skins_msgs/msg/Force"], types["skins_msgs/msg/Patch"]
+        made = [
+            patch(k, np.array(taxels, np.uint16), [force(-1.0, z) for z in forces])
+            for k, (taxels, forces) in enumerate(patches)
+        ]
+        return types[SKIN](made)
+
+    return make
+
+
+#: One message: topic, type, the bag's time and the stamp in ms after the beginning (None: a stamp of 0), its maker.
+Message = tuple[str, str, float, float | None, Make]
+
+
+def write(path: Path, messages: Iterable[Message]) -> Path:
+    """Write a bag of the kind that the ending says; without an ending a folder of a .db3."""
+    ros1 = path.suffix == ".bag"
+    types = store(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    if ros1:
+        writer: Any = rosbag1.Writer(path)
+    else:
+        plugin = rosbag2.StoragePlugin.MCAP if path.suffix == ".mcap" else rosbag2.StoragePlugin.SQLITE3
+        folder = path.with_name(f"{path.stem} parts") if path.suffix else path
+        writer = rosbag2.Writer(folder, version=9, storage_plugin=plugin)
+    serialize = types.serialize_ros1 if ros1 else types.serialize_cdr
+    with writer:
+        connections: dict[str, Any] = {}
+        for topic, kind, bag_ms, stamp_ms, make in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=types)
+            stamp = 0 if stamp_ms is None else BEGIN_NS + round(stamp_ms * 1e6)
+            message = make(types.types, stamp)
+            writer.write(connections[topic], BEGIN_NS + round(bag_ms * 1e6), serialize(message, kind))
+    if path.suffix and not ros1:
+        (inner,) = (file for file in folder.iterdir() if file.suffix == path.suffix)
+        inner.rename(path)
+        (folder / "metadata.yaml").unlink()
+        folder.rmdir()
+    return path

@@ -1,0 +1,329 @@
+"""ROS bags, made with rosbags itself: what opens, by which times, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sqlite3
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+from shell import call
+
+import taxel
+from taxel import FormatError, ProblemError
+from taxel.formats import ros
+from taxel.formats.ros.reading import _times
+
+from . import bags
+from .bags import BEGIN_NS, HAND, PALM, SKIN
+
+PALM_ARRAY = taxel.Array(24, 32)
+IMAGE = "sensor_msgs/msg/Image"
+KINDS = ("grasp.bag", "grasp.db3", "grasp.mcap", "grasp")
+RNG = np.random.default_rng(7)
+PALMS = RNG.integers(-(2**15), 2**15, (6, 24, 32))
+
+
+def palms(count: int = 6, every_ms: float = 10.0) -> list[bags.Message]:
+    """Messages of a palm, each under way for 2 ms."""
+    return [("/palm", PALM, every_ms * k + 2, every_ms * k, bags.palm(PALMS[k % len(PALMS)])) for k in range(count)]
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_palm_opens_as_pictures_from_every_kind_of_bag(name: str, tmp_path: Path) -> None:
+    bag = bags.write(tmp_path / name, palms())
+    opened = taxel.open(bag, topic="/palm", field="taxels", array=PALM_ARRAY)
+    t = BEGIN_NS // 1000 + np.arange(6) * 10_000
+    assert opened.frames() == taxel.Frames(PALMS, t, unit="counts", array=PALM_ARRAY)
+    assert (opened.kind, opened.verdict, opened.source) == ("ros", "nothing left out", f"/palm.taxels ({PALM})")
+    assert opened.counts == {"messages": 6, "messages_of_another_length": 0, "times_by_the_bag": 0}
+    # The only field with numbers need not be named; without an array a message is one row.
+    assert np.array_equal(taxel.open(bag, topic="/palm").frames().values[:, 0], PALMS.reshape(6, 768))
+
+
+def test_a_bag_of_split_files_is_one_recording(tmp_path: Path) -> None:
+    every = palms(12)
+    first, second = bags.write(tmp_path / "first", every[:5]), bags.write(tmp_path / "second", every[5:])
+    shutil.move(second / "second.db3", first / "second.db3")
+    yaml, place = YAML(typ="safe"), first / "metadata.yaml"
+    about = yaml.load(place.read_text())
+    of = about["rosbag2_bagfile_information"]
+    of["relative_file_paths"].append("second.db3")
+    of["message_count"] = of["topics_with_message_count"][0]["message_count"] = 12
+    with place.open("w") as file:
+        yaml.dump(about, file)
+    frames = taxel.open(first, topic="/palm", array=PALM_ARRAY).frames()
+    assert np.array_equal(frames.values, np.concatenate([PALMS, PALMS]))
+    assert np.array_equal(np.diff(frames.t), np.full(11, 10_000))
+
+
+def test_topics_are_listed_with_fields_shapes_and_rates(tmp_path: Path) -> None:
+    several = palms()
+    several += [("/hand", HAND, 20 * k + 3, 20 * k, bags.hand([1, 2, 3], [4, 5])) for k in range(3)]
+    several += [("/near", IMAGE, 9 * k + 4, 9 * k, bags.image(np.ones((3, 4), np.uint16), "mono16")) for k in range(4)]
+    several += [("/skin", SKIN, 5 + k, None, bags.skin([([1, 2], [0.5]), ([3, 4], [1.5])])) for k in range(2)]
+    several += [("/colours", IMAGE, 6, 6, bags.image(np.zeros((2, 2, 3), np.uint8), "rgb8"))]
+    found = ros.topics(bags.write(tmp_path / "grasp.mcap", sorted(several, key=lambda one: one[2])))
+    rates = {one.topic: None if one.rate_hz is None else round(one.rate_hz, 3) for one in found}
+    assert rates == {"/palm": 100.0, "/hand": 50.0, "/near": 111.111, "/skin": 1000.0, "/colours": None}
+    facts = {(one.topic, one.field): (one.shape, one.dtype, one.messages) for one in found}
+    assert facts == {
+        ("/palm", "taxels"): ((768,), "int16", 6),
+        ("/hand", "thumb"): ((3,), "float64", 3),
+        ("/hand", "index"): ((2,), "float64", 3),
+        ("/near", ""): ((3, 4), "uint16", 4),
+        ("/skin", "patches.number"): ((2,), "int64", 2),
+        ("/skin", "patches.taxels"): ((4,), "uint16", 2),
+        ("/skin", "patches.forces.x"): ((2,), "float64", 2),
+        ("/skin", "patches.forces.z"): ((2,), "float64", 2),
+        ("/colours", ""): ((), "", 1),
+    }
+    (colours,) = (one for one in found if one.topic == "/colours")
+    assert colours.trouble.startswith("images of encoding rgb8; must have one channel")
+
+
+@pytest.mark.parametrize(("encoding", "dtype"), [
+    ("mono8", np.uint8), ("8UC1", np.uint8), ("8SC1", np.int8), ("mono16", np.uint16), ("16UC1", np.uint16),
+    ("16SC1", np.int16), ("32SC1", np.int32), ("32FC1", np.float32), ("64FC1", np.float64),
+])  # fmt: skip
+@settings(max_examples=10)
+@given(data=st.data())
+def test_an_image_of_any_encoding_of_one_channel_reads_as_it_was_made(encoding, dtype, data, tmp_path_factory) -> None:
+    rows, columns = data.draw(st.tuples(st.integers(1, 9), st.integers(2, 9)))
+    raw = np.random.default_rng(data.draw(st.integers(0, 99))).integers(0, 200, (rows, columns))
+    pixels = (raw - 100 if np.dtype(dtype).kind != "u" else raw).astype(dtype)
+    make = bags.image(pixels, encoding, padding=data.draw(st.integers(0, 5)), big=data.draw(st.booleans()))
+    bag = bags.write(tmp_path_factory.mktemp("image") / "a.mcap", [("/near", IMAGE, 1, 1, make)])
+    assert np.array_equal(taxel.open(bag, topic="/near").frames().values[0], pixels)
+
+
+def test_topics_fields_and_parts_of_lists_become_sources(tmp_path: Path) -> None:
+    several = palms()
+    several += [("/hand", HAND, 10 * k + 3, 10 * k, bags.hand([1, 2, k], [4, 5])) for k in range(6)]
+    several += [("/skin", SKIN, 10 * k + 4, None, bags.skin([([1, 2], [0.5, k]), ([3, 4], [1.5])])) for k in range(6)]
+    bag = bags.write(tmp_path / "grasp.db3", sorted(several, key=lambda one: one[2]))
+    both = taxel.open(bag, topic=["/palm", "/hand"], field=["taxels", "thumb"], array=[PALM_ARRAY, taxel.Array(1, 3)])
+    assert list(both.sources) == ["palm", "hand"]
+    assert both.sources["palm"].frames().array == PALM_ARRAY
+    assert np.array_equal(both.sources["hand"].frames().values[:, 0, 2], np.arange(6))
+    with pytest.raises(ProblemError, match=r"holds 2 sources \(palm, hand\); say which"):
+        both.frames()
+    fingers = taxel.open(bag, topic="/hand", field=["thumb", "index"])
+    assert {name: one.array.shape for name, one in fingers.sources.items()} == {
+        "hand.thumb": (1, 3),
+        "hand.index": (1, 2),
+    }
+    forces = taxel.open(bag, topic="/skin", field="patches.forces.z")
+    assert np.array_equal(forces.frames().values[:, 0], [[0.5, k, 1.5] for k in range(6)])
+    assert forces.verdict == "at the bag's times, as its messages have no header"
+    assert np.array_equal(taxel.open(bag, topic="/skin", field="patches.1.taxels").frames().values[0, 0], [3, 4])
+
+
+def test_messages_of_another_length_are_left_out_and_counted(tmp_path: Path) -> None:
+    lengths = (3, 3, 5, 3, 0, 3)
+    several = [("/hand", HAND, 10 * k + 3, 10 * k, bags.hand(range(n), [1, 1])) for k, n in enumerate(lengths)]
+    bag = bags.write(tmp_path / "grasp.db3", several)
+    for array in (None, taxel.Array(1, 3)):
+        opened = taxel.open(bag, topic="/hand", field="thumb", array=array)
+        assert (opened.counts["messages"], opened.counts["messages_of_another_length"]) == (4, 2)
+        assert opened.verdict == "2 messages of another length left out"
+        assert np.array_equal(opened.frames().t - BEGIN_NS // 1000, [0, 10_000, 30_000, 50_000])
+    with pytest.raises(FormatError, match="thumb: its messages hold 3 values; the array has 2 x 2"):
+        taxel.open(bag, topic="/hand", field="thumb", array=taxel.Array(2, 2))
+
+
+@pytest.mark.parametrize(
+    ("stamps", "late", "expected", "by_the_bag"),
+    [
+        ([1, 11, 21, 31], 2, [1, 11, 21, 31], 0),
+        ([1, None, 21, 31], 2, [1, 13, 21, 31], 1),
+        ([None, 11, 21, 31], 2, [3, 11, 21, 31], 1),
+        ([1, 11, 5, 31], 2, [1, 11, 23, 31], 1),
+        ([1, 11, 11, 31], 2, [1, 11, 23, 31], 1),
+        # The bag's time would come after the next stamp: the median time under way is taken off.
+        ([1, None, 21, 31], 25, [1, 11, 21, 31], 1),
+        # A clock that was set back: what follows continues by the bag.
+        ([1001, 1011, 21, 31], 2, [1001, 1011, 1021, 1031], 2),
+        # No stamp at all, and a stamp far ahead: all by the bag.
+        ([None] * 4, 2, [3, 13, 23, 33], 4),
+        ([1, 1011, 21, 31], 2, [3, 13, 23, 33], 4),
+    ],
+)
+def test_a_stamp_of_0_or_one_that_steps_back_gives_way_to_the_bags_time(
+    stamps, late, expected, by_the_bag, tmp_path
+) -> None:
+    several = [("/palm", PALM, 1 + 10 * k + late, stamp, bags.palm(PALMS[0])) for k, stamp in enumerate(stamps)]
+    opened = taxel.open(bags.write(tmp_path / "grasp.mcap", several), topic="/palm")
+    assert (opened.frames().t - BEGIN_NS // 1000).tolist() == [1000 * ms for ms in expected]
+    assert opened.counts["times_by_the_bag"] == by_the_bag
+    assert (f"{by_the_bag} of 4 messages at the bag's time" in opened.verdict) == (by_the_bag > 0)
+
+
+@given(
+    stamps=st.lists(st.one_of(st.just(0), st.integers(-(10**12), 10**12)), min_size=1, max_size=30),
+    steps=st.lists(st.integers(0, 10**9), min_size=30, max_size=30),
+)
+def test_times_never_fall_and_are_stamps_or_are_counted(stamps, steps) -> None:
+    bag = np.cumsum(steps)[: len(stamps)] + 10**6
+    t, by_the_bag = _times(np.array(stamps, np.int64), bag)
+    assert (np.diff(t) >= 0).all()
+    assert np.count_nonzero(t != stamps) <= by_the_bag
+    if by_the_bag < len(stamps):
+        assert (np.diff(t) > 0).all()
+        assert (t > 0).all() or (np.array(stamps) <= 0).any()
+
+
+def without_definitions(bag: Path) -> Path:
+    """Take the definitions out of a .db3, as releases of ROS before Iron write it."""
+    with sqlite3.connect(bag) as database:
+        database.execute("DELETE FROM message_definitions")
+    database.close()
+    return bag
+
+
+def test_a_bag_without_definitions_names_both_options_and_opens_by_them(tmp_path: Path) -> None:
+    bag = without_definitions(bags.write(tmp_path / "grasp.db3", palms()))
+    (listed,) = ros.topics(bag)
+    assert (listed.messages, listed.trouble) == (6, f"no definition of {PALM}")
+    said = rf"no definition of {PALM} \(topic /palm\); give it by --types DIR .* or by --ros NAME .*humble"
+    with pytest.raises(FormatError, match=said):
+        taxel.open(bag, topic="/palm")
+    (tmp_path / "skins_msgs" / "msg").mkdir(parents=True)
+    own = tmp_path / "skins_msgs" / "msg" / "Palm.msg"
+    own.write_text(bags.DEFINITIONS[PALM])
+    with pytest.raises(FormatError, match=r"no definition of std_msgs/msg/Header .*--ros NAME"):
+        taxel.open(bag, topic="/palm", types=tmp_path / "skins_msgs")
+    flat = tmp_path / "flat"
+    flat.mkdir()
+    shutil.copy(own, flat)
+    for types in (tmp_path / "skins_msgs", tmp_path / "skins_msgs" / "msg", flat):
+        opened = taxel.open(bag, topic="/palm", types=types, ros="humble", array=PALM_ARRAY)
+        assert np.array_equal(opened.frames().values, PALMS)
+    # The bag holds the digest of its definition, so that another one is not taken for it.
+    own.write_text("std_msgs/Header header\nint16[767] taxels\n")
+    with pytest.raises(FormatError, match=f"was recorded with another definition of {PALM}"):
+        taxel.open(bag, topic="/palm", types=tmp_path / "skins_msgs", ros="humble")
+
+
+def test_a_definition_in_idl_opens_a_bag(tmp_path: Path) -> None:
+    bag = without_definitions(bags.write(tmp_path / "grasp.db3", palms()))
+    (tmp_path / "types").mkdir()
+    (tmp_path / "types" / "Palm.idl").write_text(
+        '#include "std_msgs/msg/Header.idl"\n\nmodule skins_msgs {\n  module msg {\n'
+        "    typedef int16 int16__768[768];\n    struct Palm {\n      std_msgs::msg::Header header;\n"
+        "      int16__768 taxels;\n    };\n  };\n};\n"
+    )
+    opened = taxel.open(bag, topic="/palm", types=tmp_path / "types", ros="humble", array=PALM_ARRAY)
+    assert np.array_equal(opened.frames().values, PALMS)
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "said"),
+    [
+        ({}, FormatError, "say what to open of it: --topic NAME --field NAME"),
+        ({"topic": "/foot"}, FormatError, "has no topic /foot; its topics are /hand, /palm"),
+        ({"topic": "/hand"}, FormatError, "topic /hand: say which field .*; there are thumb, index"),
+        ({"topic": "/palm", "field": "thumb"}, FormatError, "field thumb: no field with numbers; there are taxels"),
+        ({"topic": "/hand", "field": "note"}, FormatError, "field note: no field with numbers"),
+        ({"topic": "/palm", "field": "taxels.3"}, FormatError, r"field taxels\.3: no field with numbers"),
+        ({"topic": ["/hand", "/palm"], "field": ["a"] * 3}, ProblemError, "topic: given 2 times for 3 sources"),
+        ({"topic": ["/palm", "/palm"]}, ProblemError, "palm.taxels is chosen twice"),
+        ({"topic": "/palm", "ros": "hubble"}, ProblemError, "ros is hubble: must be one of .*humble"),
+        ({"topic": "/palm", "types": "nowhere"}, ProblemError, "nowhere: no folder with .msg or .idl files"),
+        ({"topic": 3}, ProblemError, "topic is 3"),
+        ({"topic": [3]}, ProblemError, "topic is 3"),
+        ({"topic": "/palm", "array": [3]}, ProblemError, "array is 3"),
+    ],
+)
+def test_what_cannot_be_opened_is_one_clear_error(given, error, said, tmp_path) -> None:
+    several = [*palms(1), ("/hand", HAND, 5, 5, bags.hand([1, 2], [3, 4]))]
+    bag = bags.write(tmp_path / "grasp.mcap", several)
+    with pytest.raises(error, match=said) as raised:
+        taxel.open(bag, **given)
+    assert "\n" not in str(raised.value)
+
+
+def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> None:
+    events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "own.mcap")
+    assert not ros.is_bag(tmp_path / "own.mcap")
+    assert taxel.open(tmp_path / "own.mcap").events == events
+    with pytest.raises(ProblemError, match=r"own\.mcap: a \.mcap; topic, field, types and ros are of a ROS bag"):
+        taxel.open(tmp_path / "own.mcap", topic="/palm")
+
+
+def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:
+    for name in KINDS:
+        bags.write(tmp_path / f"{name[:3]}{KINDS.index(name)}{name[5:]}", palms())
+    (tmp_path / "labels.csv").write_text(f"recording,label,t_us\ngra1,contact,{BEGIN_NS // 1000 + 5000}\n")
+    opened = taxel.open(tmp_path, topic="/palm", array=PALM_ARRAY)
+    assert [one.name for one in opened] == ["gra0.bag", "gra1.db3", "gra2.mcap", "gra3"]
+    assert [len(one.notes) for one in opened] == [0, 1, 0, 0]
+    with pytest.raises(FormatError, match=r"gra2\.mcap: a ROS bag; say what to open"):
+        taxel.open(tmp_path)
+
+
+def test_without_rosbags_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    bag = bags.write(tmp_path / "grasp.bag", palms())
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    with pytest.raises(ImportError, match=r"a ROS bag, and rosbags is not installed: pip install taxel\[ros\]"):
+        taxel.open(bag, topic="/palm")
+    code, _, said = call(capsys, "info", bag)
+    assert (code, "pip install taxel[ros]" in said) == (2, True)
+
+
+@pytest.mark.parametrize("name", KINDS[:3])
+@settings(max_examples=30)
+@given(data=st.data())
+def test_a_damaged_bag_never_crashes(name: str, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory) -> None:
+    bag = bags.write(tmp_path_factory.mktemp("damaged") / name, palms(2))
+    content = bytearray(bag.read_bytes())
+    if data.draw(st.booleans()):
+        del content[data.draw(st.integers(8, len(content) - 1)) :]
+    else:
+        for at in data.draw(st.lists(st.integers(30, len(content) - 1), min_size=1, max_size=5)):
+            content[at] = data.draw(st.integers(0, 255))
+    bag.write_bytes(content)
+    try:
+        opened = taxel.open(bag, topic="/palm", array=PALM_ARRAY)
+    except taxel.Error as error:
+        said = str(error)
+    else:
+        said = name if opened.frames().values.shape[1:] == (24, 32) else "another shape"
+    assert name in said
+    assert "\n" not in said
+
+
+def test_from_a_bag_to_a_detection_on_the_command_line(tmp_path: Path, monkeypatch, capsys) -> None:
+    """Presses of a finger, by the commands that a user types: info, train, detect, convert, encode, cut."""
+    monkeypatch.chdir(tmp_path)
+    values = np.random.default_rng(3).integers(0, 3, (600, 6))
+    begins = range(60, 560, 80)
+    for k in begins:
+        values[k : k + 40, 2:5] += 300
+    several = (("/skin", SKIN, 10 * k, None, bags.skin([(one, [1])])) for k, one in enumerate(values))
+    bags.write(tmp_path / "grasp", several)
+    rows = [f"contact,{BEGIN_NS // 1000 + 10_000 * k}\n" for k in begins]
+    Path("labels.csv").write_text("label,t_us\n" + "".join(rows))
+    finger = ("--topic", "/skin", "--field", "patches.taxels", "--array", "2x3")
+    assert "--topic /skin --field patches.taxels --array ROWSxCOLUMNS" in call(capsys, "info", "grasp")[1]
+    facts = json.loads(call(capsys, "info", "grasp", *finger, "--json")[1])
+    assert (facts["kind"], facts["pictures"], facts["pictures_per_s"]) == ("ros", 600, 100.0)
+    train = call(capsys, "train", "grasp", *finger, "--labels", "labels.csv", "--folds", 0, "-o", "touch.json")
+    assert train[0] == 0, train
+    detect = ("--readout", "touch.json", "--tare", ".5", "--truth", "labels.csv", "--json")
+    score = json.loads(call(capsys, "detect", "grasp", *finger, *detect)[1])["score"]
+    assert (score["found"], score["missed"], score["false"]) == (len(begins), 0, 0)
+    assert call(capsys, "convert", "grasp", "grasp.npz", *finger)[0] == 0
+    assert np.array_equal(taxel.open("grasp.npz").frames().values.reshape(600, 6), values.astype(np.float32))
+    levels = ("--encoder", "level_crossing", "--set", "levels=[4, 8]")
+    assert call(capsys, "encode", "grasp", "spikes.npz", *finger, *levels)[0] == 0
+    assert call(capsys, "cut", "grasp", "part.npz", *finger, "--rows", "0:1")[0] == 0
+    assert taxel.open("part.npz").array.shape == (1, 3)
+    assert call(capsys, "merge", "grasp", "grasp", *finger, "--gap", 1, "-o", "both.npz")[0] == 0
