@@ -115,7 +115,8 @@ def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
     frames = Frames([[[1.0, 2.5]], [[3.0, 4.0]]], [0, 10_000], unit="N", array=array)
     of = Contents(
         tmp_path / "a", "a", "npz", array, source="an amplifier", frames=frames,
-        notes=(Note("heel", 5000), Note("bare")), detections=taxel.Detections(["lift"], [100], [200]), columns=("hip", "knee"), lost=("something",),
+        notes=(Note("heel", 5000), Note("bare")), detections=taxel.Detections(["lift"], [100], [200]),
+        columns=("hip", "knee"), lost=("something",),
     )  # fmt: skip
     lost = taxel.convert(taxel.Recording(of), tmp_path / "a.mcap")
     assert lost == ["something"]
