@@ -1,4 +1,4 @@
-"""The live panel: pictures a second beside 99 other clients, CPU of the server's thread, seeking and opening recordings.
+"""The live panel: pictures a second beside 99 other clients, CPU of the server, seeking and opening recordings.
 
 Sender and clients share this machine, over loopback, the sender a process of its own. The fast client reads all
 messages and sends a credit for each picture; half of the others request pictures and never read. CPU is of

@@ -1,4 +1,4 @@
-"""Recordings of pictures in the panel: all that taxel opens, at their own rate, in their unit, as a client sees them."""
+"""Recordings of pictures in the panel: all that taxel opens, at their rate, in their unit, as a client sees them."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_pictures_without_times_are_numbered(tmp_path):
         values, _ = values_at(page, about, 2 * us)
         assert np.array_equal(values[0], [6, 7, 8])
         assert page.ask("mark", label="slip", t_us=2 * us + 5)["type"] == "done"
-        assert page.until("labels")["labels"][0]["t_us"] == 2 * us
+        assert page.since_asked("labels")["labels"][0]["t_us"] == 2 * us
         assert page.ask("cut", start_us=us, stop_us=3 * us, name="part.npz")["type"] == "done"
     assert (tmp_path / "grasp.notes.csv").read_text() == "label,t_us\nslip,2\n"
     assert [note.t for note in taxel.open(tmp_path / "grasp.npz").notes if note.text == "slip"] == [2]
@@ -186,8 +186,8 @@ def test_what_is_no_recording_is_refused_at_once(tmp_path):
     (tmp_path / "notes.txt").write_text("bread, milk\n")
     with pytest.raises(taxel.FormatError, match="no recording"):
         Panel(tmp_path / "notes.txt")
+    (tmp_path / "empty").mkdir()
     with pytest.raises(taxel.ProblemError, match="holds no recording"):
-        (tmp_path / "empty").mkdir()
         Panel(tmp_path / "empty")
 
 
