@@ -23,7 +23,7 @@ def numpy_moments(frames: Frames, tare: Tare) -> list[Any]:
     spaced = [np.geomspace(*RANGES[name], LEVELS) for name in ("area", "total", "peak", "displacement_mm")]
     which = np.repeat([0, 1, 2, 3, 3, 4, 4], LEVELS)
     levels = np.concatenate([*spaced, -spaced[3], spaced[3], -spaced[3]])
-    loaded_from, pitch = tare.rest + FLOOR + 0.5, frames.array.pitch_mm
+    loaded_from, pitch = tare.rest + FLOOR + 0.5, frames.array.column_mm
     y, x = np.mgrid[: frames.array.rows, : frames.array.columns]
     spikes, before, origin = [], None, None
     for t, picture in zip(frames.t, frames.values, strict=True):

@@ -16,7 +16,7 @@ import numpy as np
 from _rounds import stamp
 
 from taxel import SpikeTrains
-from taxel.detect.training import learner_from
+from taxel.detect.recipe import learner_from
 from taxel.learn import ConeR, OnlineConeR
 from taxel.neuron import Neuron
 from taxel_studies.gait.recipes import NOTES

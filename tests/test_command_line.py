@@ -64,6 +64,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (("record", "there.mcap"), "there.mcap: exists already; give --overwrite, or name another"),
         (("record", "--trials", "3", "a.mcap"), "--trials without --length"),
         (("record",), "FILE is missing; see taxel record --help"),
+        (("convert", "walk.npz"), "TARGET is missing; see taxel convert --help"),
+        (("cut", "walk.npz", "a.npz", "-o", "b.npz"), "OUT is given twice: a.npz and b.npz"),
         (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
         (("bogus",), "No such command 'bogus'; see taxel --help"),
         (
@@ -119,6 +121,15 @@ def test_an_error_names_what_was_typed(here: Path, capsys, arguments: tuple[str,
 def test_an_existing_file_is_not_replaced_by_a_result(capsys) -> None:
     call(capsys, "train", "walk.npz", "--labels", "labels.csv", "-o", "there.json")
     assert Path("there.json").read_text() == "{}"
+
+
+@pytest.mark.usefixtures("here")
+def test_o_says_where_output_goes_too(capsys) -> None:
+    for where in (("a.npz",), ("-o", "b.npz"), ("--out", "c.npz")):
+        assert call(capsys, "convert", "walk.npz", *where)[0] == 0
+    assert Path("a.npz").read_bytes() == Path("b.npz").read_bytes() == Path("c.npz").read_bytes()
+    assert call(capsys, "cut", "-o", "part.npz", "walk.npz", "--rows", "0:2")[0] == 0
+    assert taxel.open("part.npz").array.rows == 2
 
 
 def test_exit_codes_are_those_of_the_docs() -> None:

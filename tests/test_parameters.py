@@ -32,6 +32,7 @@ KINDS = sorted(set(of(Parameters)), key=lambda kind: kind.__name__)
 #: Values for parameters without a default.
 REQUIRED: dict[str, Any] = {
     "levels": [1.0],
+    "parts": {"area": taxel.encode.ContactArea()},
     "eta": 0.1,
     "epochs": 5,
     "updates": "batch",
@@ -157,7 +158,7 @@ def test_parameters_go_round(kind):
 def test_a_wrong_value_changes_nothing(kind):
     one = make(kind)
     known = described(kind._kind)
-    before, name = one.get_params(), next(iter(known["ranges"] or known["defaults"]))
+    before, name = one.get_params(), next(iter(known["ranges"] or known["defaults"] or known["required"]))
     for nonsense in ({name: math.nan}, {name: object()}, {"nonsense": 1}, {f"{name}__nonsense": 1}, {"__": 1}):
         with pytest.raises(taxel.ProblemError):
             one.set_params(**nonsense)

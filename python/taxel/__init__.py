@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from taxel._base.drawing import draw_by
 from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
-from taxel.array import Array
+from taxel.array import Array, Places
 from taxel.calibration import Calibration, Load
 from taxel.clock import Clock
 from taxel.detections import Detection, Detections
@@ -47,6 +47,7 @@ __all__ = [
     "Neuron",
     "NotFittedError",
     "Note",
+    "Places",
     "ProblemError",
     "Readout",
     "Recording",

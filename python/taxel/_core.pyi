@@ -31,8 +31,10 @@ def check_parameters(of: str, parameters: str) -> str: ...
 
 # nouns: parts as the nouns' `_parts()` give them, and as their `_from_parts()` take them
 
-#: rows, columns, pitch in mm, name, which taxels exist
-_Array = tuple[int, int, float, str, list[bool] | None]
+#: places: x, y, areas, whether they are in mm
+_Places = tuple[list[float], list[float], list[float] | None, bool]
+#: rows, columns, pitch in mm (rows, columns), name, which taxels exist, places
+_Array = tuple[int, int, tuple[float, float] | None, str, list[bool] | None, _Places | None]
 #: array, t, x, y, p, (intensity, present), repaired, markers as (t, start)
 _Events = tuple[
     _Array,

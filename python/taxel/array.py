@@ -2,56 +2,154 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taxel import _core
 from taxel._base.arguments import instance, number, numbers, shown, text, whole
 from taxel._core import ProblemError
 
-__all__ = ["Array"]
+__all__ = ["Array", "Places"]
+
+#: The pitch, mm, that a file states where nobody knew it, from before a pitch could be unknown.
+_UNKNOWN_MM = 1.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Places:
+    """Hold the place of each taxel of a sensor whose taxels are not evenly apart.
+
+    Parameters
+    ----------
+    x, y : float64, shape (rows, columns) or (taxels,), in `unit`
+        To the right and downwards from any origin; finite. What is given for a taxel that does not exist is not used.
+    area : float64, of the same shape, in the square of `unit`, above 0, optional
+        The area of each taxel, if it is known.
+    unit : {"mm"}, optional
+        Default: unknown. Places without a unit are drawn and give a centre in their own units.
+
+    Raises
+    ------
+    ProblemError : `x`, `y` and `area` of different shapes, or another unit
+
+    Examples
+    --------
+    >>> Places([0.0, 10.0, 5.0], [0.0, 0.0, 8.0], unit="mm")
+    Places(3 taxels, in mm, areas unknown)
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    area: NDArray[np.float64] | None = None
+    unit: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "area"):
+            if getattr(self, name) is None and name == "area":
+                continue
+            values = numbers(name, getattr(self, name), np.float64).copy()
+            if values.ndim not in (1, 2) or values.shape != np.shape(self.x):
+                raise ProblemError(f"{name} has shape {values.shape}: must be one a taxel, as x, {np.shape(self.x)}")
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
+        if self.unit is not None:
+            text("unit", self.unit, ("mm",))
+
+    def _on(self, array: Array) -> Places:
+        """Return the places in the shape of an array, which must be finite where a taxel exists."""
+        there = array._there()
+        changed: dict[str, NDArray[np.float64]] = {}
+        for name in ("x", "y", "area"):
+            values = getattr(self, name)
+            if values is None:
+                continue
+            if values.size != there.size or (values.ndim == 2 and values.shape != there.shape):
+                raise ProblemError(f"places: {name} has shape {values.shape}: must be {array.shape}, one a taxel")
+            # Files hold no NaN.
+            values = np.where(there, values.reshape(there.shape), float(name == "area"))
+            wrong = ~np.isfinite(values) | ((values <= 0) if name == "area" else False)
+            if wrong.any():
+                row, column = np.argwhere(wrong)[0]
+                right = "above 0 and finite" if name == "area" else "finite"
+                value = values[row, column]
+                raise ProblemError(f"places: {name} of row {row}, column {column} is {value}: must be {right}")
+            changed[name] = values
+        return Places(changed["x"], changed["y"], changed.get("area"), self.unit)
+
+    def _part(self, rows: slice, columns: slice) -> Places:
+        """Return the places of a rectangle."""
+        parts = (None if v is None else v[rows, columns] for v in (self.x, self.y, self.area))
+        return Places(*parts, unit=self.unit)  # type: ignore[arg-type]
+
+    def _json(self) -> dict[str, Any]:
+        areas = {} if self.area is None else {"area": self.area.ravel().tolist()}
+        return {"x": self.x.ravel().tolist(), "y": self.y.ravel().tolist(), **areas, "unit": self.unit}
+
+    def __eq__(self, other: object) -> bool:
+        return self._json() == other._json() if isinstance(other, Places) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash((self.x.size, self.unit))
+
+    def __repr__(self) -> str:
+        unit = "in mm" if self.unit else "without a unit"
+        return f"Places({self.x.size} taxels, {unit}, areas {'unknown' if self.area is None else 'known'})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Array:
-    """Describe a sensor: rows, columns, the pitch of its taxels, and which of them exist.
+    """Describe a sensor: rows, columns, how far apart or where its taxels are, and which of them exist.
 
     A taxel's index is ``row * columns + column``; x is the column, y the row.
 
     Parameters
     ----------
     rows, columns : int, 1 or more
-    pitch_mm : float, above 0
-        Distance between the centres of neighbouring taxels.
+    pitch_mm : float or (float, float), mm, above 0, optional
+        Distance between the centres of neighbouring taxels, or that between rows and that between columns. Default:
+        unknown. Without it nothing is in mm.
     exists : bool, shape (rows, columns), optional
         Which taxels exist; default: all.
     name : str
+    places : Places, optional
+        The place of each taxel, instead of a pitch.
 
     Raises
     ------
-    ProblemError : no row or column, a pitch that is not above 0, or `exists` of another shape
+    ProblemError : no row or column, a pitch that is not above 0, `exists` or `places` of another shape, or both a pitch
+        and places
+
+    Notes
+    -----
+    A grid, with rows and columns both above 1, has a map even if its pitch is unknown: its centre of pressure is in
+    columns and rows, its contact area a number of taxels. A single row or column with neither pitch nor places are
+    channels: they have curves, and no map, centre or area.
 
     Examples
     --------
     >>> Array(64, 64, pitch_mm=2.67, name="thesis")
     Array(thesis: 64 rows x 64 columns, 4096 taxels, 2.67 mm apart)
+    >>> Array(48, 32, pitch_mm=(7.62, 5.08), name="plate")
+    Array(plate: 48 rows x 32 columns, 1536 taxels, rows 7.62 mm and columns 5.08 mm apart)
+    >>> Array(1, 8, name="foot")
+    Array(foot: 1 rows x 8 columns, 8 taxels, of unknown pitch)
     """
 
     rows: int
     columns: int
-    pitch_mm: float = 1.0
+    pitch_mm: float | tuple[float, float] | None = None
     exists: NDArray[np.bool_] | None = None
     name: str = "array"
+    places: Places | None = None
 
     def __post_init__(self) -> None:
         for field in ("rows", "columns"):
             object.__setattr__(self, field, whole(field, getattr(self, field), 1, 65_535))
-        pitch = number("pitch_mm", self.pitch_mm, "mm")
-        if not (np.isfinite(pitch) and pitch > 0):
-            raise ProblemError(f"pitch_mm is {shown(self.pitch_mm)}: must be above 0 and finite")
-        object.__setattr__(self, "pitch_mm", pitch)
+        object.__setattr__(self, "pitch_mm", None if self.pitch_mm is None else _pitch(self.pitch_mm))
         text("name", self.name)
         if self.exists is not None:
             exists = numbers("exists", self.exists, np.bool_).copy()
@@ -59,6 +157,10 @@ class Array:
                 raise ProblemError(f"exists has shape {exists.shape}: must be {self.shape}")
             exists.setflags(write=False)
             object.__setattr__(self, "exists", exists)
+        if self.places is not None:
+            if self.pitch_mm is not None:
+                raise ProblemError("pitch_mm and places are both given: give one of them")
+            object.__setattr__(self, "places", instance("places", self.places, Places)._on(self))
 
     @classmethod
     def thesis(cls) -> Array:
@@ -146,25 +248,189 @@ class Array:
             limits.append((first, last))
         return limits[0], limits[1]
 
-    def _parts(self) -> tuple[int, int, float, str, list[bool] | None]:
+    @property
+    def row_mm(self) -> float:
+        """The distance between the centres of neighbouring rows, mm.
+
+        Raises
+        ------
+        ProblemError : the pitch is not known
+        """
+        return self._pitch("row_mm")[0]
+
+    @property
+    def column_mm(self) -> float:
+        """The distance between the centres of neighbouring columns, mm.
+
+        Raises
+        ------
+        ProblemError : the pitch is not known
+        """
+        return self._pitch("column_mm")[1]
+
+    @property
+    def area_mm2(self) -> NDArray[np.float64] | None:
+        """The area of each taxel, mm2, shape (rows, columns); None if it is not known.
+
+        Examples
+        --------
+        >>> Array(1, 2, pitch_mm=(2.0, 3.0)).area_mm2, Array(1, 2).area_mm2
+        (array([[6., 6.]]), None)
+        """
+        if self.pitch_mm is not None:
+            return np.full(self.shape, self.row_mm * self.column_mm)
+        in_mm = self.places is not None and self.places.unit == "mm"
+        return self.places.area if in_mm and self.places is not None else None
+
+    @property
+    def is_channels(self) -> bool:
+        """Whether it is a single row or column with neither pitch nor places, which has no map, centre or area.
+
+        Examples
+        --------
+        >>> Array(1, 8).is_channels, Array(1, 8, pitch_mm=5.0).is_channels, Array(2, 4).is_channels
+        (True, False, False)
+        """
+        return not self._is_measured and min(self.shape) == 1
+
+    @property
+    def centre_unit(self) -> str | None:
+        """The unit of a centre of pressure: "mm", "taxels" (columns and rows) or "places" (those without a unit).
+
+        None of channels, which have no centre.
+        """
+        if self.places is not None:
+            return self.places.unit or "places"
+        if self.pitch_mm is not None:
+            return "mm"
+        return None if self.is_channels else "taxels"
+
+    def positions(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return where the taxels are: x to the right and y downwards, in `centre_unit`.
+
+        Returns
+        -------
+        float64, shape (rows, columns), twice
+            On a grid from the middle of the taxel in the first column and row.
+
+        Raises
+        ------
+        ProblemError : channels
+
+        Examples
+        --------
+        >>> Array(1, 3, pitch_mm=5.0).positions()[0]
+        array([[ 0.,  5., 10.]])
+        """
+        if self.places is not None:
+            return self.places.x, self.places.y
+        if self.is_channels:
+            raise ProblemError(
+                f"{self.name}: {self.rows} x {self.columns} channels without a pitch or places; they have no position"
+            )
+        down, across = (1.0, 1.0) if self.pitch_mm is None else (self.row_mm, self.column_mm)
+        y, x = np.indices(self.shape, dtype=np.float64)
+        return x * across, y * down
+
+    def fits(self, other: Array) -> bool:
+        """Return whether what was measured or trained on one sensor can be used on another.
+
+        Parameters
+        ----------
+        other : Array
+
+        Returns
+        -------
+        bool
+            Whether both have the same rows, columns and taxels; neither name nor pitch nor places count.
+
+        Raises
+        ------
+        ProblemError : no array
+
+        Examples
+        --------
+        >>> Array(8, 8, pitch_mm=2.67).fits(Array(8, 8)), Array(8, 8).fits(Array(8, 9))
+        (True, False)
+        """
+        instance("other", other, Array)
+        return self.shape == other.shape and np.array_equal(self._there(), other._there())
+
+    def _warn_apart(self, other: Array, what: str, stacklevel: int = 2) -> bool:
+        """Warn, and return true, if another sensor's known pitch or places differ, for which nothing is refused."""
+        known = self._is_measured and other._is_measured
+        if not known or (self.pitch_mm, self.places) == (other.pitch_mm, other.places):
+            return False
+        own, its = self._apart(), other._apart()
+        differ = f"its taxels {its}, not {own}" if own != its else "its taxels at other places"
+        warnings.warn(f"{what}: {other.name} has {differ} as {self.name}", stacklevel=stacklevel + 1)
+        return True
+
+    def _part(self, x: slice, y: slice) -> Array:
+        """Return a rectangle of columns `x` and rows `y`, which holds a taxel, as a sensor of its own."""
+        (left, right), (top, bottom) = self.region(x, y)
+        rows, columns = slice(top, bottom), slice(left, right)
+        exists = None if self.exists is None else self.exists[rows, columns]
+        places = None if self.places is None else self.places._part(rows, columns)
+        return Array(bottom - top, right - left, self.pitch_mm, exists, self.name, places)
+
+    @property
+    def _is_measured(self) -> bool:
+        """Whether its pitch or places are known."""
+        return self.pitch_mm is not None or self.places is not None
+
+    def _there(self) -> NDArray[np.bool_]:
+        """Return which taxels exist, shape (rows, columns)."""
+        return np.ones(self.shape, bool) if self.exists is None else self.exists
+
+    def _pitch(self, what: str) -> tuple[float, float]:
+        """Return the distances between rows and between columns, mm, for `what` that needs them."""
+        pitch = self.pitch_mm
+        if pitch is None:
+            raise ProblemError(f"{what} needs mm, and the pitch of {self.name} is not known: give its pitch_mm")
+        return pitch if isinstance(pitch, tuple) else (pitch, pitch)
+
+    def _apart(self) -> str:
+        """Return in words how far apart the taxels are."""
+        if self.places is not None:
+            return f"at places {'in mm' if self.places.unit else 'without a unit'}"
+        if isinstance(self.pitch_mm, tuple):
+            return f"rows {self.pitch_mm[0]:g} mm and columns {self.pitch_mm[1]:g} mm apart"
+        return "of unknown pitch" if self.pitch_mm is None else f"{self.pitch_mm:g} mm apart"
+
+    def _parts(self) -> _core._Array:
         """Return the fields as the compiled part reads them."""
         exists = None if self.exists is None else [bool(e) for e in self.exists.ravel()]
-        return self.rows, self.columns, self.pitch_mm, self.name, exists
+        pitch = None if self.pitch_mm is None else self._pitch("")
+        of = self.places
+        lists = None if of is None else (of.x.ravel().tolist(), of.y.ravel().tolist())
+        areas = None if of is None or of.area is None else of.area.ravel().tolist()
+        places = None if of is None or lists is None else (*lists, areas, of.unit == "mm")
+        return self.rows, self.columns, pitch, self.name, exists, places
 
     @classmethod
-    def _from_parts(cls, parts: tuple[int, int, float, str, list[bool] | None]) -> Array:
-        rows, columns, pitch_mm, name, exists = parts
+    def _from_parts(cls, parts: _core._Array) -> Array:
+        rows, columns, pitch_mm, name, exists, of = parts
         grid = None if exists is None else np.array(exists).reshape(rows, columns)
-        return cls(rows, columns, pitch_mm, grid, name)
+        places = None if of is None else Places(of[0], of[1], of[2], "mm" if of[3] else None)  # type: ignore[arg-type]
+        return cls(rows, columns, pitch_mm, grid, name, places)
 
     def _geometry(self) -> dict[str, Any]:
-        """Return the array as JSON values."""
-        return dict(zip(("rows", "columns", "pitch_mm", "name", "exists"), self._parts(), strict=True))
+        """Return the array as JSON values; a pitch of 1 mm is a pair, as a single 1 in a file is an unknown one."""
+        rows, columns, _, name, exists, _ = self._parts()
+        pitch = self.pitch_mm if self.pitch_mm != _UNKNOWN_MM else (_UNKNOWN_MM, _UNKNOWN_MM)
+        parts = {"rows": rows, "columns": columns, "pitch_mm": pitch, "name": name, "exists": exists}
+        return parts if self.places is None else parts | {"places": self.places._json()}
 
     @classmethod
     def _from_geometry(cls, geometry: dict[str, Any]) -> Array:
-        parts = (geometry[name] for name in ("rows", "columns", "pitch_mm", "name"))
-        return cls._from_parts((*parts, geometry.get("exists")))
+        """Return the array that a file describes."""
+        pitch = geometry.get("pitch_mm")
+        pitch = tuple(pitch) if isinstance(pitch, list) else None if pitch == _UNKNOWN_MM else pitch
+        rows, columns, name = (geometry[field] for field in ("rows", "columns", "name"))
+        exists, places = geometry.get("exists"), geometry.get("places")
+        grid = None if exists is None else np.array(exists).reshape(rows, columns)
+        return cls(rows, columns, pitch, grid, name, None if places is None else Places(**places))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Array):
@@ -175,7 +441,17 @@ class Array:
         return hash((self.rows, self.columns, self.pitch_mm, self.name))
 
     def __repr__(self) -> str:
-        return (
-            f"Array({self.name}: {self.rows} rows x {self.columns} columns, {self.taxels} taxels, "
-            f"{self.pitch_mm:g} mm apart)"
-        )
+        size = f"{self.rows} rows x {self.columns} columns, {self.taxels} taxels"
+        return f"Array({self.name}: {size}, {self._apart()})"
+
+
+def _pitch(pitch: object) -> float | tuple[float, float]:
+    """Return a pitch as one number, or as a pair if its two numbers differ."""
+    pair = isinstance(pitch, tuple | list) or (isinstance(pitch, np.ndarray) and pitch.ndim > 0)
+    if pair and len(pitch) != 2:  # type: ignore[arg-type]
+        raise ProblemError(f"pitch_mm is {shown(pitch)}: must be a number, or two, that of rows and that of columns")
+    values = list(pitch) if pair else [pitch]  # type: ignore[call-overload]
+    each = [number("pitch_mm", value, "mm") for value in values]
+    if not all(np.isfinite(one) and one > 0 for one in each):
+        raise ProblemError(f"pitch_mm is {shown(pitch)}: must be above 0 and finite")
+    return each[0] if each[0] == each[-1] else (each[0], each[1])

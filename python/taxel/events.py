@@ -247,7 +247,7 @@ class Events(Columns):
         """
         if not isinstance(other, Events):
             return NotImplemented
-        if self.array != other.array:
+        if not self.array.fits(other.array):
             raise ProblemError(f"events of {self.array!r} and of {other.array!r}: only those of one array are merged")
         both = (self, other)
         ticks = present = None

@@ -178,14 +178,12 @@ class Frames(Columns):
         """
         columns, rows = self.array.region(x, y)
         values = self.values[:, slice(*rows), slice(*columns)]
-        exists = None if self.array.exists is None else self.array.exists[slice(*rows), slice(*columns)]
         if 0 in values.shape[1:]:
             raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} lies in it")
-        array = Array(values.shape[1], values.shape[2], self.array.pitch_mm, exists, self.array.name)
-        return Frames(values, self.t, unit=self.unit, array=array)
+        return Frames(values, self.t, unit=self.unit, array=self.array._part(x, y))
 
     def area(self, above: float = 0.0) -> NDArray[np.float64]:
-        """Return the contact area of each picture, mm2: the pitch squared for each taxel that reads more than `above`.
+        """Return the contact area of each picture, mm2: that of each taxel that reads more than `above`.
 
         Parameters
         ----------
@@ -199,7 +197,7 @@ class Frames(Columns):
 
         Raises
         ------
-        ProblemError : a level below 0, or taxels whose pitch is not known
+        ProblemError : a level that is no number, or taxels whose area is not known (`loaded` counts them)
 
         Examples
         --------
@@ -207,7 +205,37 @@ class Frames(Columns):
         >>> frames.area(), frames.peak(), frames.total(), frames.centre()
         (array([200.]), array([6.]), array([8.]), array([[17.5,  0. ]]))
         """
-        return np.asarray(self.array.pitch_mm**2 * np.count_nonzero(self._loaded(above), axis=(1, 2)))
+        areas = self.array.area_mm2
+        if areas is None:
+            raise ProblemError(
+                f"area needs mm2, and that of a taxel of {self.array!r} is not known; count them: loaded()"
+            )
+        if self.array.places is None:
+            return np.asarray(areas.flat[0] * self.loaded(above))
+        return np.asarray(np.where(self._loaded(above), areas, 0.0).sum(axis=(1, 2)))
+
+    def loaded(self, above: float = 0.0) -> NDArray[np.int64]:
+        """Return the number of taxels of each picture that read more than `above`.
+
+        Parameters
+        ----------
+        above : float, in the pictures' unit
+            As of `area`.
+
+        Returns
+        -------
+        int64, shape (n,)
+
+        Raises
+        ------
+        ProblemError : a level that is no number
+
+        Examples
+        --------
+        >>> Frames([[[0.0, 2.0, 6.0]]], [0]).loaded()
+        array([2])
+        """
+        return np.asarray(np.count_nonzero(self._loaded(above), axis=(1, 2)), np.int64)
 
     def peak(self) -> NDArray[np.float64]:
         """Return the largest value of each picture, in the pictures' unit; shape (n,)."""
@@ -218,7 +246,7 @@ class Frames(Columns):
         return np.asarray(self.values.sum(axis=(1, 2), dtype=np.float64))
 
     def centre(self, above: float = 0.0) -> NDArray[np.float64]:
-        """Return the centre of pressure of each picture, mm.
+        """Return the centre of pressure of each picture, in the array's `centre_unit`: mm if they are known.
 
         Parameters
         ----------
@@ -229,20 +257,32 @@ class Frames(Columns):
         -------
         float64, shape (n, 2), mm
             x to the right and y downwards from the middle of the taxel in the first column and row; NaN if no taxel
-            counts.
+            counts. In columns and rows ("taxels") on a grid of unknown pitch; of places in their unit and from their
+            origin.
 
         Raises
         ------
-        ProblemError : a level below 0, or taxels whose pitch is not known
+        ProblemError : a level below 0, or channels, which have no centre
+
+        Examples
+        --------
+        >>> Frames([[[0.0, 2.0], [0.0, 2.0]]], [0]).centre()
+        array([[1. , 0.5]])
         """
         if not number("above", above) >= 0:
             raise ProblemError(f"above is {shown(above)}: must be 0 or more, as values are weights")
         weights = np.where(self._loaded(above), self.values, 0.0)
+        x, y = self.array.positions()
         across, down = weights.sum(axis=1, dtype=np.float64), weights.sum(axis=2, dtype=np.float64)
-        moments = np.stack([across @ np.arange(self.array.columns), down @ np.arange(self.array.rows)], axis=1)
+        if self.array.places is None:
+            pitch = self.array._pitch("centre") if self.array.pitch_mm is not None else (1.0, 1.0)
+            moments = np.stack([across @ np.arange(self.array.columns), down @ np.arange(self.array.rows)], axis=1)
+            moments = moments * pitch[::-1]
+        else:
+            moments = np.einsum("nij,kij->nk", weights, np.stack([x, y]), dtype=np.float64)
         total = across.sum(axis=1)[:, None]
         centre = np.full(moments.shape, np.nan)
-        np.divide(moments * self.array.pitch_mm, total, out=centre, where=total > 0)
+        np.divide(moments, total, out=centre, where=total > 0)
         return centre
 
     def _above(self, rest: NDArray[np.float64]) -> Frames:

@@ -110,9 +110,12 @@ class Tare:
         ProblemError : pictures of an array of another shape
         """
         instance("frames", frames, Frames)
-        if frames.array.shape != self.array.shape:
+        if not self.array.fits(frames.array):
             (rows, columns), (of_rows, of_columns) = frames.array.shape, self.array.shape
-            raise ProblemError(f"pictures of {rows} x {columns} taxels: the tare is of {of_rows} x {of_columns}")
+            others = ", of which others exist" if frames.array.shape == self.array.shape else ""
+            of = f"{of_rows} x {of_columns}{others}"
+            raise ProblemError(f"pictures of {rows} x {columns} taxels: the tare is of {of}")
+        self.array._warn_apart(frames.array, "the pictures")
         return frames._above(np.where(np.isnan(self.rest), np.inf, self.rest))
 
     @classmethod

@@ -195,7 +195,7 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator,
     height = condition.height_mm + rng.normal(0, p["height_sd_mm"])
     fall_ms = float(np.sqrt(2 * height / 9.81e-3))
     array = Array.thesis()
-    x, y = ((n - 1) * array.pitch_mm / 2 + rng.normal(0, p["place_sd_mm"]) for n in (array.columns, array.rows))
+    x, y = ((n - 1) * array.column_mm / 2 + rng.normal(0, p["place_sd_mm"]) for n in (array.columns, array.rows))
     gives = {} if rig.stiffness_n_mm is None else {"stiffness_n_mm": rig.stiffness_n_mm}
     return Scene(
         {

@@ -38,13 +38,13 @@ _FINE, _STEPS, _STATED_MM = 4, 16, 2.29
 @cache
 def _layer(modulus_kpa: float, thickness_mm: float) -> Layer:
     side = 8 * _FINE
-    grid = Array(side, side, pitch_mm=ARRAY.pitch_mm / _FINE, name="foam")
+    grid = Array(side, side, pitch_mm=ARRAY.column_mm / _FINE, name="foam")
     return Layer({"modulus_kpa": modulus_kpa, "thickness_mm": thickness_mm}, grid)
 
 
 def _gap(diameter_mm: float, x_mm: float, y_mm: float) -> Values:
     """Return how far a sphere's face lies above its lowest point, mm, at each point of the foam."""
-    at = (np.arange(8 * _FINE) + 0.5) * ARRAY.pitch_mm / _FINE - 4 * ARRAY.pitch_mm
+    at = (np.arange(8 * _FINE) + 0.5) * ARRAY.column_mm / _FINE - 4 * ARRAY.column_mm
     away = (at[None, :] - x_mm) ** 2 + (at[:, None] - y_mm) ** 2
     radius = diameter_mm / 2
     return radius - np.sqrt(np.clip(radius**2 - away, 0.0, None))
@@ -84,7 +84,7 @@ def read(p: Mapping[str, Any], depths: Values, pressures: Values, course_mm: Val
     Fabric conducts by pressure: a crossing of n times the area is n crossings side by side. The taxels' spread is of
     the array, the noise of the trial.
     """
-    times = (ARRAY.pitch_mm / _STATED_MM) ** 2
+    times = (ARRAY.column_mm / _STATED_MM) ** 2
     gain = np.exp(p["gain_spread"] * np.random.default_rng(3).standard_normal(ARRAY.shape))
     fabric = Fabric()
     # kPa mm^2 is mN; conductances of the course's depths, then straight between them.

@@ -106,7 +106,7 @@ def realise(params: dict[str, Any], seed: int, courses: Path) -> Any:
     if drops is not None:
         return drops
     spikes, y = _spikes(params, seed, courses, aligned=params["ask"] != "any phase")
-    period, tau, pitch = params["period_ms"], params["tau_ms"], Array.thesis().pitch_mm
+    period, tau, pitch = params["period_ms"], params["tau_ms"], Array.thesis().column_mm
     if params["ask"] == "search":
         kernels = [dropped.smoothed(REGION, pitch, sigma) for sigma in params["sigmas_mm"]]
         grams = dropped.spatial_grams(spikes, period, tau, kernels, [spikes.shape[1]])

@@ -81,7 +81,7 @@ def played(p: Parameters, seed: int) -> Play:
 
 def _scene(rng: np.random.Generator, same: bool) -> Scene:
     array = Array.thesis()
-    width = (array.columns - 1) * array.pitch_mm
+    width = (array.columns - 1) * array.column_mm
     if same:
         x, y = width / 2 - ASIDE_MM + rng.normal(0, 1, 2)
         radius, height = 30.0, 150 + rng.normal(0, 2)

@@ -143,7 +143,7 @@ def test_a_stale_figure_is_marked_on_the_page(tmp_path: Path) -> None:
         ("taxel._core.neuron_run", {"fig6.1", "fig6.9", "fig6.11"}, {"fig4.3", "drops"}),
         ("taxel._core.circuit_volts", {"fig4.6"}, {"fig6.1", "stdp"}),
         ("taxel.learn.cone_x", {"fig6.9", "fig6.7"}, {"fig4.3", "drops", "codes"}),
-        ("taxel/detect/recipes/touch_kind.toml", {"touch"}, {"fig6.1", "fig6.9"}),
+        ("taxel/detect/recipes/touch.toml", {"touch"}, {"fig6.1", "fig6.9"}),
     ],
 )
 def test_a_change_makes_those_stale_that_use_it(changed: str, stale: set[str], counts: set[str]) -> None:

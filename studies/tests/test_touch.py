@@ -7,7 +7,7 @@ import pytest
 
 import taxel
 from taxel.detect import Recipe, recipes
-from taxel_studies import touch
+from taxel_studies import touch, touch_rivals
 
 
 def test_the_discriminant_finds_the_direction_of_two_clouds() -> None:
@@ -20,7 +20,7 @@ def test_the_discriminant_finds_the_direction_of_two_clouds() -> None:
     def cloud(of: np.ndarray) -> np.ndarray:
         return (rng.normal(size=(len(of), 400)) + np.outer(of, move)).astype(np.float32)
 
-    tell, new = touch._lda(cloud(classes), classes), cloud(classes)
+    tell, new = touch_rivals.lda(cloud(classes), classes), cloud(classes)
     best = ((new - move / 2) @ move > 0) == classes
     assert np.mean(tell(new) == classes) > np.mean(best) - 0.1
     for kind in (0, 1):
@@ -42,8 +42,8 @@ def test_the_discriminant_knows_at_other_places_what_it_learnt_at_some() -> None
             pictures.append(taxel.Frames(value[None], [0], unit="ticks"))
         return pictures
 
-    tell = touch._lda(touch._around(felt(0, 30)), kinds)
-    assert np.mean(tell(touch._around(felt(34, 63))) == kinds) > 0.9
+    tell = touch_rivals.lda(touch_rivals.around(felt(0, 30)), kinds)
+    assert np.mean(tell(touch_rivals.around(felt(34, 63))) == kinds) > 0.9
 
 
 def test_the_picture_around_a_touch_has_its_centre_in_the_middle_and_nothing_beyond_the_edge() -> None:
@@ -51,7 +51,7 @@ def test_the_picture_around_a_touch_has_its_centre_in_the_middle_and_nothing_bey
     values[0, 3:6, 30:33] = 9.0
     values[1, 0, 0] = 9.0
     values[2, 10, 20] = 3.0  # not loaded: the middle of the array is used
-    inside, corner, nothing = touch._around([taxel.Frames(values, [0, 1, 2], unit="ticks")]).reshape(3, 16, 16)
+    inside, corner, nothing = touch_rivals.around([taxel.Frames(values, [0, 1, 2], unit="ticks")]).reshape(3, 16, 16)
     assert np.argwhere(inside).mean(axis=0).tolist() == [8.0, 8.0]
     assert np.count_nonzero(inside) == 9
     assert np.argwhere(corner).tolist() == [[8, 8]]
@@ -67,7 +67,7 @@ def test_the_best_rule_is_the_feature_that_differs() -> None:
     rng = np.random.default_rng(2)
     kinds = np.arange(40) % 2
     sets = [[felt(20 + 30 * kind + rng.normal(0, 2)) for kind in kinds] for _ in range(2)]
-    name, answers = touch._best_rule(sets, kinds)
+    name, answers = touch_rivals.best_rule(sets, kinds)
     assert "peak" in name or "total" in name
     assert (answers == kinds).all()
 
@@ -90,11 +90,11 @@ def test_scenes_come_back_from_their_files_with_their_labels(tmp_path) -> None:
 def test_the_recipe_is_chosen_for_events_and_has_a_neuron_for_every_label() -> None:
     events = taxel.Events([0], [0], [0], [1], array=taxel.Array(2, 2), intensity=[5])
     labels = ["contact", "Lift", "ball"]
-    assert recipes.fitting(events, labels) == "touch_kind"
-    recipe = Recipe.load("touch_kind", labels=labels)
-    assert isinstance(recipe.encoder, taxel.encode.Moments)
-    assert recipe.encoder.displacement_mm is None
-    assert [recipe.learner_of(label)[1] for label in ("contact", "Lift", "ball")] == [2.0, 4.0, 6.0]
+    assert recipes.fitting(events) == "touch"
+    recipe = Recipe.load("touch", labels=labels)
+    assert isinstance(recipe.encoder, taxel.encode.Composite)
+    assert recipe.encoder.parts["moments"].displacement_mm is None
+    assert [recipe.learner_of(label)[1] for label in labels] == [0.1, 0.1, 5.0]
 
 
 @pytest.mark.slow

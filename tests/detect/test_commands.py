@@ -391,8 +391,7 @@ def test_weights_are_drawn_by_taxel_where_trains_are_taxels() -> None:
         (taxel.encode.ChangeEvents(), 2 * 12),
     ):
         weights = np.arange(count, dtype=float)
-        readout = taxel.Readout(encoder, {"a": (taxel.Neuron(), weights)}, array=array)
-        planes = dict(_planes(weights, readout, 12))
+        planes = dict(_planes(weights, encoder, 1, 12))
         assert sorted(np.concatenate(list(planes.values()))) == weights.tolist(), "each weight once"
         on = [plane for name, plane in planes.items() if name.startswith("ON") and "tonic" not in name]
         frames = taxel.Frames(np.stack([np.zeros((3, 4)), np.eye(3, 4) * 15.0]), [0, 1000], array=array)
@@ -400,8 +399,9 @@ def test_weights_are_drawn_by_taxel_where_trains_are_taxels() -> None:
         spoke = np.flatnonzero(heard.counts)
         told = {int(taxel_ % 12) for plane in on for taxel_ in np.flatnonzero(np.isin(plane, weights[spoke]))}
         assert told == {0, 5, 10}
-    area = taxel.Readout(taxel.encode.ContactArea(), {"a": (taxel.Neuron(), np.ones(10))})
-    assert _planes(np.ones(10), area, 5) == []
+    area = taxel.encode.ContactArea()
+    for encoder in (area, taxel.encode.Composite({"area": area, "change": taxel.encode.ChangeEvents()})):
+        assert _planes(np.ones(10), encoder, 1, 5) == []
 
 
 def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_path: Path, capsys) -> None:

@@ -51,42 +51,32 @@ def test_every_recipe_names_its_source_and_makes_learners(name: str) -> None:
 
 def test_every_kind_of_recording_has_one_recipe() -> None:
     every = {name: recipes.read(name) for name in recipes.names()}
-    kinds = [kind for one in every.values() if "other" in one for kind in one["fits"]]
-    assert len(kinds) == len(set(kinds)), "and beside it others for certain labels"
-    assert {name for name, one in every.items() if "other" not in one} == {"touch"}
+    kinds = [kind for one in every.values() for kind in one["fits"]]
+    assert len(kinds) == len(set(kinds))
+    assert all("other" in one for one in every.values())
     frames = np.zeros((2, 1, 1))
     found = {unit: recipes.fitting(Frames(frames, [0, 1000], unit=unit)) for unit in ("counts", "N", "kPa")}
     assert found == {"counts": "gait_plate", "N": "gait_insole", "kPa": "gait_channel"}
     assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) in recipes.names()
 
 
-@pytest.mark.parametrize(
-    ("labels", "name", "neurons"),
-    [
-        (["contact", "lift"], "touch", ["contact", "lift"]),
-        (["Lift"], "touch", ["Lift"]),
-        (["small", "large"], "touch_kind", ["large", "small"]),
-        (["contact", "ball"], "touch_kind", ["ball", "contact"]),
-        ([], "touch", []),
-    ],
-)
-def test_for_events_the_labels_choose_the_recipe(
-    monkeypatch: pytest.MonkeyPatch, labels: list[str], name: str, neurons: list[str]
-) -> None:
-    """Contact and lift alone by their own, any other label, also beside them, by that of kinds, as before."""
-    events = Events([0], [0], [0], [True], array=Array(1, 1))
-    assert recipes.fitting(events, labels) == name
-    backwards = recipes.names()[::-1]
-    monkeypatch.setattr(recipes, "names", lambda: backwards)
-    assert recipes.fitting(events, labels) == name, "whatever their order"
-    monkeypatch.undo()
-    assert sorted(Recipe.load(name, labels=labels).neurons) == neurons
-    assert recipes.fitting(Frames(np.zeros((1, 1, 1)), [0], unit="N"), labels) == "gait_insole"
+def test_for_events_contact_and_lift_have_their_own_neurons_and_any_other_label_that_of_kinds() -> None:
+    assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) == "touch"
+    assert list(Recipe.load("touch").neurons) == ["contact", "lift"]
+    recipe = Recipe.load("touch", labels=["Lift", "small", "large"])
+    assert {label: recipe.inputs_of(label) for label in recipe.neurons} == {
+        "Lift": ("area",),
+        "small": ("moments",),
+        "large": ("moments",),
+    }
+    assert said(recipe, "small") == said(recipe, "large")
+    assert said(recipe, "Lift") == said(Recipe.load("touch"), "lift")
 
 
-def test_a_recipe_for_certain_labels_refuses_others() -> None:
-    with pytest.raises(ProblemError, match=r"it is for contact and lift, not for 'ball': .* there are gait_channel, "):
-        Recipe.load("touch", labels=["contact", "ball"])
+def test_a_recipe_for_certain_labels_refuses_others(tmp_path: Path) -> None:
+    (tmp_path / "certain.toml").write_text('fits = ["events"]\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
+    with pytest.raises(ProblemError, match=r"it is for contact, not for 'ball': .* there are gait_channel, "):
+        Recipe.load(tmp_path / "certain.toml", labels=["contact", "ball"])
 
 
 def test_any_other_label_has_the_parameters_that_the_recipe_says() -> None:

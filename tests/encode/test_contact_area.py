@@ -28,7 +28,7 @@ def turned(encoder):
 @given(seed=seeds, rows=st.integers(1, 9), columns=st.integers(1, 12), floor=st.sampled_from([0.0, 3.0]))
 def test_contact_area_counts_loaded_taxels_with_loaded_neighbours(seed, rows, columns, floor):
     rng = np.random.default_rng(seed)
-    array = Array(rows, columns)
+    array = Array(rows, columns, 1.0)
     level = rng.choice([50.0, 56.0, 60.0], (rows, columns))
     tare = Tare.take(Frames([level, level], [0, 1000], array=array))
     lift = np.repeat(rng.integers(0, 12, 12), 5)[:, None, None]
@@ -59,7 +59,7 @@ def test_contact_area_of_events_is_reckoned_once_a_stamp(seed):
 
 
 def test_half_a_tick_above_the_floor_loads_a_taxel():
-    tare = rest(Array(1, 2), 50)
+    tare = rest(Array(1, 2, 1.0), 50)
     for value, rises in ((53.4, 0), (53.5, 1), (54.0, 1)):
         frames = Frames([[[50.0, 50.0]], [[value, value]]], [0, 192], array=tare.array)
         assert len(ContactArea(tare=tare).encode(frames)[0]) == rises

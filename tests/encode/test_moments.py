@@ -132,14 +132,14 @@ def test_sampled_moments_and_ages_are_those_of_numpy(seed, levels, left_out, ton
 
 
 def test_moments_of_events_are_sampled_every_period_from_the_first_stamp_on():
-    tare = rest(Array(1, 3), 50)
+    tare = rest(Array(1, 3, 1.0), 50)
     events = taxel.Events(
         [1000, 1000, 1000, 1750, 1750, 4100, 4100],
         [0, 1, 2, 0, 1, 0, 1],
         [0] * 7,
         [True] * 5 + [False] * 2,
         intensity=[50, 50, 50, 60, 57, 50, 50],
-        array=Array(1, 3),
+        array=Array(1, 3, 1.0),
     )
     options = {"levels": 0, "area": None, "peak": None, "displacement_mm": None, "period_ms": 0.5}
     spikes = Moments(**options, graded=True, ages_ms=[0.5, 1.2], tare=tare).encode(events)

@@ -58,7 +58,7 @@ def test_no_afferent_stands_on_a_taxel_that_does_not_exist():
     afferents = Skin().afferents(array)
     y, x = (np.rint(at / 1.5).astype(int) for at in (afferents.y_mm, afferents.x_mm))
     assert exists[y, x].all()
-    assert len(Skin().afferents(Array(2, 2, exists=np.zeros((2, 2), bool)))) == 0
+    assert len(Skin().afferents(Array(2, 2, 1.0, exists=np.zeros((2, 2), bool)))) == 0
 
 
 def felt(pictures, array, x, y, field):

@@ -258,6 +258,19 @@ def test_only_a_bag_has_topics_and_a_taxel_mcap_is_no_bag(tmp_path: Path) -> Non
         taxel.open(tmp_path / "own.mcap", topic="/palm")
 
 
+def test_a_layout_file_says_the_topic_and_that_less_means_more(tmp_path: Path, capsys) -> None:
+    bag = bags.write(tmp_path / "grasp.db3", palms())
+    layout = tmp_path / "grasp.layout.toml"
+    layout.write_text('rows = 24\ncolumns = 32\nfalls = 4095\n[ros]\ntopic = "/palm"\nfield = "taxels"\n')
+    frames = taxel.open(bag).frames()
+    assert np.array_equal(frames.values, np.float32(4095) - PALMS.astype(np.float32))
+    assert frames.array.shape == (24, 32)
+    assert json.loads(call(capsys, "info", bag, "--json")[1])["pictures"] == 6
+    layout.write_text('[ros]\ntopics = "/palm"\n')
+    with pytest.raises(FormatError, match=r"unknown key ros\.topics; there are topic, field, types, ros"):
+        taxel.open(bag)
+
+
 def test_a_folder_of_bags_opens_as_a_folder_of_trials(tmp_path: Path) -> None:
     for name in KINDS:
         bags.write(tmp_path / f"{name[:3]}{KINDS.index(name)}{name[5:]}", palms())

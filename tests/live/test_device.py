@@ -264,6 +264,8 @@ def test_the_command_does_all_of_it_on_an_emulated_line(tmp_path: Path) -> None:
         assert "line_period" in command("show", str(link)).stdout
         said = json.loads(command("set", str(link), "noise_floor=6", "ramp=140", "--json").stdout)
         assert (said["registers"]["noise_floor"], said["registers"]["ramp"]) == (6, 140)
+        assert command("set", str(link), "noise_floor=7").stdout == "noise_floor: 6 -> 7 ticks\n"
+        assert "nothing changed" in command("set", str(link), "noise_floor=7").stdout
         assert json.loads(command("apply", str(link), "2 kHz", "--json").stdout)["registers"]["line_period"] == 7.81
         assert json.loads(command("record", str(link), "stop", "--json").stdout)["registers"]["record"] == 0
         refused = command("set", str(link), "line_read=99999")

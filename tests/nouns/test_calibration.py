@@ -227,7 +227,7 @@ def test_without_one_nothing_is_called_newton(tmp_path):
 
 
 def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):
-    other = Calibration.table(Array(3, 4, pitch_mm=6.0, name="other"), [40.0], [4.0], unit="N", date=DAY)
+    other = Calibration.table(Array(4, 3, pitch_mm=6.0, name="other"), [40.0], [4.0], unit="N", date=DAY)
     with pytest.raises(ProblemError, match="the calibration is of another array"):
         other.apply(frames(1.0))
     recording = made_beside(tmp_path, other)

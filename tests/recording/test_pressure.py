@@ -53,7 +53,7 @@ def test_pictures_rest_at_zero_and_events_without_intensities_have_no_pressure(t
     frames = taxel.Frames(np.eye(3)[None] * [[[1.0]], [[2.0]]], [0, 1000], unit="N")
     taxel.convert(frames, tmp_path / "f.npz")
     found = json.loads(run("info", tmp_path / "f.npz", "--json").stdout)["pressure"]
-    assert (found["unit"], found["sum"]["most"], found["area_mm2"]["most"]) == ("N", 6.0, 3.0)
+    assert (found["unit"], found["sum"]["most"], found["area_taxels"]["most"]) == ("N", 6.0, 3.0)
     taxel.convert(taxel.Events([0, 5], [1, 2], [1, 2], [1, 0], array=ARRAY), tmp_path / "e.npz")
     assert json.loads(run("info", tmp_path / "e.npz", "--json").stdout)["pressure"] is None
     refused = run("info", tmp_path / "e.npz", "--table", tmp_path / "e.csv")

@@ -36,7 +36,10 @@ SOUND: dict[str, Sound] = {
         delay_ms={"a": 1.0},
         run_threshold=0.9,
         delays_ms=[0.0],
+        inputs=None,
     ),
+    "taxel.Readout.encoder_of": method(READOUT, "encoder_of", label="a"),
+    "taxel.Readout.trains_of": method(READOUT, "trains_of", label="a", trains=LEVELS.encode(FRAMES)),
     "taxel.Readout.to_nir": method(READOUT, "to_nir", path="readout.nir", spike_ms=0.1, overwrite=True),
     "taxel.Readout.from_nir": plain(
         taxel.Readout.from_nir, path="here.nir", encoder=LEVELS, neuron=taxel.Neuron(), spike_ms=0.1
@@ -94,6 +97,7 @@ SOUND: dict[str, Sound] = {
     "taxel.detect.Recipe.load": plain(
         taxel.detect.Recipe.load, recipe="here.toml", changes={"learner.tau": 5.0}, labels=["a"]
     ),
+    "taxel.detect.Recipe.inputs_of": method(RECIPE, "inputs_of", label="a"),
     "taxel.detect.Recipe.points_of": method(RECIPE, "points_of", label="a"),
     "taxel.detect.judge": plain(
         taxel.detect.judge,
@@ -139,6 +143,7 @@ SOUND: dict[str, Sound] = {
         neuron=taxel.Neuron(tau=2.0),
         weights=[0.5] * 32,
         delay_ms=1.0,
+        inputs=(),
     ),
 }
 

@@ -10,6 +10,8 @@ from sound.things import ARRAY, FRAMES, LEVELS, TARE, Sound, fresh, method, plai
 
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
+    "taxel.encode.Composite.only": method(taxel.encode.Composite({"a": LEVELS}), "only", names=["a"]),
+    "taxel.encode.Composite.places": method(taxel.encode.Composite({"a": LEVELS}), "places", names=["a"], array=ARRAY),
     "taxel.encode.Encoder.encode": method(LEVELS, "encode", x=FRAMES),
     "taxel.encode.Encoder.from_json": plain(taxel.encode.Encoder.from_json, text=LEVELS.to_json()),
     "taxel.encode.Encoder.transform": method(LEVELS, "transform", recordings=[FRAMES]),

@@ -13,7 +13,11 @@ CLOCK = taxel.Clock(np.array([0, 1000]), np.array([5, 1_000_005]))
 
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
-    "taxel.Array": plain(taxel.Array, rows=4, columns=4, pitch_mm=1.0, exists=np.ones((4, 4)), name="small"),
+    "taxel.Array": plain(
+        taxel.Array, rows=4, columns=4, pitch_mm=1.0, exists=np.ones((4, 4)), name="small", places=None
+    ),
+    "taxel.Places": plain(taxel.Places, x=[0.0, 1.0], y=[0.0, 0.0], area=[1.0, 2.0], unit="mm"),
+    "taxel.Array.fits": method(ARRAY, "fits", other=taxel.Array(4, 4)),
     "taxel.Array.index": method(ARRAY, "index", x=1, y=2),
     "taxel.Array.region": method(ARRAY, "region", x=slice(0, 2), y=slice(0, 2)),
     "taxel.Events": plain(
@@ -35,6 +39,7 @@ SOUND: dict[str, Sound] = {
     "taxel.Events.from_faery": plain(taxel.Events.from_faery, records=EVENTS.to_faery(), array=ARRAY),
     "taxel.Frames": plain(taxel.Frames, values=np.ones((2, 4, 4)), t=[0, 5], unit="N", array=ARRAY),
     "taxel.Frames.area": method(FRAMES, "area", above=0.5),
+    "taxel.Frames.loaded": method(FRAMES, "loaded", above=0.5),
     "taxel.Frames.centre": method(FRAMES, "centre", above=0.5),
     "taxel.Frames.from_events": plain(
         taxel.Frames.from_events, events=EVENTS, period_us=100, start=0, stop=500, held=np.ones((4, 4))

@@ -12,6 +12,7 @@ SOUND: dict[str, Sound] = {
         taxel.open,
         path="here_events.npz",
         array=ARRAY,
+        layout=None,
         pairing="direct",
         differences=False,
         topic=None,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::allowed::above_0;
 use crate::{Result, problem};
 
-/// The geometry of a sensor: rows, columns, the pitch between taxels, and which taxels exist.
+/// The geometry of a sensor: rows, columns, which taxels exist, and how far apart or where they are, if that is known.
 ///
 /// A taxel's index is `row * columns + column`; `x` is the column, `y` the row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,48 +14,164 @@ pub struct Array {
     pub rows: u16,
     /// Number of columns, from left to right.
     pub columns: u16,
-    /// Distance between the centres of neighbours, mm.
-    pub pitch_mm: f64,
+    /// Distance between the centres of neighbours; `None` where nobody knows it, or where `places` are known.
+    #[serde(default, with = "stated")]
+    pub pitch_mm: Option<Pitch>,
     /// Name of the sensor.
     pub name: String,
     /// Which taxels exist, by index; `None` if all do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exists: Option<Vec<bool>>,
+    /// The place of each taxel, of a sensor without even distances.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub places: Option<Places>,
+}
+
+/// Distance between the centres of neighbours, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pitch {
+    /// From one row to the next.
+    pub rows: f64,
+    /// From one column to the next.
+    pub columns: f64,
+}
+
+impl Pitch {
+    /// The same distance between rows and between columns.
+    #[must_use]
+    pub fn square(pitch_mm: f64) -> Self {
+        Self { rows: pitch_mm, columns: pitch_mm }
+    }
+
+    /// The area of a taxel, mm2.
+    #[must_use]
+    pub fn area(self) -> f64 {
+        self.rows * self.columns
+    }
+}
+
+/// The place of each taxel, by index; what is given for one that does not exist is not used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Places {
+    /// To the right.
+    pub x: Vec<f64>,
+    /// Downwards.
+    pub y: Vec<f64>,
+    /// The area of each taxel, in the square of the unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<Vec<f64>>,
+    /// The unit of places; `None` where nobody knows it.
+    #[serde(default)]
+    pub unit: Option<PlaceUnit>,
+}
+
+/// The unit of places.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PlaceUnit {
+    /// Millimetres.
+    Mm,
+}
+
+/// The pitch in files: a number, or a pair of numbers (rows, columns), or null.
+///
+/// Before a pitch could be unknown, 1 stood for one that nobody knew: a file's 1 reads as unknown, and a pitch of 1 mm is
+/// written as a pair.
+mod stated {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::Pitch;
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged, expecting = "pitch_mm must be a number, a pair of numbers (rows, columns), or null")]
+    enum Stated {
+        Square(f64),
+        Pair([f64; 2]),
+    }
+
+    /// The pitch that nobody knew.
+    const UNKNOWN: f64 = 1.0;
+
+    pub(super) fn serialize<S: Serializer>(pitch: &Option<Pitch>, to: S) -> Result<S::Ok, S::Error> {
+        let stated = pitch.map(|Pitch { rows, columns }| match rows == columns && rows != UNKNOWN {
+            true => Stated::Square(rows),
+            false => Stated::Pair([rows, columns]),
+        });
+        stated.serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Pitch>, D::Error> {
+        Ok(match Option::deserialize(from)? {
+            None => None,
+            Some(Stated::Square(pitch)) => (pitch != UNKNOWN).then(|| Pitch::square(pitch)),
+            Some(Stated::Pair([rows, columns])) => Some(Pitch { rows, columns }),
+        })
+    }
 }
 
 impl Array {
-    /// An array whose taxels all exist.
+    /// An array whose taxels all exist, as far apart in rows as in columns.
     ///
     /// # Errors
     ///
     /// `Problem` if there is no row or no column, or the pitch is not above 0.
     pub fn new(rows: u16, columns: u16, pitch_mm: f64, name: &str) -> Result<Self> {
-        if rows == 0 || columns == 0 {
-            return Err(problem!("array of {rows} x {columns} taxels: needs 1 row and 1 column or more"));
-        }
-        above_0("pitch_mm", pitch_mm, "")?;
-        Ok(Self { rows, columns, pitch_mm, name: name.to_owned(), exists: None })
+        let array = Self { pitch_mm: Some(Pitch::square(pitch_mm)), ..Self::unmeasured(rows, columns, name) };
+        array.check()?;
+        Ok(array)
+    }
+
+    /// An array whose taxels all exist, of unknown pitch; `check` refuses one without rows or columns.
+    #[must_use]
+    pub fn unmeasured(rows: u16, columns: u16, name: &str) -> Self {
+        Self { rows, columns, pitch_mm: None, name: name.to_owned(), exists: None, places: None }
     }
 
     /// The thesis' array: 64 x 64 taxels, 2.67 mm apart (chapter 4).
     #[must_use]
     pub fn thesis() -> Self {
-        Self { rows: 64, columns: 64, pitch_mm: 2.67, name: "thesis 64x64".to_owned(), exists: None }
+        Self { pitch_mm: Some(Pitch::square(2.67)), ..Self::unmeasured(64, 64, "thesis 64x64") }
     }
 
     /// Checks an array that a file or a caller described.
     ///
     /// # Errors
     ///
-    /// `Problem` if there is no row or no column, the pitch is not above 0, or `exists` has another length.
+    /// `Problem` if there is no row or no column, if the pitch is not above 0, if there is a pitch beside places, if
+    /// `exists` or places have another length, or if a place is not finite or an area not above 0.
     pub fn check(&self) -> Result<()> {
-        Self::new(self.rows, self.columns, self.pitch_mm, "")?;
-        match &self.exists {
-            Some(exists) if exists.len() != self.len() => {
-                Err(problem!("exists has {} entries for {} x {} taxels", exists.len(), self.rows, self.columns))
-            }
-            _ => Ok(()),
+        let Self { rows, columns, .. } = self;
+        if *rows == 0 || *columns == 0 {
+            return Err(problem!("array of {rows} x {columns} taxels: needs 1 row and 1 column or more"));
         }
+        if let Some(Pitch { rows, columns }) = self.pitch_mm {
+            above_0("pitch_mm", rows, "")?;
+            above_0("pitch_mm", columns, "")?;
+            if self.places.is_some() {
+                return Err(problem!("array {}: pitch_mm and places are both given: give one of them", self.name));
+            }
+        }
+        let of_each = |name: &str, entries: usize| {
+            (entries == self.len())
+                .then_some(())
+                .ok_or_else(|| problem!("{name} has {entries} entries for {rows} x {columns} taxels"))
+        };
+        if let Some(exists) = &self.exists {
+            of_each("exists", exists.len())?;
+        }
+        let Some(Places { x, y, area, unit: _ }) = &self.places else { return Ok(()) };
+        for (name, values) in [("places.x", Some(x)), ("places.y", Some(y)), ("places.area", area.as_ref())] {
+            let Some(values) = values else { continue };
+            of_each(name, values.len())?;
+            for (taxel, &value) in values.iter().enumerate().filter(|&(taxel, _)| self.has(taxel)) {
+                let is_area = name == "places.area";
+                if !value.is_finite() || (is_area && value <= 0.0) {
+                    let right = if is_area { "above 0 and finite" } else { "finite" };
+                    return Err(problem!("{name} of taxel {taxel} is {value}: must be {right}"));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Number of places in the grid, whether a taxel exists there or not.
@@ -74,5 +190,133 @@ impl Array {
     #[must_use]
     pub fn index(&self, x: u16, y: u16) -> usize {
         usize::from(y) * usize::from(self.columns) + usize::from(x)
+    }
+
+    /// Whether a taxel exists.
+    #[must_use]
+    pub fn has(&self, taxel: usize) -> bool {
+        self.exists.as_ref().is_none_or(|exists| exists[taxel])
+    }
+
+    /// Whether another array has the same rows, columns and taxels, so that what was measured or trained on it fits.
+    #[must_use]
+    pub fn fits(&self, other: &Self) -> bool {
+        (self.rows, self.columns) == (other.rows, other.columns)
+            && (self.exists == other.exists || (0..self.len()).all(|taxel| self.has(taxel) == other.has(taxel)))
+    }
+
+    /// The distance between neighbours, for `what` that needs it.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if it is not known.
+    pub fn pitch(&self, what: &str) -> Result<Pitch> {
+        let name = &self.name;
+        self.pitch_mm.ok_or_else(|| match self.places {
+            None => problem!("{what} needs mm, and the pitch of {name} is not known: give its pitch_mm"),
+            Some(_) => problem!("{what} needs one pitch, and {name} has a place for each taxel"),
+        })
+    }
+
+    /// The distance between neighbours, for `what` that needs the same between rows and between columns, mm.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if it is not known, or not the same.
+    pub fn square_pitch(&self, what: &str) -> Result<f64> {
+        let Pitch { rows, columns } = self.pitch(what)?;
+        if rows == columns {
+            return Ok(rows);
+        }
+        Err(problem!(
+            "{what} needs the same pitch between rows and between columns; {} has {rows} and {columns} mm",
+            self.name
+        ))
+    }
+
+    /// Refuses, for `what` that needs them, an array whose taxels are not known to have neighbours: channels.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for a single row or column without a pitch.
+    pub fn check_neighbours(&self, what: &str) -> Result<()> {
+        if self.pitch_mm.is_some() || (self.rows > 1 && self.columns > 1) || self.len() == 1 {
+            return Ok(());
+        }
+        Err(problem!(
+            "{what} needs neighbours on a grid; {} has {} x {} channels without a pitch",
+            self.name,
+            self.rows,
+            self.columns
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(json: &str) -> Array {
+        serde_json::from_str(json).unwrap()
+    }
+
+    #[test]
+    fn a_pitch_of_1_in_an_old_file_is_unknown_and_a_known_one_is_kept() {
+        let of = |pitch: &str| read(&format!(r#"{{"rows": 2, "columns": 3, "pitch_mm": {pitch}, "name": "a"}}"#));
+        assert_eq!(of("1.0").pitch_mm, None);
+        assert_eq!(of("1").pitch_mm, None);
+        assert_eq!(of("null").pitch_mm, None);
+        assert_eq!(of("2.67").pitch_mm, Some(Pitch::square(2.67)));
+        assert_eq!(of("[7.62, 5.08]").pitch_mm, Some(Pitch { rows: 7.62, columns: 5.08 }));
+        assert!(
+            serde_json::from_str::<Array>(r#"{"rows": 2, "columns": 3, "pitch_mm": "wide", "name": "a"}"#).is_err()
+        );
+        for array in [Array::thesis(), Array::new(3, 4, 1.0, "one").unwrap(), Array::unmeasured(3, 4, "none")] {
+            assert_eq!(read(&serde_json::to_string(&array).unwrap()), array);
+        }
+    }
+
+    #[test]
+    fn the_board_s_array_is_written_as_before() {
+        let text = serde_json::to_string(&Array::thesis()).unwrap();
+        assert_eq!(text, r#"{"rows":64,"columns":64,"pitch_mm":2.67,"name":"thesis 64x64"}"#);
+    }
+
+    #[test]
+    fn places_are_one_a_taxel_and_beside_no_pitch() {
+        let places = Places { x: vec![0.0, 1.5], y: vec![2.0, 0.5], area: Some(vec![9.0, 4.0]), unit: None };
+        let array = Array { places: Some(places.clone()), ..Array::unmeasured(1, 2, "two") };
+        array.check().unwrap();
+        assert_eq!(read(&serde_json::to_string(&array).unwrap()), array);
+        let text = |array: &Array| array.check().unwrap_err().to_string();
+        let pitched = Array { pitch_mm: Some(Pitch::square(2.0)), ..array.clone() };
+        assert!(text(&pitched).contains("both given"));
+        let short = Places { x: vec![0.0], ..places.clone() };
+        assert!(text(&Array { places: Some(short), ..array.clone() }).contains("places.x has 1 entries"));
+        let flat = Places { area: Some(vec![9.0, 0.0]), ..places.clone() };
+        assert!(text(&Array { places: Some(flat.clone()), ..array.clone() }).contains("area of taxel 1"));
+        let exists = Some(vec![true, false]);
+        Array { places: Some(flat), exists, ..array }.check().unwrap();
+    }
+
+    #[test]
+    fn arrays_fit_by_rows_columns_and_taxels_alone() {
+        let thesis = Array::thesis();
+        assert!(thesis.fits(&Array::unmeasured(64, 64, "any")));
+        assert!(thesis.fits(&Array { exists: Some(vec![true; 4096]), ..thesis.clone() }));
+        assert!(!thesis.fits(&Array { exists: Some(vec![false; 4096]), ..thesis.clone() }));
+        assert!(!thesis.fits(&Array::unmeasured(64, 63, "any")));
+    }
+
+    #[test]
+    fn what_needs_mm_or_neighbours_refuses_by_name() {
+        let channels = Array::unmeasured(1, 8, "foot");
+        assert!(channels.pitch("skin").unwrap_err().to_string().contains("skin needs mm, and the pitch of foot"));
+        assert!(channels.check_neighbours("area").unwrap_err().to_string().contains("area needs neighbours"));
+        Array::new(1, 8, 5.0, "line").unwrap().check_neighbours("area").unwrap();
+        Array::unmeasured(2, 8, "grid").check_neighbours("area").unwrap();
+        let plate = Array { pitch_mm: Some(Pitch { rows: 7.62, columns: 5.08 }), ..Array::unmeasured(9, 9, "plate") };
+        assert!(plate.square_pitch("foam").is_err());
+        assert_eq!(Array::thesis().square_pitch("foam").unwrap(), 2.67);
     }
 }

@@ -9,7 +9,7 @@
 //! frames. The times of touches are known to a fraction of a frame, so that detections can be scored against them.
 
 use crate::allowed::{Parameter, Range};
-use crate::{Error, Result};
+use crate::{Array, Error, Result};
 
 pub mod act;
 pub mod body;
@@ -43,6 +43,11 @@ pub use shape::Shape;
 pub use stage::{Prepared, Stage};
 pub use touch::{Contact, TouchKind};
 pub use track::Track;
+
+/// The pitch of an array that a scene is played on, mm.
+fn pitch_of(array: &Array) -> Result<f64> {
+    array.square_pitch("a scene").map_err(|error| Error::Scene(error.to_string()))
+}
 
 /// Checks that a value of a scene is within its range; `place` names its owner in the error.
 fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range: Range) -> Result<()> {

@@ -4,6 +4,7 @@ mod blocks;
 mod bracket;
 mod by_stamp;
 mod channels;
+mod composite;
 mod fields;
 mod law;
 mod loaded;
@@ -23,6 +24,7 @@ mod tare;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+pub use composite::Composite;
 pub use local_load::LargestSum;
 pub use pieces::Pieces;
 pub use quantity::Quantity;
@@ -50,18 +52,20 @@ macro_rules! encoders {
         #[serde(tag = "name", rename_all = "snake_case")]
         pub enum Encoder {
             $($(#[$about])* $Kind($Kind),)*
+            /// Several of the others side by side.
+            Composite(Composite),
         }
 
-        /// The names of all encoders, as in JSON.
+        /// The names of all encoders but `composite`, which is made of the others, as in JSON.
         pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
         impl Encoder {
             fn law(&self) -> &dyn Law {
-                match self { $(Self::$Kind(e) => e,)* }
+                match self { $(Self::$Kind(e) => e,)* Self::Composite(e) => e }
             }
 
             fn law_mut(&mut self) -> &mut dyn Law {
-                match self { $(Self::$Kind(e) => e,)* }
+                match self { $(Self::$Kind(e) => e,)* Self::Composite(e) => e }
             }
 
             /// Parses the parameters of the encoder with this name; none if there is no such encoder.
@@ -69,7 +73,7 @@ macro_rules! encoders {
                 $(if name == stringify!($name) {
                     return Some(reading::from_value(parameters).map(Self::$Kind));
                 })*
-                None
+                (name == "composite").then(|| reading::from_value(parameters).map(Self::Composite))
             }
 
             /// The parameters of an encoder, by its name, with their defaults and ranges.
@@ -78,7 +82,7 @@ macro_rules! encoders {
                 $(if name == stringify!($name) {
                     return Some($Kind::described());
                 })*
-                None
+                (name == "composite").then(Composite::described)
             }
         }
     };
@@ -125,6 +129,12 @@ impl Encoder {
             Some(other) => return Err(problem!("encoder {other}: must be one of {names}")),
             None => return Err(problem!("encoder without a name: must be one of {names}")),
         };
+        // Errors of an encoder inside of another would not name its parameters, so each part is also read by itself.
+        if let (true, Some(Value::Object(parts))) = (name == "composite", given.get("parts")) {
+            for (part, encoder) in parts {
+                Self::from_json(&encoder.to_string()).map_err(|error| error.of(part))?;
+            }
+        }
         let encoder = Self::read(&name, given.into())
             .ok_or_else(|| problem!("encoder {name}: must be one of {names}"))?
             .map_err(|unfit| Error::Problem(unfit.of(&format!("encoder {name}"))))?;

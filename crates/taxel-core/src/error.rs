@@ -22,6 +22,14 @@ pub enum Error {
     Interrupted,
 }
 
+impl Error {
+    /// The same error, with the name of the part that it is of in front of its text.
+    #[must_use]
+    pub fn of(self, part: &str) -> Self {
+        if let Self::Problem(text) = self { Self::Problem(format!("{part}: {text}")) } else { self }
+    }
+}
+
 /// The result of each function in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 

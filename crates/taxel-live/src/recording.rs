@@ -87,6 +87,12 @@ pub struct Header {
     /// Name of this source among the sources of its file.
     #[serde(default = "board", skip_serializing_if = "is_board")]
     pub name: String,
+    /// The side of the body that the sensor is of, "left" or "right"; empty if it is unknown.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub side: String,
+    /// Where on the sensor the heel lies, "top" or "bottom"; empty if it is unknown.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub heel: String,
     /// For a stream of numbers, the content of its lines; none for a board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<Stream>,
@@ -225,6 +231,8 @@ impl Header {
             source,
             started_ns,
             name: board(),
+            side: String::new(),
+            heel: String::new(),
             stream: None,
             pictures: None,
             sources: vec![],
@@ -239,7 +247,7 @@ impl Header {
     pub fn of_stream(name: &str, stream: Stream, source: String, started_ns: i64) -> taxel_core::Result<Self> {
         stream.check(name)?;
         let columns = u16::try_from(stream.values().count()).unwrap_or(u16::MAX);
-        let array = Array::new(1, columns, 1.0, name)?;
+        let array = Array::unmeasured(1, columns, name);
         let board = Self::of_board(array, None, source, started_ns);
         let header = Self { name: name.to_owned(), stream: Some(stream), ..board };
         header.check()?;

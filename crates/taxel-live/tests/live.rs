@@ -87,7 +87,7 @@ fn emulate(to: SocketAddr, real_time: bool, mut touch: impl Touch) -> Report {
 /// Reads every event and fires after some forty within `tau` ms, which is how slowly its kernel rises.
 fn readout(tau: f64) -> Readout {
     let neuron = Neuron { tau, refractory: 15.0, theta_0: 0.4, ..Neuron::default() };
-    let one = TrainedNeuron { delay_ms: 0.0, weights: vec![0.03; 2 * 4096], neuron };
+    let one = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![0.03; 2 * 4096], neuron };
     of(r#"{"name": "change_events"}"#, one)
 }
 
@@ -397,7 +397,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_reads_w
     let mut weights = vec![0.0; 10];
     weights[0] = 3.0;
     let neuron = Neuron { tau: 0.5, refractory: 15.0, ..Neuron::default() };
-    let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, weights });
+    let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, inputs: vec![], weights });
     let path = Scratch::new("tare.mcap");
     let setup = ReadoutSetup::Taring(1_000_000, Box::new(readout.clone().into()));
     let live = Live::start(ANY, options(Some(&path)), setup, vec![]).expect("a port");

@@ -16,7 +16,10 @@ pub(super) const MOST_DETECTIONS: usize = 10_000;
 pub(super) fn array(array: &Array) -> Value {
     let digit = |&exists: &bool| if exists { '1' } else { '0' };
     let exists = array.exists.as_ref().map(|all| all.iter().map(digit).collect::<String>());
-    json!({ "rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm, "name": array.name, "exists": exists })
+    // Pitch and places are as in files.
+    let mut sensor = json!(Array { exists: None, ..array.clone() });
+    sensor["exists"] = json!(exists);
+    sensor
 }
 
 /// A taxel that was zeroed.
@@ -39,16 +42,17 @@ pub(super) fn warning(text: impl std::fmt::Display) -> Value {
     json!({ "type": "warning", "text": text.to_string() })
 }
 
-/// Without any datagram for so long a source is quiet, ns; one with heartbeats is lost after this at least.
-const QUIET_NS: i64 = 500_000_000;
+/// Without any datagram for so long a source is quiet, ns.
+const QUIET_NS: i64 = 1_000_000_000;
 
-/// Heartbeats that may be missing before a source is lost.
+/// A source with heartbeats is lost after so many of the longest intervals between them, and after this time at least, ns.
 const MISSING_HEARTBEATS: i64 = 3;
+const LOST_NS: i64 = 500_000_000;
 
 /// Whether datagrams arrive, since when none do, and how long they may be missing.
 fn arrival(now: &Counters) -> Value {
     let silent_ns = now.arrived_ns.map_or(0, |arrived_ns| (now_ns() - arrived_ns).max(0));
-    let lost_ns = now.heartbeat_us.map(|interval| (MISSING_HEARTBEATS * interval * 1000).max(QUIET_NS));
+    let lost_ns = now.heartbeat_us.map(|interval| (MISSING_HEARTBEATS * interval * 1000).max(LOST_NS));
     let state = match (now.arrived_ns, lost_ns) {
         (None, _) => "nothing",
         (Some(_), Some(lost_ns)) if silent_ns > lost_ns => "lost",

@@ -275,8 +275,11 @@ export class Labels {
     const flag = make("button", { type: "button", class: "flag" }, make("i"), make("span"));
     const mine = () => this.labels.find((label) => label.label_id === label_id);
     let from = 0;
+    // The pointer holds the handle, which stands beside the label's time.
+    let beside_us = 0;
     flag.addEventListener("pointerdown", (event) => {
       from = event.clientX;
+      beside_us = (mine()?.t_us ?? 0) - (this.timeAt(from) ?? 0);
       flag.setPointerCapture(event.pointerId);
     });
     flag.addEventListener("pointermove", (event) => {
@@ -284,7 +287,7 @@ export class Labels {
       if (!this.dragged && !(Math.abs(event.clientX - from) >= DRAG)) return;
       const t_us = this.timeAt(event.clientX);
       if (t_us === null) return;
-      this.dragged = { label_id, t_us };
+      this.dragged = { label_id, t_us: t_us + beside_us };
       this.place();
     });
     flag.addEventListener("pointerup", () => {

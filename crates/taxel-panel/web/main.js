@@ -162,7 +162,7 @@ function resize(array) {
 function receivePicture(buffer) {
   const picture = readPicture(buffer);
   if (!timeline || picture.rows !== timeline.rows || picture.columns !== maps.columns) {
-    resize({ rows: picture.rows, columns: picture.columns, pitch_mm: 0, name: "", exists: null });
+    resize({ rows: picture.rows, columns: picture.columns, pitch_mm: null, name: "", exists: null });
   }
   if (!timeline) return;
   const followed = timeline.following;

@@ -6,7 +6,8 @@ export const VERSION = 1;
 export const UNKNOWN_VALUE = 65535;
 
 /**
- * @typedef {{ rows: number, columns: number, pitch_mm: number, name: string, exists: string | null }} ArrayInfo
+ * @typedef {{ x: number[], y: number[], area?: number[], unit: "mm" | null }} Places
+ * @typedef {{ rows: number, columns: number, pitch_mm: number | [number, number] | null, name: string, exists: string | null, places?: Places }} ArrayInfo
  * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayInfo | null, udp: string | null, control: string | null,
  *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, columns_us: [number, number], time_columns: number,
  *   delta_intensity: boolean | null }} Hello

@@ -8,6 +8,7 @@ use std::ops::Deref;
 use numpy::{BorrowError, Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::Borrowed;
 use pyo3::prelude::*;
+use taxel_core::array::{Pitch, PlaceUnit, Places};
 use taxel_core::wire::{Columns, Filled, Room};
 use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeKind, SpikeTrains, Stop};
 
@@ -63,23 +64,24 @@ pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyA
     values.into_pyarray(py)
 }
 
-/// An array's geometry as Python hands it over: rows, columns, pitch in mm, name, which exist.
-pub(crate) type ArrayParts = (u16, u16, f64, String, Option<Vec<bool>>);
+/// An array's geometry as Python hands it over: rows, columns, pitch in mm (rows, columns), name, which exist, places.
+pub(crate) type ArrayParts = (u16, u16, Option<(f64, f64)>, String, Option<Vec<bool>>, Option<PlacesParts>);
 
-pub(crate) fn to_array((rows, columns, pitch_mm, name, exists): ArrayParts) -> PyResult<Array> {
-    let mut array = Array::new(rows, columns, pitch_mm, &name).map_err(core)?;
-    if let Some(exists) = exists {
-        if exists.len() != array.len() {
-            let text = format!("exists has {} entries: must be {rows} x {columns}", exists.len());
-            return Err(ProblemError::new_err(text));
-        }
-        array.exists = Some(exists);
-    }
+/// Places by taxel: x, y, areas, whether they are in mm.
+type PlacesParts = (Vec<f64>, Vec<f64>, Option<Vec<f64>>, bool);
+
+pub(crate) fn to_array((rows, columns, pitch_mm, name, exists, places): ArrayParts) -> PyResult<Array> {
+    let pitch_mm = pitch_mm.map(|(rows, columns)| Pitch { rows, columns });
+    let places = places.map(|(x, y, area, mm)| Places { x, y, area, unit: mm.then_some(PlaceUnit::Mm) });
+    let array = Array { rows, columns, pitch_mm, name, exists, places };
+    array.check().map_err(core)?;
     Ok(array)
 }
 
 pub(crate) fn from_array(array: &Array) -> ArrayParts {
-    (array.rows, array.columns, array.pitch_mm, array.name.clone(), array.exists.clone())
+    let Array { rows, columns, pitch_mm, name, exists, places } = array.clone();
+    let places = places.map(|Places { x, y, area, unit }| (x, y, area, unit.is_some()));
+    (rows, columns, pitch_mm.map(|pitch| (pitch.rows, pitch.columns)), name, exists, places)
 }
 
 /// How many rows of columns were filled, whether ticks were, which rows states gave (none where no row is of that kind), and

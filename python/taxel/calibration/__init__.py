@@ -69,7 +69,7 @@ class Calibration:
     Attributes
     ----------
     array : Array
-        The sensor; pictures of another are refused.
+        The sensor; pictures of one with other rows, columns or taxels are refused.
     unit : {"N", "kPa"}
     of : str
         What readings are in: "ticks" of a board, "counts" of a file.
@@ -269,7 +269,7 @@ class Calibration:
         loads : list of Load, one or more
             All of one array and in one unit of readings.
         unit : {"N", "kPa"}
-            Of the calibration. Between N and kPa stands the pitch squared.
+            Of the calibration. Between N and kPa stands the area of each taxel.
         start : Calibration, optional
             The calibration whose curve (a law, a table) is fitted; else a power of the reading.
         exponent : float, above 0, optional
@@ -391,8 +391,7 @@ class Calibration:
     def _region(self, columns: slice, rows: slice) -> Calibration:
         """Return the calibration of a rectangle of the array."""
         (left, right), (top, bottom) = self.array.region(columns, rows)
-        exists = None if self.array.exists is None else self.array.exists[top:bottom, left:right]
-        small = Array(bottom - top, right - left, self.array.pitch_mm, exists, self.array.name)
+        small = self.array._part(columns, rows)
         curve, rest = self._curve, None if self.rest is None else self.rest[top:bottom, left:right]
         if isinstance(curve, Table) and curve.x.ndim == 3:
             curve = Table(curve.x[:, top:bottom, left:right], curve.y)
@@ -556,7 +555,7 @@ class _Laid(NamedTuple):
     """The equations of a load: its taxels, their weights and the value; from mean readings above the floor."""
 
     load: float
-    weight: float
+    weight: float | Values
     readings: Values
     rest: Values
     chosen: NDArray[np.bool_]
@@ -586,11 +585,15 @@ class _Laid(NamedTuple):
             raise ProblemError(
                 f"{place}: no taxel reads more than {calibration.floor:g} {calibration.of} above its rest"
             )
-        area = calibration.array.pitch_mm**2 * N_PER_KPA_MM2
-        if unit == "kPa":
-            weight = 1.0 if calibration.unit == "kPa" else 1 / area
-        else:
-            weight = 1.0 if calibration.unit == "N" else area
+        weight: float | Values = 1.0
+        if unit != calibration.unit:
+            areas = calibration.array.area_mm2
+            if areas is None:
+                raise ProblemError(
+                    f"{place}: in {unit}, and the calibration in {calibration.unit}: between them stands the area of "
+                    f"each taxel, which is not known of {calibration.array!r}"
+                )
+            weight = 1 / (areas * N_PER_KPA_MM2) if unit == "kPa" else areas * N_PER_KPA_MM2
         alone = unit == "kPa" or load.taxel is not None
         # Uniform pressure is on every taxel: one that reads nothing is broken, and no measure of the others.
         return cls(value, weight, readings, rest, loaded, alone)
@@ -672,9 +675,10 @@ def _there(array: Array) -> NDArray[np.bool_]:
 
 
 def _same(own: Array, other: Array, what: str, unit: str | None = None, expected: str | None = None) -> None:
-    """Refuse what is of another array, or in another unit."""
-    if own != other:
+    """Refuse what has other taxels, or another unit; warn of another pitch."""
+    if not own.fits(other):
         raise ProblemError(f"{what}: of {other!r}; the calibration is of another array, {own!r}")
+    own._warn_apart(other, what, stacklevel=3)
     if unit != expected:
         raise ProblemError(f"{what}: in {unit}; the calibration takes {expected}")
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import errno
+import functools
 import inspect
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
 from typer.core import TyperCommand
 
 from taxel._base.options import with_options
-from taxel._core import Error
+from taxel._core import Error, ProblemError
 from taxel.cli._added import WithAdded
 
-__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app", "with_typed"]
+__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app", "with_out", "with_typed"]
 
+_KEYWORD = inspect.Parameter.KEYWORD_ONLY
 _Typed = TypeVar("_Typed")
 
 #: Exit codes: the user's input is wrong; board, socket or disk; stopped by Ctrl-C.
@@ -109,3 +112,34 @@ def with_typed(options: type[_Typed]) -> Callable[[Callable[[_Typed], None]], Ca
         return command
 
     return decorate
+
+
+def with_out(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that lets ``-o`` say where output goes too, which a command's argument `name` says."""
+    upper = name.upper()
+    out = Annotated[Path | None, typer.Option("--out", "-o", metavar=upper, help=f"The same as {upper}.")]
+
+    def decorate(work: Callable[..., None]) -> Callable[..., None]:
+        own = dict(inspect.signature(work, eval_str=True).parameters)
+        own[name] = own[name].replace(default=None, annotation=_or_none(own[name].annotation))
+
+        def command(ctx: typer.Context, typed_out: Path | None, **typed: Any) -> None:
+            if typed_out is None and typed[name] is None:
+                raise ProblemError(f"{upper} is missing; see {ctx.command_path} --help")
+            if typed_out is not None and typed[name] is not None:
+                raise ProblemError(f"{upper} is given twice: {typed[name]} and {typed_out}")
+            work(**{**typed, name: typed[name] or typed_out})
+
+        functools.update_wrapper(command, work)
+        more = {"ctx": typer.Context, "typed_out": out}
+        own |= {key: inspect.Parameter(key, _KEYWORD, default=None, annotation=kind) for key, kind in more.items()}
+        command.__signature__ = inspect.Signature([one.replace(kind=_KEYWORD) for one in own.values()])  # type: ignore[attr-defined]
+        command.__annotations__ = {}  # those of `work`, which the signature replaces
+        return command
+
+    return decorate
+
+
+def _or_none(annotation: Any) -> Any:
+    """Return the annotation of an argument that may be left out."""
+    return Annotated[annotation.__origin__ | None, *annotation.__metadata__]

@@ -13,14 +13,15 @@ if TYPE_CHECKING:
 __all__ = ["geometry"]
 
 
-def geometry(size: str) -> Array:
-    """Return the array of a size, rows x columns [x pitch in mm]; the default pitch is the thesis'."""
+def geometry(size: str, *, of_wire: bool = True) -> Array:
+    """Return the array of a size, rows x columns [x mm]; without mm, the pitch of the board's wire or none."""
     from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
 
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", size)
     if match is None:
         raise ProblemError(f"--array {size}: must be rows x columns, as 64x64, or with the pitch in mm, as 64x64x2.67")
     thesis = Array.thesis()
-    rows, columns, pitch = int(match[1]), int(match[2]), float(match[3] or thesis.pitch_mm)
+    rows, columns, pitch = int(match[1]), int(match[2]), thesis.pitch_mm if of_wire else None
+    pitch = float(match[3]) if match[3] else pitch
     same = (rows, columns, pitch) == (*thesis.shape, thesis.pitch_mm)
     return thesis if same else Array(rows, columns, pitch_mm=pitch, name=size)

@@ -28,8 +28,17 @@ class FileOptions:
         list[str] | None,
         typer.Option(
             metavar="ROWSxCOLUMNS[xMM]",
-            help="Rows, columns and pitch of the sensor, as 24x20x5, for files without them (events as .csv, .lsa, ROS "
-            "bags). Default: 64x64x2.67, or a larger array if events lie outside it; of a bag as its messages say.",
+            help="Rows, columns and pitch (mm) of the sensor, as 24x20x5, for files without them (.csv, .lsa, ROS "
+            "bags). Default: 64x64x2.67, or a larger array if events lie outside it; of a bag as its messages say. "
+            "Without mm the pitch is 2.67 for events of the board, else unknown.",
+        ),
+    ] = None
+    layout: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="What a file lacks: sensor, unit, rate, how to read a table. Default: NAME.layout.toml or layout.toml "
+            "beside it.",
         ),
     ] = None
     topic: Annotated[
@@ -66,15 +75,45 @@ class FileOptions:
         """
         from taxel.recording import open_any  # noqa: PLC0415  the command line starts quickly
 
-        arrays = [geometry(size) for size in self.array or ()]
-        named = {"topic": self.topic, "field": self.field, "types": self.types, "ros": self.ros}
-        opened = open_any(path, array=arrays if len(arrays) > 1 else arrays[0] if arrays else None, **named)
-        for one in opened if isinstance(opened, list) else [opened]:
-            # A bag holds no sensor, so that its messages are of the given one or are left out.
-            if arrays and one.kind != "ros" and one.array != arrays[0]:
-                given = ", ".join(self.array or ())
-                raise ProblemError(f"--array {given}: {one.path} holds its own sensor, {one.array!r}; leave it out")
-        return opened  # type: ignore[no-any-return]
+        arrays = [geometry(size, of_wire=False) for size in self.array or ()]
+        opened = open_any(
+            path,
+            array=arrays if len(arrays) > 1 else arrays[0] if arrays else None,
+            layout=self.layout,
+            topic=self.topic,
+            field=self.field,
+            types=self.types,
+            ros=self.ros,
+        )
+        if isinstance(opened, list):
+            return [self._on_array(one) for one in opened]
+        return self._on_array(opened)
+
+    def names_topic(self, bag: Path) -> bool:
+        """Return whether these options, or the layout file of a ROS bag, say which topic to open."""
+        from taxel.formats.layout import Layout  # noqa: PLC0415  the command line starts quickly
+
+        place = self.layout or Layout.beside(bag)
+        return bool(self.topic) or (place is not None and "topic" in Layout.read(place).ros)
+
+    def _on_array(self, recording: Recording) -> Recording:
+        """Return a recording on the sensor of ``--array``; refuse one that holds a sensor that differs from it."""
+        # A bag holds no sensor, so that its messages are of the given one or are left out.
+        if not self.array or recording.kind == "ros":
+            return recording
+        from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
+        from taxel.recording.layout import on_array  # noqa: PLC0415
+
+        own, given = recording.array, geometry(self.array[0], of_wire=False)
+        differs = given.pitch_mm is not None and (own.pitch_mm, own.places) != (given.pitch_mm, None)
+        if own.shape != given.shape or differs:
+            sizes = ", ".join(self.array)
+            raise ProblemError(f"--array {sizes}: {recording.path} holds its own sensor, {own!r}; leave it out")
+        if not recording.has_events or own._is_measured:
+            return recording
+        # A size without a pitch says nothing of it, and events without one are of the board's wire.
+        wire = geometry(self.array[0])
+        return type(recording)(on_array(recording._contents, Array(*own.shape, wire.pitch_mm, own.exists, wire.name)))
 
     def joined(self, path: Path) -> list[Recording]:
         """Open a file or a folder, with the feet of each trial joined as its sources."""

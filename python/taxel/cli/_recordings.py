@@ -225,9 +225,9 @@ def progress(quiet: bool) -> Iterator[Callable[[str], None]]:
         else:
             with console.status("") as status:
                 yield status.update
-    for warning in caught:
-        if issubclass(warning.category, UserWarning):
-            typer.echo(f"taxel: warning: {warning.message}", err=True)
+    # One that holds for several recordings is shown once.
+    for message in dict.fromkeys(str(one.message) for one in caught if issubclass(one.category, UserWarning)):
+        typer.echo(f"taxel: warning: {message}", err=True)
 
 
 def of_source(recording: Recording, name: str | None) -> Recording:

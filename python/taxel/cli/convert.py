@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import of_source
 
@@ -22,6 +22,7 @@ __all__ = ["convert"]
 
 
 @app.command()
+@with_out("target")
 @with_file_options
 def convert(
     source: Annotated[Path, typer.Argument(help="A recording, a file of another maker, or a folder.")],

@@ -11,7 +11,7 @@ import typer
 
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import of_source, span_us
 
@@ -22,6 +22,7 @@ __all__ = ["cut"]
 
 
 @app.command()
+@with_out("out")
 @with_file_options
 def cut(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],

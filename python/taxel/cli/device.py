@@ -73,13 +73,24 @@ def set_registers(
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
-    """Set registers by name, in an order in which the board is never without a valid set, and read them back.
+    """Set registers by name, in an order in which the board is never without a valid set, and print what changed.
 
     Example: taxel device set /dev/ttyUSB0 noise_floor=5 wire_version=2
     """
     values = dict(_field(assignment) for assignment in fields)
     with Device(place, baud=baud) as device:
-        _print(device, device.set(**values), as_json)
+        before = {name: value for name, value, *_ in described(device.registers)}
+        after = device.set(**values)
+        if as_json:
+            _print(device, after, as_json)
+            return
+        changed = [(name, value, unit) for name, value, unit, *_ in described(after) if value != before[name]]
+        for name, value, unit in changed:
+            typer.echo(f"{name}: {before[name]:g} -> {value:g}" + f" {unit}" * bool(unit))
+        if not changed:
+            typer.echo("nothing changed: the board had these values")
+        for warning in after.warnings:
+            typer.echo(f"warning: {warning}", err=True)
 
 
 @_device.command()

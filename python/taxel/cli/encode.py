@@ -12,7 +12,7 @@ import typer
 from taxel._base.files import try_whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError, encoder_names
-from taxel.cli._app import app
+from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, progress, tare_of
 
@@ -20,6 +20,7 @@ __all__ = ["encode"]
 
 
 @app.command()
+@with_out("out")
 @with_file_options
 def encode(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],

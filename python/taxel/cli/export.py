@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from taxel.cli._app import App, app
+from taxel.cli._app import App, app, with_out
 
 __all__ = ["nir"]
 
@@ -22,6 +22,7 @@ def _root() -> None:
 
 
 @_export.command()
+@with_out("out")
 def nir(
     readout: Annotated[Path, typer.Argument(help="A readout, as taxel train writes it.")],
     out: Annotated[Path, typer.Argument(help="The new file, a .nir.")],

@@ -68,7 +68,7 @@ def info(
             try_whole(place, overwrite=overwrite)
     # The status line is shown on a terminal only, and removed at the end.
     with Console(stderr=True).status(f"reading {file}"):
-        if not files.topic and file.exists() and is_bag(file):
+        if file.exists() and is_bag(file) and not files.names_topic(file):
             typer.echo(listed(file, topics(file, files.types, files.ros), as_json))
             return
         opened = files.open(file)
@@ -163,9 +163,12 @@ def _pages(several: dict[str, Any]) -> str:
 
 def _lines(pressed: Series) -> Iterator[str]:
     """Yield the lines of a table of pressure over time; the centre is empty where nothing is loaded."""
-    yield f"t_us,area_mm2,peak_{pressed.unit},sum_{pressed.unit},centre_x_mm,centre_y_mm"
-    columns = (pressed.t, pressed.area, pressed.peak, pressed.total, *pressed.centre.T)
-    for t, *values in zip(*(column.tolist() for column in columns), strict=True):
+    columns = {f"area_{pressed.area_unit}": pressed.area} if pressed.area is not None else {}
+    columns |= {f"peak_{pressed.unit}": pressed.peak, f"sum_{pressed.unit}": pressed.total}
+    if pressed.centre is not None:
+        columns |= {f"centre_{axis}_{pressed.centre_unit}": of for axis, of in zip("xy", pressed.centre.T, strict=True)}
+    yield ",".join(["t_us", *columns])
+    for t, *values in zip(*(column.tolist() for column in (pressed.t, *columns.values())), strict=True):
         yield ",".join([str(t), *("" if np.isnan(value) else f"{value:.10g}" for value in values)])
 
 
@@ -182,10 +185,10 @@ def _page(facts: dict[str, Any]) -> str:
 
 
 def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    from taxel.calibration._curves import N_PER_KPA_MM2  # noqa: PLC0415  the command line starts quickly
+    from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
 
-    array = facts["array"]
-    size = f"{array['rows']} x {array['columns']} taxels, {array['pitch_mm']:g} mm, {array['name']}"
+    array = Array._from_geometry(facts["array"])
+    size = f"{array.rows} x {array.columns} taxels, {array._apart()}, {array.name}"
     yield "array", size + (f"; a .{facts['kind']} does not hold it: --array" if facts["array_assumed"] else "")
     yield from _time(facts)
     if "events" in facts:
@@ -200,20 +203,8 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"clock of {of['source']}", f"{of['offset_us']:+d} us at the beginning, {of['drift_ppm']:+.1f} ppm faster"
     if facts["calibration"] is not None:
         yield "calibration", facts["calibration"]
-    pressed = facts["pressure"]
-    if pressed is not None:
-        # In a calibration a taxel's area is the pitch squared; in other files taxels may have any size.
-        newtons = array["pitch_mm"] ** 2 * N_PER_KPA_MM2
-        force = facts["calibration"] is not None and pressed["unit"] == "kPa"
-        for name, words, unit, factor in (
-            ("area_mm2", "contact area", "mm2", 1.0),
-            ("peak", "peak", pressed["unit"], 1.0),
-            ("sum", "force", "N", newtons) if force else ("sum", "sum", pressed["unit"], 1.0),
-        ):
-            yield words, f"at most {factor * pressed[name]['most']:g} {unit}, at {pressed[name]['t_us']} us"
-        if pressed["centre_mm"] is not None:
-            x, y = pressed["centre_mm"]["x"], pressed["centre_mm"]["y"]
-            yield "centre of pressure", f"x {x[0]:.1f} to {x[1]:.1f} mm, y {y[0]:.1f} to {y[1]:.1f} mm"
+    if facts["pressure"] is not None:
+        yield from _pressure(facts["pressure"])
     if facts["notes"]:
         yield "notes", str(len(facts["notes"]))
     if facts["detections"]:
@@ -228,6 +219,22 @@ def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "time", "none: pictures are numbered; --rate-hz where a command needs times"
     elif facts["from_us"] is not None:
         yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
+
+
+def _pressure(pressed: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    for name, words, unit in (
+        ("area_mm2", "contact area", "mm2"),
+        ("area_taxels", "contact area", "taxels"),
+        ("peak", "peak", pressed["unit"]),
+        ("force_n", "force", "N") if "force_n" in pressed else ("sum", "sum", pressed["unit"]),
+    ):
+        if name in pressed:
+            yield words, f"at most {pressed[name]['most']:g} {unit}, at {pressed[name]['t_us']} us"
+    for unit, more in (("mm", " mm"), ("taxels", ""), ("places", " in units of the places")):
+        across, down = ("column", "row") if unit == "taxels" else ("x", "y")
+        if pressed.get(f"centre_{unit}") is not None:
+            x, y = (f"{low:.1f} to {high:.1f}{more}" for low, high in pressed[f"centre_{unit}"].values())
+            yield "centre of pressure", f"{across} {x}, {down} {y}"
 
 
 def _rates(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -17,7 +17,7 @@ from rich.live import Live as Display
 from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.cli._app import OUTSIDE, SecondsOption, app
+from taxel.cli._app import OUTSIDE, SecondsOption, app, with_out
 from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
@@ -47,6 +47,7 @@ _EMPTY = 3
 
 
 @app.command()
+@with_out("file")
 def record(
     file: Annotated[Path, typer.Argument(help="A new file: .mcap (with times, registers, notes) or .lsa (raw bytes).")],
     port: PortOption = LiveOptions.port,

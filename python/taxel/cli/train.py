@@ -49,10 +49,10 @@ def train(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="The recipe to start from: touch (contact and lift, events of a board), touch_kind (other labels), "
-            "gait_plate (counts), gait_insole (N), gait_channel (others); or a TOML or JSON file (a path with a dot or "
-            "a slash): [encoder], [learner], [neurons.LABEL], run_threshold, align. Default, without --encoder: "
-            "that which fits the recording and its labels."
+            help="The recipe to start from: touch (events of a board), gait_plate (counts), gait_insole (N), "
+            "gait_channel (others); or a TOML or JSON file (a path with a dot or a slash): [encoder] or "
+            "[encoders.NAME], [learner], [neurons.LABEL], run_threshold, align. Default, without --encoder: that which "
+            "fits the recording."
         ),
     ] = None,
     encoder: Annotated[
@@ -142,12 +142,12 @@ def _planned(
 ) -> tuple[str | None, Recipe | None]:
     """Return the name of the recipe, if it has one, and the recipe: that which fits the source if none is named."""
     from taxel.detect import Recipe, recipes  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect.training import changed  # noqa: PLC0415
+    from taxel.detect.recipe import changed  # noqa: PLC0415
 
     if recipe is None and "encoder.name" in changes:
         return None, Recipe.from_dict(changed({}, changes))
     if recipe is None and source is not None:
-        recipe = recipes.fitting(source, labels or ())
+        recipe = recipes.fitting(source)
     return recipe, None if recipe is None else Recipe.load(recipe, changes, labels)
 
 
@@ -163,7 +163,7 @@ def _examples(
     """Return recordings as examples; if the encoder needs a tare and none is given, it is taken from each recording."""
     from taxel.detect import Example  # noqa: PLC0415
 
-    needs_rest = tare is None and getattr(plan.encoder, "tare", True) is None
+    needs_rest = tare is None and any(getattr(part, "tare", True) is None for part in plan.encoder._each())
     return [
         Example(
             one,

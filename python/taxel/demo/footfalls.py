@@ -58,7 +58,7 @@ def _shrunk(trial: Trial) -> NDArray[np.float32]:
     scale = max(1.0, float(size.max()) / _FILL_MM)
     # Where each taxel lies on the plate, in its rows and columns; the footprint's middle on the array's.
     array = Array.thesis()
-    away = (np.arange(array.rows) - (array.rows - 1) / 2) * array.pitch_mm * scale
+    away = (np.arange(array.rows) - (array.rows - 1) / 2) * array.row_mm * scale
     rows = (top + bottom) / 2 + away / plate.ROW_MM
     columns = (left + right) / 2 + away / plate.COLUMN_MM
     places = np.meshgrid(rows, columns, indexing="ij")

@@ -7,9 +7,10 @@ from taxel.detect.folds import Fold, Judged, Part, choose, judge
 from taxel.detect.loading import load
 from taxel.detect.plain_rule import PlainRule
 from taxel.detect.readout import Learner, Readout, run
+from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron
-from taxel.detect.training import Recipe, Trained, train
+from taxel.detect.training import Trained, train
 from taxel.detect.tuning import tune
 
 __all__ = [

@@ -88,15 +88,16 @@ def loaded_at_rest(examples: Sequence[Example], encoder: Encoder) -> int:
 
 
 def _loaded(example: Example, encoder: Encoder) -> int:
-    floor, source = getattr(encoder, "noise_floor", None), recorded(example.source)
+    floors = [one.noise_floor for one in encoder._each() if hasattr(one, "noise_floor")]
+    source = recorded(example.source)
     times = np.sort(np.concatenate([*example.labels.values(), np.empty(0, np.int64)])).astype(np.int64) - _BEFORE_US
-    if example.tare is None or floor is None or isinstance(source, SpikeTrains) or not len(times):
+    if example.tare is None or not floors or isinstance(source, SpikeTrains) or not len(times):
         return 0
     least = [
         np.min([example.tare.off(_at(source, int(t))).values for t in ends], axis=0)
         for ends in (times[:_LABELS], times[-_LABELS:])
     ]
-    return max(int(np.count_nonzero(values > floor + 0.5)) for values in least)
+    return max(int(np.count_nonzero(values > max(floors) + 0.5)) for values in least)
 
 
 def _at(source: Events | Frames, t_us: int) -> Frames:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from taxel._base.arguments import whole
 from taxel._base.messages import counted
 from taxel._core import ProblemError
+from taxel.array import Array
 from taxel.detect.scoring import APART_US, Score, score
 from taxel.detections import Detections
+from taxel.encode import Encoder
 from taxel.spikes import SpikeTrains, to_us
 
 __all__ = ["Alignment", "align"]
@@ -99,22 +101,58 @@ class Alignment:
         return f"Alignment({self.label}: {moved}, {self.unpaired.sum()} of {len(self.given)} without a pair)"
 
 
+class Ages(NamedTuple):
+    """The trains of the ages of a touch, one of which fires at every sample of it, and the least age, ms."""
+
+    trains: range
+    least_ms: float
+
+
+def ages_of(encoder: Encoder, array: Array | None) -> Ages | None:
+    """Return the trains of ages of an encoder, or of the first part of a composite one that has any."""
+    first = 0
+    for part in encoder._each():
+        first += part.trains(array or Array(1, 1)) * (2 if part.signed else 1)
+        ages = getattr(part, "ages_ms", None)
+        if ages is not None:
+            return Ages(range(first - len(ages), first), float(ages[0]))
+    return None
+
+
+def _onsets(pattern: SpikeTrains, ages: Ages) -> NDArray[np.float64]:
+    """Return when touches began, ms: the least age before its first spike after a pause, or after a greater age."""
+    times = [pattern[n] for n in ages.trains]
+    order = np.argsort(pooled := np.concatenate(times), kind="stable")
+    pooled, age = pooled[order], np.repeat(np.arange(len(times)), [len(t) for t in times])[order]
+    apart = np.diff(pooled)
+    begins = np.ones(len(pooled), np.bool_)
+    begins[1:] = (apart > 1.5 * apart.min(initial=np.inf)) | (np.diff(age) < 0)
+    return pooled[begins & (age == 0)] - ages.least_ms
+
+
 def align(
-    patterns: Sequence[SpikeTrains], label: str, given: Sequence[NDArray[np.int64]], latency_ms: float
+    patterns: Sequence[SpikeTrains],
+    label: str,
+    given: Sequence[NDArray[np.int64]],
+    latency_ms: float,
+    ages: Ages | None = None,
 ) -> Alignment:
     """Return by how much the labels of one name move to what the sensor felt, which is chosen over all patterns.
 
     The spikes of each input train, less the latency of the encoder, are scored as if they were detections. Of the
     trains with nearly the fewest missed and false, those with the most found, of these the ones nearest to the labels
-    at the median, and of these the first gives each label the spike that is paired with it.
+    at the median, and of these the first gives each label the spike that is paired with it. Of the trains of ages, one
+    of which fires at every sample of a touch, the least age stands for all, with the spikes at which touches begin.
 
     Parameters
     ----------
-    patterns : sequence of SpikeTrains, unsigned
+    patterns : sequence of SpikeTrains, unsigned or graded
     label : str
     given : sequence of int64, shape (events,), us
         The labels of each pattern, ascending; one or more in all.
     latency_ms : float, ms
+    ages : Ages, optional
+        The trains of ages, if there are any.
 
     Returns
     -------
@@ -130,15 +168,20 @@ def align(
     example = np.repeat(np.arange(len(given)), [len(times) for times in given])
     # One after the other, so far apart that nothing of one pairs with another, wherever the clock of each began.
     shift = [k * APART_US - round(to_us(pattern.start)) for k, pattern in enumerate(patterns)]
-    times = [
-        np.rint(to_us(one.times - latency_ms)).astype(np.int64) + by for one, by in zip(patterns, shift, strict=True)
-    ]
     truth = np.concatenate([t + by for t, by in zip(given, shift, strict=True)])
     counts = np.sum([pattern.counts for pattern in patterns], axis=0)
+    if ages is not None:
+        counts[list(ages.trains)] = 0
+    candidates = {
+        train: [pattern[train] for pattern in patterns]
+        for train in np.flatnonzero((counts > 0) & (counts <= _MOST_A_LABEL * len(truth))).tolist()
+    }
+    if ages is not None:
+        candidates[ages.trains[0]] = [_onsets(pattern, ages) for pattern in patterns]
     scores = {}
-    for train in np.flatnonzero((counts > 0) & (counts <= _MOST_A_LABEL * len(truth))).tolist():
-        spikes = [t[one.offsets[train] : one.offsets[train + 1]] for t, one in zip(times, patterns, strict=True)]
-        fired = np.concatenate(spikes)
+    for train, spikes in candidates.items():
+        each = [np.rint(to_us(ms - latency_ms)).astype(np.int64) + by for ms, by in zip(spikes, shift, strict=True)]
+        fired = np.concatenate(each)
         scores[train] = score(Detections([label] * len(fired), fired, fired), {label: truth}, _WINDOW_MS)
     best = _best(scores, len(truth))
     moved = np.zeros(len(truth)) if best is None else np.full(len(truth), np.nan)

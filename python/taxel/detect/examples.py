@@ -112,7 +112,11 @@ def array_of(examples: Sequence[Example]) -> Array | None:
     ProblemError : examples of different arrays (names their places)
     """
     arrays = [None if isinstance(one.source, SpikeTrains) else one.source.array for one in examples]  # type: ignore[union-attr]
+    first = arrays[0]
     for k, array in enumerate(arrays):
-        if array != arrays[0]:
-            raise ProblemError(f"example {k} is of {array!r}, example 0 of {arrays[0]!r}: must be equal")
-    return arrays[0]
+        if (array is None) != (first is None) or (array is not None and first is not None and not first.fits(array)):
+            raise ProblemError(f"example {k} is of {array!r}, example 0 of {first!r}: must have the same taxels")
+    if first is not None:
+        # One line for all, as every second recording may be of the other foot.
+        any(first._warn_apart(array, "examples", stacklevel=3) for array in arrays if array is not None)
+    return first

@@ -47,6 +47,7 @@ class Parts:
     ----------
     encoder : Encoder
     neurons : mapping from label to TrainedNeuron
+        With one weight a train of the encoder, also where they receive some of its parts.
     array : Array, optional
     delays_ms : float64, shape (copies,), ms
     run_threshold : float
@@ -274,7 +275,8 @@ def _parts(
             # The nodes' threshold holds the factor already.
             constants["theta_plus"] = rest.theta_plus * own.run_threshold
         one = Neuron(**{**rest.get_params(), **constants})
-        trained[label] = TrainedNeuron(one, 1000.0 * row * factor, 0.0 if template is None else template.delay_ms)
+        delay_ms, inputs = (0.0, ()) if template is None else (template.delay_ms, template.inputs)
+        trained[label] = TrainedNeuron(one, 1000.0 * row * factor, delay_ms, inputs)
     array = None if own is None else own.array
     return Parts(encoder, trained, array, delays_ms)
 

@@ -18,8 +18,9 @@ from taxel._base.arguments import callback, finite, flag, instance, several, sho
 from taxel._core import ProblemError
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import Readout, run
+from taxel.detect.recipe import Recipe
 from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import Fitting, Recipe, Trained, encoded, learn, readout_of
+from taxel.detect.training import Fitting, Trained, encoded, learn, readout_of
 from taxel.detections import Detections
 from taxel.spikes import SpikeTrains, to_ms
 
@@ -153,7 +154,9 @@ def judge(
     report = _reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
-    patterns = encoded(examples, instance("recipe", recipe, Recipe), report)
+    whole = instance("recipe", recipe, Recipe)
+    recipe = whole._narrowed(recipe._labels(examples), search=search)
+    patterns = encoded(examples, recipe, report)
     array = array_of(examples)
     detections: dict[int, list[Detections]] = {}
     trained = []
@@ -164,7 +167,8 @@ def judge(
             inner = fold.inner or _split(examples, fold.train, INNER)
             plan = _chosen(examples, patterns, recipe, inner, window, frame_us, report)
         with _quiet():
-            trained.append(learn([_of(part, patterns) for part in fold.train], plan, array, report))
+            made = learn([_of(part, patterns) for part in fold.train], plan, array, report)
+        trained.append(made._replace(recipe=replace(whole, neurons=plan.neurons)))
         for part in fold.test:
             detections.setdefault(part.example, []).append(_detected(trained[-1].readout, examples, part, frame_us))
     joined = [reduce(add, detections[place]) for place in sorted(detections)]
@@ -225,7 +229,9 @@ def choose(
         k = whole("k", k, 2, 2**31)
         k = min(k, len(examples)) if len(examples) > 1 else k
     ways, _ = _folds(examples, k)
-    return _chosen(examples, encoded(examples, recipe, report), recipe, ways, window, frame_us, report)
+    narrowed = recipe._narrowed(recipe._labels(examples), search=True)
+    chosen = _chosen(examples, encoded(examples, narrowed, report), narrowed, ways, window, frame_us, report)
+    return replace(chosen, encoder=recipe.encoder)
 
 
 def _chosen(
@@ -277,7 +283,7 @@ def _marks(
                 continue
             if rows is None or not rows.fits(plan):
                 try:
-                    rows = Fitting(training, plan, label, lambda _: None)
+                    rows = Fitting(training, plan, label, array, lambda _: None)
                 except ProblemError:  # as where two labels lie within a longer refractory time
                     if m == 0:
                         raise

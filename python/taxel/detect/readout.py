@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import floats, instance, number, parameters, shown, text, whole
+from taxel._base.arguments import floats, instance, mapping, number, parameters, several, shown, text, whole
 from taxel._core import NotFittedError, ProblemError
 from taxel.array import Array
 from taxel.detect.detector import _Detector, detector, tare_text
 from taxel.detect.exchange import Parts, read_nir, write_nir
 from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
-from taxel.encode import Encoder
+from taxel.encode import Composite, Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.neuron import Neuron
@@ -48,7 +48,7 @@ class Readout(_Detector):
     ----------
     encoder : Encoder
         With its parameters: they belong to the readout. A tare belongs to a board and a day and may be given later.
-    neurons : mapping of str to a fitted learner, or to (Neuron, weights) or (Neuron, weights, delay in ms)
+    neurons : mapping of str to a fitted learner, or to (Neuron, weights), with a delay in ms, with inputs
         By label. All of the same `time` and `after_spike`; others are refused. Weights in mV, one a train of the
         encoder; where its spikes are signed first all ON trains, then all OFF (`SpikeTrains.split_by_sign`).
     array : Array, optional
@@ -62,6 +62,9 @@ class Readout(_Detector):
     delays_ms : float64, shape (delays,), ms, 0 or more, ascending
         Every train is an input once at each of these delays, as `SpikeTrains.delayed` copies it; weights are then one a
         copy: first all trains at the first delay, then all at the second.
+    inputs : mapping of str to sequence of str, optional
+        By label, the parts of a `taxel.encode.Composite` whose trains a neuron receives, in any order; its weights are
+        one a train of these, in the encoder's order. A neuron that has none receives all trains.
 
     Raises
     ------
@@ -96,11 +99,18 @@ class Readout(_Detector):
         delay_ms: float | Mapping[str, float] = 0.0,
         run_threshold: float = 1.0,
         delays_ms: ArrayLike = (0.0,),
+        inputs: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         instance("encoder", encoder, Encoder)
         if not isinstance(neurons, Mapping) or not neurons:
             raise ProblemError(f"neurons is {shown(neurons)}: must be trained neurons by label, one or more")
-        trained = {text("label", label): _trained(label, one, delay_ms) for label, one in neurons.items()}
+        named = {} if inputs is None else mapping("inputs", inputs)
+        for label in named:
+            if label not in neurons:
+                raise ProblemError(f"inputs: no neuron {shown(label)}: there are {', '.join(map(str, neurons))}")
+        trained = {
+            text("label", label): _trained(label, one, delay_ms, named.get(label)) for label, one in neurons.items()
+        }
         first = next(iter(trained.values())).neuron
         made = _core.make_readout(
             parameters(
@@ -115,6 +125,7 @@ class Readout(_Detector):
                         label: {
                             "neuron": json.loads(one.neuron._json()),
                             "delay_ms": one.delay_ms,
+                            "inputs": list(one.inputs),
                             "weights": one.weights,
                         }
                         for label, one in trained.items()
@@ -143,9 +154,59 @@ class Readout(_Detector):
     def neurons(self) -> dict[str, TrainedNeuron]:
         """The trained neurons by label."""
         return {
-            label: TrainedNeuron(Neuron(**one["neuron"]), np.array(one["weights"], np.float64), one["delay_ms"])
+            label: TrainedNeuron(
+                Neuron(**one["neuron"]),
+                np.array(one["weights"], np.float64),
+                one["delay_ms"],
+                tuple(one.get("inputs", ())),
+            )
             for label, one in self._parts["neurons"].items()
         }
+
+    def encoder_of(self, label: str) -> Encoder:
+        """Return the encoder whose trains a neuron receives: the readout's, or of a composite one its own inputs.
+
+        Parameters
+        ----------
+        label : str
+
+        Returns
+        -------
+        Encoder
+
+        Raises
+        ------
+        ProblemError : no neuron of that label
+        """
+        if text("label", label) not in self.labels:
+            raise ProblemError(f"label {shown(label)}: there are {', '.join(self.labels)}")
+        encoder, inputs = self.encoder, self.neurons[label].inputs
+        return encoder.only(inputs) if inputs and isinstance(encoder, Composite) else encoder
+
+    def trains_of(self, label: str, trains: SpikeTrains) -> SpikeTrains:
+        """Return what a neuron receives of the spikes that the encoder made: its inputs, at each delay.
+
+        Parameters
+        ----------
+        label : str
+        trains : SpikeTrains
+            Of the readout's encoder.
+
+        Returns
+        -------
+        SpikeTrains
+            One a weight of the neuron, unsigned or graded.
+
+        Raises
+        ------
+        ProblemError : no neuron of that label, or not the encoder's trains
+        """
+        instance("trains", trains, SpikeTrains)
+        inputs = trains.split_by_sign() if trains.signed else trains
+        if text("label", label) not in self.labels:
+            raise ProblemError(f"label {shown(label)}: there are {', '.join(self.labels)}")
+        received = _received(self.encoder, self.neurons[label], self.array, 1)
+        return (inputs if received is None else inputs.select(received)).delayed(self.delays_ms)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -204,11 +265,23 @@ class Readout(_Detector):
         return write_nir(self._exchanged(), path, spike_ms=spike_ms, overwrite=overwrite)
 
     def _exchanged(self) -> Parts:
-        """Return the parts that the exchange format is made of."""
+        """Return the parts that the exchange format is made of; weights of trains that a neuron lacks are 0."""
+        neurons = {label: one._replace(weights=self._spread(one)) for label, one in self.neurons.items()}
         return Parts(
-            self.encoder, self.neurons, self.array, self.delays_ms, self.run_threshold, self.time, self.after_spike,
+            self.encoder, neurons, self.array, self.delays_ms, self.run_threshold, self.time, self.after_spike,
             self.to_json(),
         )  # fmt: skip
+
+    def _spread(self, one: TrainedNeuron) -> NDArray[np.float64]:
+        """Return one weight a train of the whole encoder, at each delay."""
+        received = _received(self.encoder, one, self.array, len(self.delays_ms))
+        if received is None:
+            return one.weights
+        if np.count_nonzero(received) != len(one.weights):
+            raise ProblemError("NIR: a readout of encoders whose trains depend on the array must state its array")
+        spread = np.zeros(len(received))
+        spread[received] = one.weights
+        return spread
 
     @classmethod
     def from_nir(
@@ -249,7 +322,8 @@ class Readout(_Detector):
         def build(parts: Parts) -> Readout:
             if parts.text:
                 return cls.from_json(parts.text)
-            return cls(parts.encoder, parts.neurons, array=parts.array, delays_ms=parts.delays_ms)
+            neurons = {label: _gathered(parts, one) for label, one in parts.neurons.items()}
+            return cls(parts.encoder, neurons, array=parts.array, delays_ms=parts.delays_ms)
 
         return read_nir(
             path,
@@ -330,6 +404,10 @@ def run(
         if not isinstance(readout, Readout):
             raise ProblemError(f"source is {shown(source)}: a plain rule reads a recording, events or frames")
         return _run_spikes(readout, source)
+    if isinstance(source, Events | Frames):
+        for own in (readout.array, None if tare is None else tare.array):
+            if own is not None:
+                own._warn_apart(source.array, "the recording")
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
         columns = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
@@ -341,35 +419,57 @@ def run(
     return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, rest))
 
 
+def _received(encoder: Encoder, one: TrainedNeuron, array: Array | None, delays: int) -> NDArray[np.bool_] | None:
+    """Return which of the encoder's trains, at each delay, a neuron receives; None where it receives all."""
+    if not one.inputs or not isinstance(encoder, Composite):
+        return None
+    return np.tile(encoder.places(one.inputs, array or Array(1, 1)), delays)
+
+
+def _gathered(parts: Parts, one: TrainedNeuron) -> TrainedNeuron:
+    """Return a neuron with weights of its inputs alone; with all trains as inputs where others have weights too."""
+    received = _received(parts.encoder, one, parts.array, len(parts.delays_ms))
+    if received is None:
+        return one
+    own = len(received) == len(one.weights) and not one.weights[~received].any()
+    return one._replace(weights=one.weights[received]) if own else one._replace(inputs=())
+
+
 def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     """Return what the neurons of a readout detect in the spikes that its encoder made."""
-    trains = trains.split_by_sign() if trains.signed else trains
-    trains = trains.delayed(readout.delays_ms)
-    trains = trains.lasting(trains.stop + SILENCE_MS)
     detections = Detections([], [], [])
     for label, one in readout.neurons.items():
-        spikes, slopes = one.neuron._run(one.weights, trains, readout.run_threshold)
-        t, known = (
-            np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - (readout.encoder.latency_ms + one.delay_ms), spikes)
-        )
+        inputs = readout.trains_of(label, trains)
+        spikes, slopes = one.neuron._run(one.weights, inputs.lasting(inputs.stop + SILENCE_MS), readout.run_threshold)
+        offset_ms = readout.encoder_of(label).latency_ms + one.delay_ms
+        t, known = (np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - offset_ms, spikes))
         detections += Detections([label] * len(spikes), t, known, slopes)
     return detections[np.argsort(detections.known, kind="stable")]
 
 
-def _trained(label: str, one: Any, delay_ms: float | Mapping[str, float]) -> TrainedNeuron:
-    """Return a neuron with weights and delay, given a learner or a tuple."""
+def _trained(
+    label: str, one: Any, delay_ms: float | Mapping[str, float], inputs: Sequence[str] | None
+) -> TrainedNeuron:
+    """Return a neuron with weights, delay and inputs, given a learner or a tuple."""
     if isinstance(delay_ms, Mapping):
         if label not in delay_ms:
             raise ProblemError(f"delay_ms: there is none for {label!r}")
         delay_ms = delay_ms[label]
-    if isinstance(one, tuple) and len(one) in (2, 3):
-        neuron, weights, *its_delay = one
-        delay = its_delay[0] if its_delay else delay_ms
+    delay, named = delay_ms, () if inputs is None else inputs
+    if isinstance(one, tuple) and len(one) in (2, 3, 4):
+        neuron, weights, *others = one
+        delay = others[0] if others else delay
+        named = others[1] if len(others) > 1 and inputs is None else named
     elif hasattr(one, "weights_") and hasattr(one, "neuron_"):
-        neuron, weights, delay = one.neuron_, one.weights_, delay_ms
+        neuron, weights = one.neuron_, one.weights_
     else:
         if hasattr(one, "fit"):
             raise NotFittedError(f"{label}: {shown(one)} is not fitted")
         raise ProblemError(f"{label}: {shown(one)} must be a fitted learner, or (Neuron, weights)")
     instance(f"{label}: neuron", neuron, Neuron)
-    return TrainedNeuron(neuron, floats(f"{label}: weights", weights), number(f"{label}: delay_ms", delay, "ms"))
+    return TrainedNeuron(
+        neuron,
+        floats(f"{label}: weights", weights),
+        number(f"{label}: delay_ms", delay, "ms"),
+        tuple(text(f"{label}: inputs", name) for name in several(f"{label}: inputs", named)),
+    )

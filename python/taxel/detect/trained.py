@@ -19,8 +19,11 @@ class TrainedNeuron(NamedTuple):
     ----------
     neuron : Neuron
     weights : float64, shape (trains,), mV
+        In the order of the encoder's trains.
     delay_ms : float, ms, 0 or more
         How much later than the event it was trained to fire.
+    inputs : tuple of str
+        The parts of a `Composite` encoder whose trains it receives; none stands for all trains of the encoder.
 
     Raises
     ------
@@ -30,3 +33,4 @@ class TrainedNeuron(NamedTuple):
     neuron: Neuron
     weights: NDArray[np.float64]
     delay_ms: float = 0.0
+    inputs: tuple[str, ...] = ()

@@ -1,5 +1,6 @@
 """Encoders: events or frames to spikes, with the same result for a stream as for a whole recording."""
 
+from taxel.encode._composite import Composite as Composite
 from taxel.encode._encoder import Encoder as Encoder
 from taxel.encode._encoder import EncoderStream as EncoderStream
 from taxel.encode.change_events import ChangeEvents as ChangeEvents

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -92,8 +92,16 @@ class Encoder(Value):
         """
         if not isinstance(text, str):
             raise ProblemError(f"encoder is {shown(text)}: must be JSON text")
-        values = json.loads(_core.check_encoder(checked_text("encoder", text)))
-        return Encoder._by_name[values.pop("name")]._from_values(values)
+        return Encoder._of(json.loads(_core.check_encoder(checked_text("encoder", text))))
+
+    @staticmethod
+    def _of(values: Mapping[str, Any]) -> Encoder:
+        """Return the encoder of checked JSON values."""
+        return Encoder._by_name[values["name"]]._from_values({k: v for k, v in values.items() if k != "name"})
+
+    def _each(self) -> list[Encoder]:
+        """Return the encoders that it is made of: itself, or the parts of a composite in the order of their trains."""
+        return [self]
 
     def trains(self, array: Array) -> int:
         """Return the number of trains that the encoder returns for an array; a signed train counts once.

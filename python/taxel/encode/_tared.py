@@ -72,8 +72,13 @@ class Tared(Encoder):
 
     def _with_rest_of(self, x: Events | Frames | Recorded) -> tuple[Self, Events | Frames | Recorded]:
         """Return the encoder with its tare, measured at the beginning of `x` if it is a number of seconds, and `x`."""
-        if self.tare is None or self._is_rest():
+        if self.tare is None:
             return self, x
+        if isinstance(self.tare, Tare):
+            held = recorded(x)
+            if isinstance(held, Events | Frames):
+                self.tare.array._warn_apart(held.array, "the recording", stacklevel=4)
+            return self, held
         held = recorded(x)
         if not isinstance(held, Events | Frames) or not len(held.t):
             return self, held

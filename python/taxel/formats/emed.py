@@ -111,8 +111,8 @@ def _read(file: Path) -> Trial:
     values = np.zeros((len(pages), *shape), np.float32)
     for picture, page in zip(values, pages, strict=True):
         picture[np.ix_(page.rows, page.columns)] = page.values
-    # Taxels that are not square have two sizes; the pitch of equal area is used.
-    array = Array(*shape, pitch_mm=10 * float(np.sqrt(size[0] * size[1])), name="emed plate")
+    # The size is named as the matrix is: across first.
+    array = Array(*shape, pitch_mm=(10 * size[1], 10 * size[0]), name="emed plate")
     return Trial(
         name=file.stem,
         person=file.stem,

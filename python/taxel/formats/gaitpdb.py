@@ -18,6 +18,7 @@ from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.checks import ascending_us
+from taxel.formats.layout import packaged
 from taxel.formats.trial import MARGIN_US, Trial
 from taxel.frames import Frames
 
@@ -48,7 +49,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     Yields
     ------
     Trial
-        Channels 0 to 7 are sensors 1 to 8 (heel to front) of either foot; ``series["total"]`` is the total force in N.
+        Channels 0 to 7 are sensors 1 to 8 (heel to front) of either foot, at the places that the source states in units
+        of its own; ``series["total"]`` is the total force in N.
 
     Raises
     ------
@@ -58,6 +60,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     paths = files(place)
     if not paths:
         raise FormatError(f"{place}: no file such as GaCo02_01.txt in it")
+    places, foot_of = packaged("gaitpdb"), Array(1, 8, name="gaitpdb foot")
     known = _events_table((place if place.is_dir() else place.parent) / "events.csv")
     for file in paths:
         match = _NAME.fullmatch(file.name)
@@ -85,7 +88,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
                 name=f"{file.name.split('.')[0]} {foot}",
                 person=person,
                 recorded=Frames(
-                    values[:, None, 1 + 8 * n : 9 + 8 * n], t, unit="N", array=Array(1, 8, name="gaitpdb foot")
+                    values[:, None, 1 + 8 * n : 9 + 8 * n], t, unit="N", array=places.array(8, foot_of, foot)
                 ),
                 truth=truth,
                 source=_SOURCE,

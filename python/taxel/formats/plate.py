@@ -106,7 +106,7 @@ def _trial(
     except FormatError as error:
         raise FormatError(f"{file.name}, img{number:03d}: {error}") from None
     values = np.ascontiguousarray(sensors.transpose(2, 0, 1), np.float32)
-    array = Array(values.shape[1], values.shape[2], COLUMN_MM, name="footscan plate")
+    array = Array(values.shape[1], values.shape[2], (ROW_MM, COLUMN_MM), name="footscan plate")
     return Trial(
         name=f"{person}/{number:02d}",
         person=person,

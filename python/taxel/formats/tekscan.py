@@ -7,7 +7,6 @@ the file. Only the header has the unit and the spacings.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -57,8 +56,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     """Yield the movie of one file, or of all in a folder.
 
     Cells that do not exist (``B``) read 0. Times are those that the frames state; if they state none, frame 1 is at 0
-    us, and times jump at a missing frame. The pitch is the square root of the product of the two spacings, so that
-    areas are correct if rows and columns are spaced differently.
+    us, and times jump at a missing frame.
 
     Parameters
     ----------
@@ -128,7 +126,7 @@ def _read(file: Path) -> Trial:
     array = Array(
         rows,
         columns,
-        math.sqrt(down * across),
+        (down, across),
         None if exists is None or exists.all() else exists,
         f"Tekscan {header.values.get('SENSOR_TYPE', 'sensor')}",
     )

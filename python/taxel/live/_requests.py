@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _core
 from taxel._base.files import whole_file
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -83,7 +84,7 @@ def _reasons() -> Iterator[None]:
 
 
 def _rest(recording: Recording) -> Tare:
-    """Return the rest of a recording's taxels: before its first label and the start marker, or at its beginning."""
+    """Return the rest of taxels: before the first label and the board's start marker, or at the recording's beginning."""
     source = recorded(recording)
     first = int(source.t[0]) if len(source) else 0
     ends = [note.t - _BEFORE_US for note in recording.notes if note.t is not None]
@@ -180,7 +181,7 @@ class RequestHandler:
 
     def health(
         self,
-        array: tuple[int, int, float, str, list[bool] | None],
+        array: _core._Array,
         events: NDArray[np.uint32],
         moved: NDArray[np.uint32],
         values: tuple[NDArray[np.uint8], NDArray[np.int32], NDArray[np.int32]] | None,

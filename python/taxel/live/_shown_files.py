@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._core import FormatError, ProblemError
-from taxel.array import Array
+from taxel.array import Array, Places
 from taxel.frames import Frames
 from taxel.recording import Recording
 from taxel.recording.convert import convert
@@ -197,4 +197,26 @@ def side_by_side(arrays: list[Array]) -> tuple[Array, list[int]]:
     pitches = {one.pitch_mm for one in arrays}
     name = arrays[0].name if len({one.name for one in arrays}) == 1 else ", ".join(one.name for one in arrays)
     more: dict[str, Any] = {"pitch_mm": pitches.pop()} if len(pitches) == 1 else {}
+    more |= {"places": _places_beside(arrays, lefts, exists)}
     return Array(rows, columns - 1, exists=exists, name=name, **more), lefts
+
+
+def _places_beside(arrays: list[Array], lefts: list[int], exists: NDArray[np.bool_]) -> Places | None:
+    """Return the places of arrays side by side, a fifth of a width apart; None unless all have them in one unit."""
+    every = [one.places for one in arrays]
+    places = [one for one in every if one is not None]
+    if len(places) < len(arrays) or len({one.unit for one in places}) > 1:
+        return None
+    x, y, area = np.zeros(exists.shape), np.zeros(exists.shape), np.ones(exists.shape)
+    right = 0.0
+    for array, left, one in zip(arrays, lefts, places, strict=True):
+        at = np.s_[: array.rows, left : left + array.columns]
+        there = exists[at]
+        own = one.x.reshape(array.shape)
+        least, most = float(own[there].min()), float(own[there].max())
+        x[at], y[at] = own - least + right, one.y.reshape(array.shape)
+        right += 1.2 * (most - least)
+        if one.area is not None:
+            area[at] = one.area.reshape(array.shape)
+    known = all(one.area is not None for one in places)
+    return Places(x, y, area if known else None, places[0].unit)

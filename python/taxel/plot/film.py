@@ -142,13 +142,14 @@ def _stage(events: Events, times: NDArray[np.float64]) -> tuple[Figure, AxesImag
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, height_ratios=[5, 1])
     rows, columns = events.array.shape
-    pitch = events.array.pitch_mm
+    known = events.array.pitch_mm is not None
+    down, across = events.array._pitch("film") if known else (1.0, 1.0)
     image = above.imshow(
         np.zeros((rows, columns)), cmap="magma", vmin=0, vmax=_most(events), interpolation="nearest",
-        extent=(-pitch / 2, (columns - 0.5) * pitch, (rows - 0.5) * pitch, -pitch / 2),
+        extent=(-across / 2, (columns - 0.5) * across, (rows - 0.5) * down, -down / 2),
     )  # fmt: skip
     figure.colorbar(image, ax=above, label="ticks above rest")
-    above.set(xlabel="x (mm)", ylabel="y (mm)")
+    above.set(xlabel="x (mm)" if known else "column", ylabel="y (mm)" if known else "row")
     below.set(xlabel="time since the start marker (ms)", xlim=(0, to_ms(times[-1] - times[0])))
     return figure, image, below
 

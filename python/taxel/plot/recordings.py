@@ -13,6 +13,7 @@ from taxel._base.arguments import instance
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
+from taxel.recording.pressure import Series
 
 __all__ = ["health_map", "overview", "pressure"]
 
@@ -91,7 +92,7 @@ def pressure(frames: Frames, above: float = 0.0, figure: None = None) -> Figure:
 @overload
 def pressure(frames: Frames, above: float = 0.0, *, figure: F) -> F: ...
 def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = None) -> FigureBase:
-    """Draw contact area, peak, sum and centre of pressure over time.
+    """Draw contact area, peak, sum and centre of pressure over time; of channels peak and sum.
 
     Parameters
     ----------
@@ -117,22 +118,24 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     >>> [ax.get_ylabel() for ax in pressure(frames).axes]
     ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
     """
-    instance("frames", frames, Frames)
+    of = Series.of(instance("frames", frames, Frames), above)
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
-    rows = instance("figure", figure, FigureBase).subplots(4, 1, sharex=True)
-    t, centre = frames.t / 1e6, frames.centre(above)
-    for ax, values, name in (
-        (rows[0], frames.area(above), "contact area (mm2)"),
-        (rows[1], frames.peak(), f"peak ({frames.unit})"),
-        (rows[2], frames.total(), f"sum ({frames.unit})"),
-    ):
+    curves = [(f"peak ({of.unit})", of.peak), (f"sum ({of.unit})", of.total)]
+    if of.area is not None:
+        curves.insert(0, (f"contact area ({of.area_unit})", of.area))
+    rows = instance("figure", figure, FigureBase).subplots(len(curves) + (of.centre is not None), 1, sharex=True)
+    t = frames.t / 1e6
+    for ax, (name, values) in zip(rows, curves, strict=False):
         ax.plot(t, values, color="black", linewidth=0.8)
         ax.set_ylabel(name)
-    for axis, colour, name in ((0, "#c44e52", "x"), (1, "#4c72b0", "y")):
-        rows[3].plot(t, centre[:, axis], color=colour, linewidth=0.8, label=name)
-    rows[3].set(xlabel="board time (s)", ylabel="centre (mm)")
-    rows[3].legend(loc="upper right")
+    if of.centre is not None:
+        names = ("column", "row") if of.centre_unit == "taxels" else ("x", "y")
+        for axis, colour, name in zip(of.centre.T, ("#c44e52", "#4c72b0"), names, strict=True):
+            rows[-1].plot(t, axis, color=colour, linewidth=0.8, label=name)
+        rows[-1].set_ylabel(f"centre ({of.centre_unit})")
+        rows[-1].legend(loc="upper right")
+    rows[-1].set_xlabel("board time (s)")
     return figure
 
 

@@ -97,6 +97,10 @@ class Contents:
         The sensor.
     source : str
         The origin of the bytes, such as an address or a port.
+    side : {"left", "right", ""}
+        The foot or hand that the sensor is of.
+    heel : {"top", "bottom", ""}
+        Where on the sensor the heel lies.
     events, frames : Events, Frames
         One of the two; for a recording of events `frames` is None, never a function.
     stretch : (int, int), us
@@ -153,6 +157,8 @@ class Contents:
     array: Array
     label: str = "board"
     source: str = ""
+    side: str = ""
+    heel: str = ""
     events: Events | None = None
     frames: Frames | None = None
     stretch: tuple[int, int] | None = None

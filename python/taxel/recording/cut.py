@@ -6,7 +6,6 @@ import numpy as np
 
 from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
-from taxel.array import Array
 from taxel.events import Events
 from taxel.recording.contents import Contents, once
 from taxel.recording.fates import after
@@ -96,8 +95,7 @@ def region(of: Contents, columns: slice, rows: slice) -> Contents:
     if of.is_several:
         # Reading the events raises the error that lists the sources.
         _ = of.events
-    exists = None if array.exists is None else array.exists[top:bottom, left:right]
-    small = Array(bottom - top, right - left, array.pitch_mm, exists, array.name)
+    small = array._part(columns, rows)
 
     def events() -> Events | None:
         if of.events is None:

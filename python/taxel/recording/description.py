@@ -31,6 +31,8 @@ def json_of(contents: Contents) -> str:
     document: dict[str, Any] = {
         "array": contents.array._geometry(),
         "source": contents.source,
+        "side": contents.side,
+        "heel": contents.heel,
         "registers": None if registers is None else json.loads(registers._json()),
         "registers_array": None if driven == contents.array else driven._geometry(),
         "register_changes": [[at, json.loads(held._json())] for at, held in changes],
@@ -162,6 +164,8 @@ def _texts(texts: Any) -> tuple[str, ...]:
 _ENTRIES: dict[str, Any] = {
     "array": lambda value, place: sensor(place, array_of(value)),
     "source": lambda value, _: text("source", value),
+    "side": lambda value, _: text("side", value, ("left", "right")),
+    "heel": lambda value, _: text("heel", value, ("top", "bottom")),
     "registers": lambda value, _: value,
     "registers_array": lambda value, place: sensor(place, array_of(value)),
     "register_changes": lambda value, _: value,

@@ -30,6 +30,8 @@ kind                 =      =      ~      =         =          =         =      
 array                =      ~      ~      =         =          =         =       ~      =     ~    =    ~   =
 label                =      =      ~      =         =          =         =       ~      ~     ~    ~    ~   ~
 source               =      =      ~      =         =          =         =       ~      ~     -    ~    -   ~
+side                 =      =      ~      =         =          =         =       ~      =     -    =    -   =
+heel                 =      =      ~      =         =          =         =       ~      =     -    =    -   =
 events               ~      ~      ~      ~         =          ~         ~       ~      ~     ~    =    ~   =
 frames               ~      ~      ~      ~         =          ~         ~       ~      ~     ~    =    ~   =
 stretch              ~      =      -      =         =          =         =       ~      -     -    -    -   -
@@ -79,7 +81,7 @@ _DEFAULTS: dict[str, Callable[[], Any]] = {
 def sensor(array: Array) -> str:
     """Return the line of `lost` for a sensor."""
     some = "" if array.exists is None else f", {array.taxels} exist"
-    return f'the sensor ({array.rows} x {array.columns} taxels{some}, {array.pitch_mm:g} mm apart, "{array.name}")'
+    return f'the sensor ({array.rows} x {array.columns} taxels{some}, {array._apart()}, "{array.name}")'
 
 
 def _datagrams(of: Contents, step: str) -> str:
@@ -100,6 +102,8 @@ def _sources(of: Contents, _: str) -> list[str]:
 #: The line of `lost` for a field that held anything. None: the field is part of another one, or follows from others.
 LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "source": lambda of, _: f"where it came from ({of.source})",
+    "side": lambda of, _: f"the side ({of.side})",
+    "heel": lambda of, _: f"where the heel lies ({of.heel})",
     # A part that is written to a file becomes a recording of its own.
     "stretch": None,
     "held": lambda of, _: f"what {counted(int(np.sum(of.held != UNKNOWN)), 'taxel')} held at the beginning",

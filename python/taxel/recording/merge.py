@@ -82,7 +82,11 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
     tables = [part.table for part in parts]
     shifts = _shifts(tables, gap)
     array, lefts = _side_by_side(tables) if beside else (_common(parts, tables), [0] * len(parts))
-    lost = [f"the pitch of {p.name} ({p.array.pitch_mm:g} mm)" for p in parts if p.array.pitch_mm != array.pitch_mm]
+    lost = [
+        f"the pitch or places of {p.name} ({p.array._apart()})"
+        for p in parts
+        if p.array._is_measured and (p.array.pitch_mm, p.array.places) != (array.pitch_mm, array.places)
+    ]
     has_events = parts[0].has_events
     events = _events([t for t in tables if isinstance(t, Events)], shifts, array, lefts) if has_events else None
     frames = None if has_events else _frames([t for t in tables if isinstance(t, Frames)], shifts, array, beside)
@@ -94,6 +98,8 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
     fields["board_changes"] = _agreed(changes, (), "the changes of the board (the recordings differ)", lost)
     fields["counts"] = common("counts", {}, "what each received and lost, by cause (the recordings differ)")
     fields["rebuilt"] = common("rebuilt", {}, "what reading each had to put up with (the recordings differ)")
+    for name, what in (("side", "the side"), ("heel", "where the heel lies")):
+        fields[name] = common(name, "", f"{what} (the recordings differ)")
     fields["columns"] = None if beside else common("columns", None, "the names of the columns (the recordings differ)")
     if beside and any(part.columns is not None for part in parts):
         fields["columns"] = tuple(name for part in parts for name in part.columns or ())
@@ -305,7 +311,7 @@ def _shifts(tables: Sequence[Events | Frames], gap: float | None) -> list[int]:
 def _common(parts: Sequence[Contents], tables: Sequence[Events | Frames]) -> Array:
     array = tables[0].array
     for part, table in zip(parts, tables, strict=True):
-        if table.array != array:
+        if not array.fits(table.array):
             raise ProblemError(
                 f"{part.name}: {table.array!r}, {parts[0].name}: {array!r}; different sensors are merged "
                 "beside one another only"
@@ -322,7 +328,8 @@ def _side_by_side(tables: Sequence[Events | Frames]) -> tuple[Array, list[int]]:
     for left, a in zip(lefts, arrays, strict=False):
         exists[: a.rows, left : left + a.columns] = True if a.exists is None else a.exists
     name = " | ".join(dict.fromkeys(a.name for a in arrays))
-    return Array(rows, lefts[-1], arrays[0].pitch_mm, None if exists.all() else exists, name), lefts[:-1]
+    pitch = arrays[0].pitch_mm if all(a.pitch_mm == arrays[0].pitch_mm for a in arrays) else None
+    return Array(rows, lefts[-1], pitch, None if exists.all() else exists, name), lefts[:-1]
 
 
 def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[int]) -> Events:

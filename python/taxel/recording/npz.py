@@ -67,7 +67,9 @@ def contents_of(path: Path, kind: str, columns: dict[str, NDArray[Any]], array: 
     columns = {name: frozen(values) for name, values in columns.items()}
     about = about_of(f"{path}, array about", str(columns.get("about", "{}")))
     described = about.pop("array", None)
-    sensor = array or described
+    # A sensor of unknown pitch says nothing against the pitch of the file.
+    says_less = array is not None and described is not None and not array._is_measured and described.fits(array)
+    sensor = described if says_less else array or described
     try:
         if "values" in columns and "t" in columns:
             unit = str(columns.get("unit", "counts"))

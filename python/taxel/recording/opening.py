@@ -15,13 +15,16 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats import Trial
+from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
 from taxel.labels import Labels, Note
 from taxel.recording.contents import Contents, several
 from taxel.recording.csv import read_csv
 from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, kind_of
+from taxel.recording.layout import laid_out
 from taxel.recording.npz import read_npz
+from taxel.recording.read_foreign import is_foreign, read_foreign
 from taxel.recording.read_lsa import read_lsa
 from taxel.recording.read_mcap import read_mcap
 from taxel.recording.read_ros import Topics, read_ros
@@ -41,6 +44,7 @@ def open_any(
     path: str | os.PathLike[str],
     *,
     array: Array | Sequence[Array] | None = None,
+    layout: str | os.PathLike[str] | None = None,
     pairing: str = "direct",
     differences: bool = False,
     topic: str | Sequence[str] | None = None,
@@ -60,6 +64,9 @@ def open_any(
     array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
         a larger one if events lie outside it. Of a ROS bag rows and columns, for messages that do not state them.
+    layout : path, optional
+        The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
+        ``layout.toml`` beside it, if there is one.
     pairing : {"direct", "taxel"}
         Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
     differences : bool
@@ -101,13 +108,13 @@ def open_any(
      Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
     """
     place = Path(arguments.path("path", path))
-    how: dict[str, Any] = {"array": array, "pairing": pairing, "differences": differences}
+    how: dict[str, Any] = {"array": array, "layout": layout, "pairing": pairing, "differences": differences}
     how |= {"topic": topic, "field": field, "types": types, "ros": ros}
     if place.is_dir() and not is_bag(place):
         return _folder(place, how)
     # The names of other formats are tested first, as recognising a .h5 requires reading it once more.
     if place.exists() and (names := _formats(place)) and not _is_own(place):
-        return [_of(trial, place, names[0]) for trial in formats.trials(place, names[0])]
+        return [_of(trial, place, names[0], layout) for trial in formats.trials(place, names[0])]
     return open_recording(place, **how)
 
 
@@ -115,6 +122,7 @@ def open_recording(
     path: str | os.PathLike[str],
     *,
     array: Array | Sequence[Array] | None = None,
+    layout: str | os.PathLike[str] | None = None,
     pairing: str = "direct",
     differences: bool = False,
     topic: str | Sequence[str] | None = None,
@@ -130,6 +138,9 @@ def open_recording(
     array : Array, or list of Array, optional
         The sensor, for files that do not hold it (.lsa, .csv, plain .npz); default: the thesis' 64 x 64,
         a larger one if events lie outside it. Of a ROS bag rows and columns, for messages that do not state them.
+    layout : path, optional
+        The layout file that says what the recording lacks (docs/files.md); default: ``NAME.layout.toml`` or
+        ``layout.toml`` beside it, if there is one.
     pairing : {"direct", "taxel"}
         Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
     differences : bool
@@ -157,16 +168,21 @@ def open_recording(
     place = Path(arguments.path("path", path))
     text("pairing", pairing, ("direct", "taxel"))
     flag("differences", differences)
-    topics = Topics(topic, field, types, ros)
-    kind = kind_of(place)
+    said = _layout(place, layout)
+    of_layout = {} if said is None else said.ros
+    given = Topics(topic, field, types, ros)
+    topics = given.but(of_layout)
     try:
-        if kind == "ros":
-            return Recording(with_sidecars(read_ros(place, topics, array)))
-        if topics:
+        if said is not None and is_foreign(place):
+            contents = read_foreign(place, said)
+        elif (kind := kind_of(place)) == "ros":
+            contents = read_ros(place, topics, said.grid() if array is None and said is not None else array)
+        elif given.are_given:
             raise ProblemError(f"{place}: a .{kind}; topic, field, types and ros are of a ROS bag")
-        if array is not None:
-            instance("array", array, Array)
-        return Recording(with_sidecars(_read(place, kind, array, pairing, differences)))
+        else:
+            own = None if array is None else instance("array", array, Array)
+            contents = _read(place, kind, own, pairing, differences)
+        return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
 
@@ -182,15 +198,16 @@ def _read(place: Path, kind: str, array: Array | None, pairing: str, differences
 
 def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
     """Open all recordings of a folder, with the labels in the same folder."""
-    there = sorted((file for file in folder.iterdir() if file.name != LABELS), key=_order)
-    own = [file for file in there if _is_own(file)]
+    files = sorted((file for file in folder.iterdir() if file.name != LABELS), key=_order)
+    own = [file for file in files if _is_own(file)]
     if how["topic"] or not own:
-        own = [file for file in there if file in own or is_bag(file)]
+        own = [file for file in files if file in own or is_bag(file)]
     if own:
         opened = [open_recording(file, **how) for file in own]
         pairs = [(recording.path.relative_to(folder), recording) for recording in opened]
+    elif not (names := _formats(folder)) and (foreign := [f for f in files if _is_laid_out(f, how["layout"])]):
+        pairs = [(file.relative_to(folder), open_recording(file, **how)) for file in foreign]
     else:
-        names = _formats(folder)
         if len(names) != 1:
             problem = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
             deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
@@ -198,7 +215,7 @@ def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
             there = f"there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}"
             raise FormatError(f"{folder}: holds {problem}; {hint or there}")
         trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
-        pairs = [(Path(trial.name), _of(trial, folder, names[0])) for trial in trials]
+        pairs = [(Path(trial.name), _of(trial, folder, names[0], how["layout"])) for trial in trials]
     return _labelled(folder / LABELS, pairs)
 
 
@@ -230,7 +247,19 @@ def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
     )
 
 
-def _of(trial: Trial, place: Path, kind: str) -> Recording:
+def _is_laid_out(file: Path, given: str | os.PathLike[str] | None) -> bool:
+    """Return whether a file of a folder is of somebody else, and a layout says how to read it."""
+    is_labels = file.name.endswith(".notes.csv")
+    return is_foreign(file) and not is_labels and (given is not None or Layout.beside(file) is not None)
+
+
+def _layout(place: Path, given: str | os.PathLike[str] | None) -> Layout | None:
+    """Return what the given layout file says, or the one beside a recording; None if there is none."""
+    file = Layout.beside(place) if given is None else Path(arguments.path("layout", given))
+    return None if file is None else Layout.read(file)
+
+
+def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | None) -> Recording:
     """Return a trial of another format as a recording, with its reference events as notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
@@ -241,7 +270,9 @@ def _of(trial: Trial, place: Path, kind: str) -> Recording:
     held: dict[str, Any] = {"events": events, "frames": frames, "source": trial.source, "notes": tuple(notes)}
     label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
     held |= {"untimed": not trial.timed, "label": label}
-    return Recording(with_sidecars(Contents(path, trial.name, kind, table.array, **held)))
+    contents = Contents(path, trial.name, kind, table.array, side=trial.foot, **held)
+    said = _layout(place, layout)
+    return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
 
 
 def recordings_in(folder: Path) -> list[Path]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel.calibration._curves import N_PER_KPA_MM2
 from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.frames import Frames
@@ -36,26 +37,48 @@ class Series:
     unit : str
     above : float
         The value above which a taxel counts as loaded, in `unit`.
-    area : float64, shape (n,), mm2
+    area : float64, shape (n,), mm2 or taxels; None of channels
+    area_unit : {"mm2", "taxels"}
+        "taxels", a number of taxels, if their area is not known.
     peak, total : float64, shape (n,), in `unit`
-    centre : float64, shape (n, 2), mm
+    centre : float64, shape (n, 2), in `centre_unit`; None of channels
         As of `Frames.centre`.
+    centre_unit : {"mm", "taxels", "places"}
+        As of `Array.centre_unit`.
+    force : float64, shape (n,), N
+        Of values in kPa, if the area of each taxel is known.
     """
 
     t: NDArray[np.int64]
     unit: str
     above: float
-    area: NDArray[np.float64]
+    area: NDArray[np.float64] | None
     peak: NDArray[np.float64]
     total: NDArray[np.float64]
-    centre: NDArray[np.float64]
+    centre: NDArray[np.float64] | None
+    area_unit: str
+    centre_unit: str
+    force: NDArray[np.float64] | None = None
 
     @classmethod
     def of(cls, frames: Frames, above: float) -> Series:
         """Return the series of pictures above rest."""
+        array = frames.array
+        in_mm2 = array.area_mm2 is not None
+        area = frames.area(above) if in_mm2 else frames.loaded(above).astype(np.float64)
+        centre = None if array.is_channels else frames.centre(above)
         return cls(
-            frames.t, frames.unit, above, frames.area(above), frames.peak(), frames.total(), frames.centre(above)
-        )
+            frames.t, frames.unit, above, None if array.is_channels else area, frames.peak(), frames.total(), centre,
+            "mm2" if in_mm2 else "taxels", array.centre_unit or "", force_n(frames),
+        )  # fmt: skip
+
+
+def force_n(frames: Frames) -> NDArray[np.float64] | None:
+    """Return the force of each picture in kPa, N, from each taxel's area; None in another unit or of unknown area."""
+    areas = frames.array.area_mm2
+    if frames.unit != "kPa" or areas is None:
+        return None
+    return np.asarray(np.einsum("nij,ij->n", frames.values, areas, dtype=np.float64) * N_PER_KPA_MM2)
 
 
 def series(recording: Recording) -> Series | None:
@@ -77,19 +100,25 @@ def series(recording: Recording) -> Series | None:
         known = drawn.t[first : first + len(values), None] >= drawn.since
         rest = np.minimum(rest, np.min(values, axis=0, where=known, initial=np.inf))
     array, n = events.array, len(drawn.t)
-    y, x = np.divmod(drawn.taxels, array.columns)
+    areas = array.area_mm2
+    each = (np.ones(array.shape) if areas is None else areas).reshape(-1)[drawn.taxels]
     area, peak, total, centre = np.zeros(n), np.zeros(n), np.zeros(n), np.full((n, 2), np.nan)
+    places = None if array.is_channels else [axis.reshape(-1)[drawn.taxels] for axis in array.positions()]
     for first, values in drawn.blocks():
         over = _core.above_rest(values.reshape(-1), rest).reshape(values.shape)
         loaded = over > np.float64(floor)
         part = slice(first, first + len(values))
-        area[part] = array.pitch_mm**2 * np.count_nonzero(loaded, axis=1)
+        area[part] = np.where(loaded, each, 0.0).sum(axis=1)
         peak[part], total[part] = over.max(axis=1), over.sum(axis=1, dtype=np.float64)
+        if places is None:
+            continue
         weights = np.where(loaded, over, 0.0).astype(np.float64)
         all_of_them = weights.sum(axis=1)[:, None]
-        moments = np.stack([weights @ x, weights @ y], axis=1) * array.pitch_mm
+        moments = np.stack([weights @ axis for axis in places], axis=1)
         np.divide(moments, all_of_them, out=centre[part], where=all_of_them > 0)
-    return Series(drawn.t, "ticks", floor, area, peak, total, centre)
+    of = (area, centre) if places is not None else (None, None)
+    unit = "taxels" if areas is None else "mm2"
+    return Series(drawn.t, "ticks", floor, of[0], peak, total, of[1], unit, array.centre_unit or "")
 
 
 @dataclass(frozen=True, eq=False)

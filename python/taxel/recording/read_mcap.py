@@ -69,6 +69,8 @@ class _Source:
             "rebuilt": once(self.rebuilt),
             "sources": sources,
             "lost": tuple(self.header.get("lost", ())),
+            "side": self.header.get("side", ""),
+            "heel": self.header.get("heel", ""),
         }
 
     def board(self, pairing: str) -> Contents:

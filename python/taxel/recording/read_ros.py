@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from taxel._base import arguments
 from taxel._base.messages import counted
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
-from taxel.formats import ros
+from taxel.formats.ros import Chosen, Read, read
 from taxel.frames import Frames
 from taxel.recording.contents import Contents, alone
 from taxel.recording.read_mcap import ascending
@@ -20,47 +22,56 @@ __all__ = ["Topics", "read_ros"]
 
 @dataclass(frozen=True)
 class Topics:
-    """Choose what of a ROS bag is opened.
-
-    Parameters
-    ----------
-    topic, field : str, or list of str, optional
-        As many of each, or one of either for all.
-    types : path, optional
-        A folder of .msg or .idl files.
-    ros : str, optional
-        A release of ROS.
+    """Choose what of a ROS bag is opened; the arguments are those of `taxel.open`.
 
     Raises
     ------
     ProblemError : no text, or more fields than topics
     """
 
-    topic: object = None
-    field: object = None
-    types: object = None
-    ros: object = None
+    topic: str | Sequence[str] | None
+    field: str | Sequence[str] | None
+    types: str | os.PathLike[str] | None
+    ros: str | None
 
     def __post_init__(self) -> None:
         for name in ("topic", "field"):
-            given = getattr(self, name)
-            entries = [given] if isinstance(given, str) else [] if given is None else arguments.several(name, given)
-            object.__setattr__(self, name, [arguments.text(name, one) for one in entries])
-        object.__setattr__(self, "types", None if self.types is None else Path(arguments.path("types", self.types)))
-        object.__setattr__(self, "ros", None if self.ros is None else arguments.text("ros", self.ros))
+            _texts(name, getattr(self, name))
+        if self.types is not None:
+            arguments.path("types", self.types)
+        if self.ros is not None:
+            arguments.text("ros", self.ros)
 
-    def __bool__(self) -> bool:
-        return any((self.topic, self.field, self.types, self.ros))
+    @property
+    def are_given(self) -> bool:
+        """Whether any of them is."""
+        return any(one is not None for one in (self.topic, self.field, self.types, self.ros))
 
-    def chosen(self, array: Array | Sequence[Array] | None) -> list[ros.Chosen]:
+    def but(self, said: Mapping[str, Any]) -> Topics:
+        """Return what is given, and what a layout says of the rest."""
+        return replace(self, **{name: one for name, one in said.items() if getattr(self, name) is None})
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder of definitions."""
+        return None if self.types is None else Path(self.types)
+
+    def chosen(self, array: Array | Sequence[Array] | None) -> list[Chosen]:
         """Return each topic with its field and its array."""
-        given = {"topic": self.topic, "field": self.field, "array": _arrays(array)}
-        count = max(map(len, given.values()))
-        for name, entries in given.items():
-            if len(entries) not in (0, 1, count):
-                raise ProblemError(f"{name}: given {len(entries)} times for {count} sources; must be once, or for each")
-        columns = (entries * count if len(entries) == 1 else entries or [None] * count for entries in given.values())
-        return [ros.Chosen(*one) for one in zip(*columns, strict=True)]
+        topics, fields, arrays = _texts("topic", self.topic), _texts("field", self.field), _arrays(array)
+        count = max(len(topics), len(fields), len(arrays))
+        for name, given in (("topic", len(topics)), ("field", len(fields)), ("array", len(arrays))):
+            if given not in (0, 1, count):
+                raise ProblemError(f"{name}: given {given} times for {count} sources; must be once, or for each")
+        topics = topics * count if len(topics) == 1 else topics
+        every_field: Sequence[str | None] = fields * count if len(fields) == 1 else fields or [None] * count
+        every_array: Sequence[Array | None] = arrays * count if len(arrays) == 1 else arrays or [None] * count
+        return [Chosen(*one) for one in zip(topics, every_field, every_array, strict=True)]
+
+
+def _texts(name: str, given: str | Sequence[str] | None) -> list[str]:
+    entries = [given] if isinstance(given, str) else [] if given is None else arguments.several(name, given)
+    return [arguments.text(name, one) for one in entries]
 
 
 def _arrays(array: Array | Sequence[Array] | None) -> list[Array]:
@@ -82,7 +93,7 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
             f"{path}: a ROS bag; say what to open of it: --topic NAME --field NAME (topic=, field=); taxel info lists "
             "its topics"
         )
-    reads = ros.read(path, topics.chosen(array), topics.types, topics.ros)
+    reads = read(path, topics.chosen(array), topics.folder, topics.ros)
     sources: dict[str, Contents] = {}
     for name, one in zip(_names(path, reads), reads, strict=True):
         sources[name] = Contents(
@@ -104,7 +115,7 @@ def read_ros(path: Path, topics: Topics, array: Array | Sequence[Array] | None) 
     return alone(sources)
 
 
-def _names(path: Path, reads: Sequence[ros.Read]) -> list[str]:
+def _names(path: Path, reads: Sequence[Read]) -> list[str]:
     """Return the names of sources: their topics, with the field where a topic is opened twice."""
     topics = [one.topic.strip("/") for one in reads]
     names = [f"{t}.{one.field}" if topics.count(t) > 1 else t for t, one in zip(topics, reads, strict=True)]
@@ -114,7 +125,7 @@ def _names(path: Path, reads: Sequence[ros.Read]) -> list[str]:
     return names
 
 
-def _verdict(one: ros.Read) -> str:
+def _verdict(one: Read) -> str:
     """Return in one line what was left out, and whose times stand in for a header's."""
     parts = []
     if one.left_out:

@@ -205,6 +205,16 @@ class Recording:
         return frames
 
     @property
+    def side(self) -> str:
+        """The foot or hand that the sensor is of, "left" or "right"; "" if nobody said it."""
+        return self._contents.side
+
+    @property
+    def heel(self) -> str:
+        """Where on the sensor the heel lies, "top" or "bottom"; "" if nobody said it."""
+        return self._contents.heel
+
+    @property
     def is_slice(self) -> bool:
         """Whether this is a part of the file by time, made by `between`."""
         return self._contents.is_slice

@@ -61,7 +61,7 @@ def calibration_beside(path: Path, of: Contents) -> Calibration | None:
         return None
     calibration = Calibration.load(place)
     read = "ticks" if of.frames is None else of.frames.unit
-    if calibration.array != of.array or calibration.of != read:
+    if not calibration.array.fits(of.array) or calibration.of != read:
         raise ProblemError(
             f"{place}: turns {calibration.of} of {calibration.array!r} into {calibration.unit}; {of.name} holds {read} "
             f"of {of.array!r}, another array"

@@ -80,18 +80,23 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
 
 
 def _pressure(pressed: Series) -> dict[str, Any] | None:
-    """Return the largest contact area, peak and sum with their times, and the path of the centre."""
+    """Return the largest contact area, peak and sum with their times, and the path of the centre, as far as known."""
     if not len(pressed.t):
         return None
     facts: dict[str, Any] = {"unit": pressed.unit, "above": pressed.above}
-    for name, values in {"area_mm2": pressed.area, "peak": pressed.peak, "sum": pressed.total}.items():
-        k = int(values.argmax())
-        facts[name] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
+    curves: dict[str, Any] = {f"area_{pressed.area_unit}": pressed.area, "peak": pressed.peak, "sum": pressed.total}
+    curves["force_n"] = pressed.force
+    for name, values in curves.items():
+        if values is not None:
+            k = int(values.argmax())
+            facts[name] = {"most": float(values[k]), "t_us": int(pressed.t[k])}
+    if pressed.centre is None:
+        return facts
     centre = pressed.centre[~np.isnan(pressed.centre).any(axis=1)]
     limits = {"x": [float(v) for v in (centre[:, 0].min(), centre[:, 0].max())]} if len(centre) else None
     if limits is not None:
         limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
-    return facts | {"centre_mm": limits}
+    return facts | {f"centre_{pressed.centre_unit}": limits}
 
 
 def _peak(t: NDArray[np.int64]) -> float | None:

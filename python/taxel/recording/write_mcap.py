@@ -87,6 +87,8 @@ def _header(contents: Contents) -> dict[str, Any]:
         **({} if driven == contents.array else {"driven": driven._geometry()}),
         "lost": contents.lost,
         "source": contents.source,
+        "side": contents.side,
+        "heel": contents.heel,
     }
 
 

@@ -22,6 +22,7 @@ from taxel.array import Array
 from taxel.detect import Alignment, Outcome, PlainRule, Readout, Score
 from taxel.detect.detector import detector
 from taxel.detect.examples import array_of
+from taxel.encode import Composite, Encoder
 from taxel.report.charts import INK, STYLE, chart
 from taxel.report.page import render
 from taxel.spikes import SpikeTrains, to_ms, to_us
@@ -191,11 +192,11 @@ def _potential(
         apart = moment.badness if np.isfinite(moment.badness) else _MISSED_MS
         reach = _AROUND * one.neuron.tau + one.delay_ms + apart
         outcome = listened[moment.recording]
-        trains = _trains(readout, outcome)
+        trains = readout.trains_of(label, _trains(readout, outcome))
         detected_ms = to_ms(outcome.found[label].t)
         at = to_ms(moment.t)
         times = np.linspace(at - reach, at + reach, 600)
-        crossings = detected_ms + readout.encoder.latency_ms + one.delay_ms
+        crossings = detected_ms + readout.encoder_of(label).latency_ms + one.delay_ms
         potential = one.neuron.potential(one.weights, trains, times, spikes=crossings)
         axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1, label="potential")
         threshold = readout.run_threshold * one.neuron.theta_0
@@ -231,13 +232,10 @@ def _moved(aligned: Alignment | None) -> Figure | None:
     return figure
 
 
-def _trains(readout: Readout, outcome: Outcome) -> Any:
+def _trains(readout: Readout, outcome: Outcome) -> SpikeTrains:
     encoder = readout.encoder if outcome.example.tare is None else readout.encoder.with_tare(outcome.example.tare)
     source = outcome.example.source
-    trains = source if isinstance(source, SpikeTrains) else encoder.encode(source)
-    trains = trains.split_by_sign() if trains.signed else trains
-    delays = readout.delays_ms
-    return trains if len(delays) == 1 and not delays[0] else trains.delayed(delays)
+    return source if isinstance(source, SpikeTrains) else encoder.encode(source)  # type: ignore[arg-type]
 
 
 def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
@@ -247,7 +245,7 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
     if array is None:
         raise ProblemError(f"{outcome.name}: spike trains do not state their array")
     largest = float(np.abs(weights).max()) or 1.0
-    planes = _planes(weights, readout, array.rows * array.columns)
+    planes = _planes(weights, readout.encoder_of(label), len(readout.delays_ms), array.rows * array.columns)
     if not planes or array.rows * array.columns < 4:
         figure, axis = plt.subplots(figsize=(6.5, 2.2), layout="constrained")
         axis.bar(np.arange(len(weights)), weights, color=_POTENTIAL)
@@ -273,15 +271,17 @@ def _weights(readout: Readout, outcome: Outcome, label: str) -> Figure:
     return figure
 
 
-def _planes(weights: NDArray[np.float64], readout: Readout, taxels: int) -> list[tuple[str, NDArray[np.float64]]]:
+def _planes(
+    weights: NDArray[np.float64], encoder: Encoder, delays: int, taxels: int
+) -> list[tuple[str, NDArray[np.float64]]]:
     """Return weights by taxel, with the names of what else tells trains apart; none where trains are not taxels'.
 
     Trains are ordered by delay, then ON before OFF, then by taxel and level; the tonic trains come last.
     """
-    if readout.encoder.trains(Array(taxels, 1)) == readout.encoder.trains(Array(taxels, 2)):
+    several = isinstance(encoder, Composite)
+    if several or encoder.trains(Array(taxels, 1)) == encoder.trains(Array(taxels, 2)):
         return []
-    halves, delays = 2 if readout.encoder.signed else 1, len(readout.delays_ms)
-    tonic = getattr(readout.encoder, "tonic_ms", None) is not None
+    halves, tonic = 2 if encoder.signed else 1, getattr(encoder, "tonic_ms", None) is not None
     levels, left = divmod(len(weights), taxels * halves * delays)
     if left or not levels:
         return []

@@ -186,7 +186,7 @@ class Layer:
         pressure, base = self._core.press(sunk.reshape(-1))
         on = _KPA * pressure.reshape(self.array.shape)
         # MPa mm^2 is N.
-        force = float(pressure.sum()) * self.array.pitch_mm**2
+        force = float(pressure.sum()) * self.array.row_mm * self.array.column_mm
         return Pressed(on, _KPA * base.reshape(self.array.shape).astype(np.float64), force)
 
     def forget(self) -> None:

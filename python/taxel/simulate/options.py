@@ -61,7 +61,9 @@ class EmulateOptions:
     )
     asynchronous: bool = option(False, "Taxels send by themselves, without a scan, with stamps of 1 us (wire 2).")
     flaws: Flaws | None = option(
-        None, "A flaw of taxels: gain, threshold, hysteresis, drift, dead, stuck, loose, noise. May be repeated."
+        None,
+        "A flaw of taxels and its size: gain (deviation of its logarithm), threshold, hysteresis and noise (ticks), "
+        "drift (ticks a minute), dead and stuck (share of taxels, 0 to 1), loose (lines). May be repeated.",
     )
     faults: Faults | None = option(
         None,

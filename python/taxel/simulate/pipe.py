@@ -51,7 +51,7 @@ class Pipe:
             expected = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
             begin = line[:60].decode("utf-8", "replace")
             raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {expected}") from None
-        self.array = Array(rows, columns, pitch_mm=header.get("pitch_mm", 1.0), name=header.get("name", "pipe"))
+        self.array = Array(rows, columns, pitch_mm=header.get("pitch_mm"), name=header.get("name", "pipe"))
         self.rate_hz, floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
         try:
             held, self.shift = Registers._of_source(self.array, self.rate_hz, whole("bits", bits, 1, 16))

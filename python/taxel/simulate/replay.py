@@ -68,7 +68,7 @@ class Replay:
         ProblemError : no such preset
         """
         known = None if self.recording is None else self.recording.registers
-        if known is not None and known.array != self.array:
+        if known is not None and not known.array.fits(self.array):
             # A region of a sensor is played as a board of its own, at the frame rate of the whole one.
             held, _ = Registers._of_source(self.array, 1e6 / known.frame_us, int(known.ramp).bit_length())
             held = held.replace(noise_floor=known.noise_floor, wire_version=known.wire_version)

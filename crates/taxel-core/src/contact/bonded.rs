@@ -5,9 +5,9 @@
 //! `g = K p - t`, and contact demands `p >= 0`, `g >= 0` and `p g = 0` in each cell. `K` is [`surface_compliance`] at the
 //! grid's wave numbers, tabulated once. A taxel senses the mean stress of its own cells.
 
-use super::Foam;
 use super::layer::{base_stress, surface_compliance};
 use super::waves::Waves;
+use super::{Foam, pitch_of};
 use crate::{Array, Result, Stop};
 
 mod cell;
@@ -76,8 +76,10 @@ impl Bonded {
     pub fn new(foam: &Foam, array: &Array, cells_per_pitch: u16, stop: Stop<'_>) -> Result<Self> {
         foam.check()?;
         check_cells(foam, array, cells_per_pitch)?;
-        let Plan { per_pitch, reach, margin, tall, wide } = Plan::of(foam, array, usize::from(cells_per_pitch));
-        let (pitch, thick) = (array.pitch_mm / f64::from(cells_per_pitch), foam.thickness_mm);
+        let pitch_mm = pitch_of(array)?;
+        let Plan { per_pitch, reach, margin, tall, wide } =
+            Plan::of(foam, array, pitch_mm, usize::from(cells_per_pitch));
+        let (pitch, thick) = (pitch_mm / f64::from(cells_per_pitch), foam.thickness_mm);
         let of = |taxels: u16| (usize::from(taxels) + 2 * margin) * per_pitch;
         let (rows, columns) = (of(array.rows), of(array.columns));
         let mut waves = Waves::new(tall, wide, pitch);
@@ -113,7 +115,7 @@ impl Bonded {
             foam: foam.clone(),
             per_pitch,
             pitch_mm: pitch,
-            first_mm: (pitch - array.pitch_mm) / 2.0,
+            first_mm: (pitch - pitch_mm) / 2.0,
             rows,
             columns,
             margin: margin * per_pitch,

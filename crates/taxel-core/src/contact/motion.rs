@@ -78,7 +78,7 @@ impl Motion {
         }
         motion.contacts.sort_by(|a, b| a.start_us.total_cmp(&b.start_us));
         if scene.surface == Surface::Layer {
-            motion.narrow = Narrow::of(scene, array, &motion.tracks);
+            motion.narrow = Narrow::of(scene, array, &motion.tracks)?;
         }
         Ok(motion)
     }

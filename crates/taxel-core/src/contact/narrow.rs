@@ -3,8 +3,8 @@
 use std::fmt;
 
 use super::bonded::most_cells;
-use super::{Scene, Track};
-use crate::Array;
+use super::{Scene, Track, pitch_of};
+use crate::{Array, Result};
 
 /// A touch that is narrow even at its deepest: its force is too small.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,22 +27,26 @@ const ACROSS: f64 = 1.5;
 
 impl Narrow {
     /// Finds the narrowest touch of a scene that its cells do not resolve.
-    pub(super) fn of(scene: &Scene, array: &Array, tracks: &[Track]) -> Option<Self> {
-        let most = most_cells(&scene.foam, array);
+    ///
+    /// # Errors
+    ///
+    /// `Scene` if the pitch of the array is not known.
+    pub(super) fn of(scene: &Scene, array: &Array, tracks: &[Track]) -> Result<Option<Self>> {
+        let (most, pitch_mm) = (most_cells(&scene.foam, array)?, pitch_of(array)?);
         let of_body = |(n, track): (usize, &Track)| {
             // By depth and not by force: between two cells the narrowest touch makes no force at all.
             let deepest = track.depth_mm.iter().fold(0.0_f32, |deepest, depth| deepest.max(*depth));
             let width_mm = scene.bodies[n].shape.width_mm(f64::from(deepest));
-            let enough = (ACROSS * array.pitch_mm / width_mm).ceil();
+            let enough = (ACROSS * pitch_mm / width_mm).ceil();
             (width_mm > 0.0 && enough > f64::from(scene.cells_per_pitch)).then(|| Self {
                 body: n,
                 width_mm,
-                cell_mm: array.pitch_mm / f64::from(scene.cells_per_pitch),
+                cell_mm: pitch_mm / f64::from(scene.cells_per_pitch),
                 cells_per_pitch: enough as u16,
                 most,
             })
         };
-        tracks.iter().enumerate().filter_map(of_body).min_by(|a, b| a.width_mm.total_cmp(&b.width_mm))
+        Ok(tracks.iter().enumerate().filter_map(of_body).min_by(|a, b| a.width_mm.total_cmp(&b.width_mm)))
     }
 }
 

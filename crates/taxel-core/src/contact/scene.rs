@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::body::WAIT;
 use super::bonded::check_cells;
-use super::{Body, Ending, Foam, Move, Press, Shape, within};
+use super::{Body, Ending, Foam, Move, Press, Shape, pitch_of, within};
 use crate::allowed::Range;
 use crate::{Array, Error, Result};
 
@@ -89,12 +89,13 @@ impl Scene {
             draw = StdRng::from_rng(&mut draw);
         }
         let mut between = |low: f64, high: f64| draw.random_range(low..=high);
-        let width = f64::from(array.columns - 1) * array.pitch_mm - 2.0 * MARGIN_MM;
-        let height = f64::from(array.rows - 1) * array.pitch_mm - 2.0 * MARGIN_MM;
+        let pitch_mm = pitch_of(array)?;
+        let width = f64::from(array.columns - 1) * pitch_mm - 2.0 * MARGIN_MM;
+        let height = f64::from(array.rows - 1) * pitch_mm - 2.0 * MARGIN_MM;
         if width < 0.0 || height < 0.0 {
             return Err(Error::Scene(format!(
-                "array of {} x {} taxels, {} mm apart: too small for scenes that keep {MARGIN_MM} mm from its edge",
-                array.rows, array.columns, array.pitch_mm
+                "array of {} x {} taxels, {pitch_mm} mm apart: too small for scenes that keep {MARGIN_MM} mm from its edge",
+                array.rows, array.columns
             )));
         }
         let shape = Shape::Sphere { radius_mm: between(25.0, 35.0) };
@@ -153,6 +154,7 @@ impl Scene {
     /// `Scene`, naming the parameter.
     pub fn check(&self, array: &Array) -> Result<()> {
         self.foam.check()?;
+        let pitch_mm = pitch_of(array)?;
         check_cells(&self.foam, array, self.cells_per_pitch)?;
         within("scene", "lead_ms", self.lead_ms, "ms", WAIT)?;
         within("scene", "tail_ms", self.tail_ms, "ms", WAIT)?;
@@ -164,7 +166,7 @@ impl Scene {
         for (n, body) in self.bodies.iter().enumerate() {
             let place = format!("bodies[{n}]");
             body.check(&place)?;
-            let last = |count: u16| Range::within(0.0, f64::from(count - 1) * array.pitch_mm);
+            let last = |count: u16| Range::within(0.0, f64::from(count - 1) * pitch_mm);
             let off = |error: Error| Error::Scene(format!("{error} (the body is off the array)"));
             within(&place, "x_mm", body.x_mm, "mm", last(array.columns)).map_err(off)?;
             within(&place, "y_mm", body.y_mm, "mm", last(array.rows)).map_err(off)?;

@@ -2,7 +2,7 @@
 
 use super::body::{Along, Body, Ending, Move, Press};
 use super::track::{MOST_STEPS, too_many};
-use super::{Contact, Push, Scene, TouchKind, Track};
+use super::{Contact, Push, Scene, TouchKind, Track, pitch_of};
 use crate::spikes::us;
 use crate::{Array, Error, Result, Stop};
 
@@ -157,7 +157,8 @@ impl<'a> Trajectory<'a> {
             Move::Slid(_) => "slides",
             _ => return Ok(()),
         };
-        let on = |at: f32, count: u16| (-0.01..=f64::from(count - 1) * array.pitch_mm + 0.01).contains(&f64::from(at));
+        let pitch_mm = pitch_of(array)?;
+        let on = |at: f32, count: u16| (-0.01..=f64::from(count - 1) * pitch_mm + 0.01).contains(&f64::from(at));
         let track = &self.track;
         let touches = |k: &usize| track.force_n[*k] > 0.0;
         let off = (0..track.force_n.len())

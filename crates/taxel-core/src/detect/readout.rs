@@ -1,15 +1,17 @@
 //! A readout: trained neurons with labels, and the encoder with which they were trained.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::above_0;
+use crate::detect::stream::{Inputs, NamedNeuron, Neurons};
 use crate::detect::{FrameClock, FrameTime, ReadoutStream, TrainedNeuron};
-use crate::encode::{Encoder, Tare};
+use crate::encode::{Composite, Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
-use crate::{Array, Error, Result, SpikeKind, problem};
+use crate::{Array, Result, SpikeKind, problem};
 
 mod file;
 #[cfg(test)]
@@ -76,7 +78,8 @@ impl Readout {
             if label.trim().is_empty() {
                 return Err(problem!("a neuron without a name: must have a label"));
             }
-            one.neuron.check().map_err(|e| at(label, e))?;
+            one.neuron.check().map_err(|error| error.of(label))?;
+            self.encoder_of(one).map_err(|error| error.of(label))?;
             if one.neuron.time != self.time {
                 let (its, mine) = (word(&one.neuron.time), word(&self.time));
                 return Err(problem!("{label}: trained for time {its}, this readout is for time {mine}"));
@@ -116,13 +119,26 @@ impl Readout {
         Ok(())
     }
 
+    /// The encoder whose trains a neuron receives: the readout's own, or some of its parts.
+    fn encoder_of(&self, one: &TrainedNeuron) -> Result<Cow<'_, Encoder>> {
+        match (&self.encoder, &*one.inputs) {
+            (own, []) => Ok(Cow::Borrowed(own)),
+            (Encoder::Composite(own), names) => {
+                let parts = own.named(names)?.into_iter().map(|(name, part)| (name.to_owned(), part.clone()));
+                Ok(Cow::Owned(Encoder::Composite(Composite { parts: parts.collect() })))
+            }
+            (_, names) => Err(problem!("inputs are {names:?}: the encoder is no composite, so there are no others")),
+        }
+    }
+
     fn check_weights(&self, label: &str, one: &TrainedNeuron, array: &Array) -> Result<()> {
         let copies = self.delays_ms.len();
-        let inputs = self.encoder.trains(array) * self.encoder.kind().inputs_per_train() * copies;
+        let encoder = self.encoder_of(one)?;
+        let inputs = encoder.trains(array) * encoder.kind().inputs_per_train() * copies;
         if one.weights.len() == inputs {
             return Ok(());
         }
-        let (rows, columns, signed) = (array.rows, array.columns, self.encoder.kind() == SpikeKind::Signed);
+        let (rows, columns, signed) = (array.rows, array.columns, encoder.kind() == SpikeKind::Signed);
         Err(problem!(
             "{label}: {} weights, the encoder makes {inputs} trains{}{} of {rows} x {columns} taxels: must be one each",
             one.weights.len(),
@@ -140,7 +156,7 @@ impl Readout {
     pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
         self.check()?;
         if let Some(mine) = &self.array
-            && (mine.rows, mine.columns, &mine.exists) != (array.rows, array.columns, &array.exists)
+            && !mine.fits(array)
         {
             return Err(problem!(
                 "array {} of {} x {} taxels: the readout was trained on {}, {} x {}{}",
@@ -150,27 +166,35 @@ impl Readout {
                 mine.name,
                 mine.rows,
                 mine.columns,
-                if mine.exists == array.exists { "" } else { ", of which others exist" }
+                if (mine.rows, mine.columns) == (array.rows, array.columns) { ", of which others exist" } else { "" }
             ));
         }
         for (label, one) in &self.neurons {
             self.check_weights(label, one, array)?;
         }
         let encoder = tare.map_or_else(|| self.encoder.clone(), |tare| self.encoder.with_tare(tare));
-        let neurons = self.neurons.iter().map(|(label, one)| (label.clone(), one.clone()));
-        let (encoder, clock) = (encoder.stream(array)?, FrameClock::new(frames)?);
-        let delays_ms = self.delays_ms.clone();
-        Ok(ReadoutStream::new(encoder, array.clone(), clock, self.run_threshold, delays_ms, neurons))
+        let neurons = self.neurons.iter().map(|(label, one)| {
+            let received = match &self.encoder {
+                Encoder::Composite(own) if !one.inputs.is_empty() => Some(own.of_parts(&one.inputs, array)?),
+                _ => None,
+            };
+            let latency_ms = self.encoder_of(one)?.latency_ms();
+            Ok(NamedNeuron::new(
+                label,
+                one,
+                self.run_threshold,
+                latency_ms,
+                Inputs::new(received, self.delays_ms.len()),
+            ))
+        });
+        let neurons = Neurons::new(neurons.collect::<Result<_>>()?, self.delays_ms.clone());
+        Ok(ReadoutStream::new(encoder.stream(array)?, array.clone(), FrameClock::new(frames)?, neurons))
     }
 
     /// The time by which its neurons receive the last spike later than the last input, us.
     pub(super) fn reach_us(&self) -> i64 {
         us(self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
     }
-}
-
-fn at(label: &str, error: Error) -> Error {
-    if let Error::Problem(text) = error { problem!("{label}: {text}") } else { error }
 }
 
 /// The name of an option in JSON.

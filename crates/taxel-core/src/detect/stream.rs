@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::detect::running_rule::RunningRule;
-use crate::detect::{Detection, FrameClock, TrainedNeuron};
+use crate::detect::{Detection, FrameClock};
 use crate::encode::{Stream, Zeroing};
 use crate::spikes::ms;
 use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
@@ -16,8 +16,8 @@ mod repairs;
 mod tests;
 
 use labelled_rule::LabelledRule;
-use named_neuron::NamedNeuron;
-use neurons::Neurons;
+pub(super) use named_neuron::{Inputs, NamedNeuron};
+pub(super) use neurons::Neurons;
 use repairs::Repairs;
 
 /// The number of events between two checks of [`Stop`].
@@ -55,17 +55,8 @@ enum Decides {
 }
 
 impl ReadoutStream {
-    pub(super) fn new(
-        encoder: Box<dyn Stream>,
-        array: Array,
-        clock: FrameClock,
-        threshold: f64,
-        delays_ms: Vec<f64>,
-        neurons: impl Iterator<Item = (String, TrainedNeuron)>,
-    ) -> Self {
-        let latency_ms = encoder.latency_ms();
-        let neurons = neurons.map(|(label, one)| NamedNeuron::new(label, one, threshold, latency_ms)).collect();
-        Self::of(encoder, array, clock, Decides::Neurons(Neurons::new(neurons, delays_ms)))
+    pub(super) fn new(encoder: Box<dyn Stream>, array: Array, clock: FrameClock, neurons: Neurons) -> Self {
+        Self::of(encoder, array, clock, Decides::Neurons(neurons))
     }
 
     /// A stream of a plain rule: `loads` emits the changes of its quantities.

@@ -13,6 +13,10 @@ pub struct TrainedNeuron {
     /// The delay after the event at which the neuron was trained to fire, in addition to the encoder's latency, ms.
     #[serde(default)]
     pub delay_ms: f64,
-    /// One weight per train of the encoder, mV; for signed spikes all ON trains first, then all OFF trains.
+    /// The parts of a composite encoder that it receives, in any order; none stands for all trains of the encoder.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inputs: Vec<String>,
+    /// One weight per train of the encoder, or of those of its inputs in the encoder's order, mV; for signed spikes all
+    /// ON trains first, then all OFF trains.
     pub weights: Vec<f64>,
 }

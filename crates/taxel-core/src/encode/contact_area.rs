@@ -63,6 +63,7 @@ impl Law for ContactArea {
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let crossings = Crossings { levels: self.levels.clone(), reported: 0 };
+        array.check_neighbours("contact area")?;
         let loaded = Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?;
         Ok(Box::new(ByStamp::new(crossings, loaded, array)))
     }

@@ -182,7 +182,13 @@ impl Loaded {
 
     /// Sums over the taxels that count, from the values of all places; they are added in the order of places.
     pub(super) fn sums(&self, held: &[Block]) -> Sums {
-        let (mut sums, columns) = (Sums::default(), self.places.columns);
+        let columns = self.places.columns;
+        self.sums_at(held, |place| [(place % columns) as f64, (place / columns) as f64])
+    }
+
+    /// The same, with x and y of each place.
+    pub(super) fn sums_at(&self, held: &[Block], at: impl Fn(usize) -> [f64; 2]) -> Sums {
+        let mut sums = Sums::default();
         if self.area() == 0 {
             return sums;
         }
@@ -193,8 +199,9 @@ impl Loaded {
                     let above = self.above(place, value);
                     sums.total += above;
                     sums.peak = sums.peak.max(above);
-                    sums.x += above * (place % columns) as f64;
-                    sums.y += above * (place / columns) as f64;
+                    let [x, y] = at(place);
+                    sums.x += above * x;
+                    sums.y += above * y;
                 }
             }
         }

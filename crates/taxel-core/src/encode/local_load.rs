@@ -178,6 +178,7 @@ impl Law for LocalLoad {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        array.check_neighbours("local load")?;
         Ok(Box::new(self.sampled(array, Emit::Spikes)?))
     }
 

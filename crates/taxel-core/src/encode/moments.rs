@@ -13,6 +13,7 @@ use super::sampled::{Rule, Sampled};
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
+use crate::array::{Pitch, PlaceUnit, Places};
 use crate::parameters::Described;
 use crate::spikes::{ms, us};
 use crate::{Array, Result, Spike, SpikeKind, problem};
@@ -168,11 +169,13 @@ impl Law for Moments {
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        array.check_neighbours("moments")?;
         let loaded = Loaded::new("moments", array, self.tare.as_ref(), self.noise_floor)?;
+        let way = if self.displacement_mm.is_some() { Some(Way::on(array)?) } else { None };
         let levels = self.all_levels();
         let passing = Passing {
             loaded,
-            pitch_mm: array.pitch_mm,
+            way,
             touch: None,
             moments: [0.0; 5],
             since: vec![None; levels.len()],
@@ -225,11 +228,33 @@ impl Level {
     }
 }
 
+/// How the centre of a touch is measured in mm.
+#[derive(Clone)]
+enum Way {
+    /// In columns and rows, so far apart.
+    Pitch(Pitch),
+    /// By the place of each taxel, mm.
+    Places(Vec<[f64; 2]>),
+}
+
+impl Way {
+    fn on(array: &Array) -> Result<Self> {
+        match &array.places {
+            Some(Places { x, y, unit: Some(PlaceUnit::Mm), .. }) => {
+                Ok(Self::Places(x.iter().zip(y).map(|(&x, &y)| [x, y]).collect()))
+            }
+            Some(_) => Err(problem!("moments: displacement_mm needs places in mm; those of {} are not", array.name)),
+            None => array.pitch("moments: displacement_mm").map(Self::Pitch),
+        }
+    }
+}
+
 #[derive(Clone)]
 struct Passing {
     loaded: Loaded,
-    pitch_mm: f64,
-    /// When the current touch began, us, and its centre then, in taxels.
+    /// How the centre is measured; `None` where its displacement is not asked for.
+    way: Option<Way>,
+    /// When the current touch began, us, and its centre then, in the unit of `way`.
     touch: Option<(i64, [f64; 2])>,
     /// The moments of the last sample: area, total, peak, and the displacement of the centre in x and y, mm.
     moments: [f64; 5],
@@ -256,10 +281,14 @@ impl Passing {
             (self.touch, self.moments) = (None, [0.0; 5]);
             return;
         }
-        let Sums { total, peak, x, y } = self.loaded.sums(held);
+        let (Sums { total, peak, x, y }, unit) = match &self.way {
+            Some(Way::Places(at)) => (self.loaded.sums_at(held, |place| at[place]), [1.0; 2]),
+            Some(Way::Pitch(Pitch { rows, columns })) => (self.loaded.sums(held), [*columns, *rows]),
+            None => (self.loaded.sums(held), [0.0; 2]),
+        };
         let centre = [x / total, y / total];
         let (_, origin) = *self.touch.get_or_insert((t, centre));
-        let way = |axis: usize| (centre[axis] - origin[axis]) * self.pitch_mm;
+        let way = |axis: usize| (centre[axis] - origin[axis]) * unit[axis];
         self.moments = [f64::from(self.loaded.area()), total, peak, way(0), way(1)];
     }
 

@@ -18,6 +18,7 @@ use super::slow::Slow;
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
+use crate::array::Pitch;
 use crate::parameters::Described;
 use crate::{Array, Result, Spike, SpikeKind, problem};
 
@@ -153,7 +154,10 @@ impl Skin {
 
     /// Number of afferents on an array at this density.
     fn count(array: &Array, density: f64) -> usize {
-        let area_cm2 = Channels::new(array).len() as f64 * array.pitch_mm * array.pitch_mm / 100.0;
+        // Without a pitch, which `afferents` refuses, there are none.
+        let area_cm2 = array.pitch_mm.map_or(0.0, |Pitch { rows, columns }| {
+            Channels::new(array).len() as f64 * columns * rows / 100.0
+        });
         (density * area_cm2).round() as usize
     }
 
@@ -161,13 +165,17 @@ impl Skin {
     ///
     /// # Errors
     ///
-    /// `Problem` if a parameter is out of range, or if there would be more than a million afferents.
+    /// `Problem` if a parameter is out of range, if the pitch of the array is not known, or if there would be more than a
+    /// million afferents.
     pub fn afferents(&self, array: &Array) -> Result<Vec<Placed>> {
         self.check()?;
+        let pitch = array.pitch("skin")?;
         let count = Law::trains(self, array);
         if count > MOST {
-            let (array, pitch_mm) = (&array.name, array.pitch_mm);
-            return Err(problem!("skin on {array} of pitch {pitch_mm} mm: {count} afferents, must be at most {MOST}"));
+            let (array, Pitch { rows, columns }) = (&array.name, pitch);
+            return Err(problem!(
+                "skin on {array} of pitch {rows} x {columns} mm: {count} afferents, must be at most {MOST}"
+            ));
         }
         let (mut all, taxels) = (vec![], places(array));
         for (kind, density, _) in self.types() {
@@ -181,7 +189,7 @@ impl Skin {
                 let within = [draw.random::<f64>() - 0.5, draw.random::<f64>() - 0.5];
                 let part = ((k as f64 + at) / count as f64 * taxels.len() as f64) as usize;
                 let [x, y] = taxels[part.min(taxels.len() - 1)];
-                let [x_mm, y_mm] = [x + within[0], y + within[1]].map(|place| place * array.pitch_mm);
+                let (x_mm, y_mm) = ((x + within[0]) * pitch.columns, (y + within[1]) * pitch.rows);
                 all.push(Placed { kind, x_mm, y_mm });
             }
         }
@@ -210,7 +218,7 @@ impl Law for Skin {
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let placed = self.afferents(array)?;
-        let sampled = Sampled::new(self, Afferents::new(self, array, &placed), array, self.period_ms)?;
+        let sampled = Sampled::new(self, Afferents::new(self, array, &placed)?, array, self.period_ms)?;
         Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
     }
 
@@ -228,21 +236,23 @@ impl Law for Skin {
 }
 
 /// The channels in each afferent's field, with their weights.
-fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Vec<Vec<(u32, f32)>> {
-    let taxels = places(array);
-    let (pitch, edge) = (array.pitch_mm, (field_mm2 / std::f64::consts::PI).sqrt());
+fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Result<Vec<Vec<(u32, f32)>>> {
+    let (taxels, pitch) = (places(array), array.pitch("skin")?);
+    let edge = (field_mm2 / std::f64::consts::PI).sqrt();
+    // Distances are computed in units of the columns' pitch.
+    let (across, down) = (pitch.columns, pitch.rows / pitch.columns);
     // Channels are consecutive within a row of the array; only the rows that a field can reach are searched.
     let rows: Vec<usize> =
         (0..=usize::from(array.rows)).map(|row| taxels.partition_point(|at| at[1] < row as f64)).collect();
     let of = |at: &&Placed| {
-        let (x, y) = (at.x_mm / pitch, at.y_mm / pitch);
-        let reach = edge / pitch;
+        let (x, y) = (at.x_mm / pitch.columns, at.y_mm / pitch.rows);
+        let reach = edge / pitch.rows;
         let row = |y: f64| (y.max(0.0) as usize).min(rows.len() - 1);
         let near = rows[row((y - reach).ceil())]..rows[row((y + reach).floor() + 1.0)];
         let (mut field, mut sum) = (vec![], 0.0);
         for channel in near {
             let [column, line] = taxels[channel];
-            let away = ((column - x).powi(2) + (line - y).powi(2)) * pitch * pitch;
+            let away = ((column - x).powi(2) + ((line - y) * down).powi(2)) * across * across;
             if away <= edge * edge {
                 // The edge is at the second standard deviation.
                 let weight = (-2.0 * away / (edge * edge)).exp();
@@ -259,7 +269,7 @@ fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Vec<Vec<(u32, f32)
         field.iter_mut().for_each(|(_, weight)| *weight /= sum as f32);
         field
     };
-    placed.iter().map(of).collect()
+    Ok(placed.iter().map(of).collect())
 }
 
 /// The afferents of one type, with their fields.
@@ -275,10 +285,10 @@ struct Type<R> {
 }
 
 impl<R: Rule> Type<R> {
-    fn new(rule: R, array: &Array, first: usize, placed: &[&Placed], field_mm2: f64) -> Self {
-        let fields = Fields::new(&felt(array, placed, field_mm2), Channels::new(array).len());
+    fn new(rule: R, array: &Array, first: usize, placed: &[&Placed], field_mm2: f64) -> Result<Self> {
+        let fields = Fields::new(&felt(array, placed, field_mm2)?, Channels::new(array).len());
         let n = blocks(placed.len());
-        Self { rule, first, fields, held: vec![[0.0; BLOCK]; n], changed: vec![true; n] }
+        Ok(Self { rule, first, fields, held: vec![[0.0; BLOCK]; n], changed: vec![true; n] })
     }
 
     #[inline(always)]
@@ -331,7 +341,7 @@ struct Afferents {
 }
 
 impl Afferents {
-    fn new(skin: &Skin, array: &Array, placed: &[Placed]) -> Self {
+    fn new(skin: &Skin, array: &Array, placed: &[Placed]) -> Result<Self> {
         let (range, period_ms) = (skin.range, skin.period_ms);
         let sa1 = Sa1 { range, period_ms, ..Sa1::default() };
         let fa1 = Fa1 { range: Some(range), period_ms, decay: Decay::Ms, ..Fa1::default() };
@@ -340,12 +350,12 @@ impl Afferents {
         let first = |kind| placed.iter().position(|p| p.kind == kind).unwrap_or(0);
         let of = |kind| placed.iter().filter(|p| p.kind == kind).collect::<Vec<_>>();
         let [a, b, c, d] = skin.types().map(|(kind, _, field)| (first(kind), of(kind), field));
-        Self {
-            sa1: Type::new(ByTaxel::new(sa1.filter(), sa1.firing(), range, a.1.len()), array, a.0, &a.1, a.2),
-            fa1: Type::new(fa1::Afferents::new(&fa1), array, b.0, &b.1, b.2),
-            sa2: Type::new(ByTaxel::new(sa2.filter(), sa2.firing(), range, c.1.len()), array, c.0, &c.1, c.2),
-            fa2: Type::new(ByTaxel::new(fa2.filter(), fa2.firing(), range, d.1.len()), array, d.0, &d.1, d.2),
-        }
+        Ok(Self {
+            sa1: Type::new(ByTaxel::new(sa1.filter(), sa1.firing(), range, a.1.len()), array, a.0, &a.1, a.2)?,
+            fa1: Type::new(fa1::Afferents::new(&fa1), array, b.0, &b.1, b.2)?,
+            sa2: Type::new(ByTaxel::new(sa2.filter(), sa2.firing(), range, c.1.len()), array, c.0, &c.1, c.2)?,
+            fa2: Type::new(ByTaxel::new(fa2.filter(), fa2.firing(), range, d.1.len()), array, d.0, &d.1, d.2)?,
+        })
     }
 }
 

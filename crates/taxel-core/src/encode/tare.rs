@@ -37,10 +37,7 @@ impl Tare {
     /// `Problem`, naming the taxel.
     pub fn check(&self) -> Result<()> {
         let (rows, columns) = (self.array.rows, self.array.columns);
-        Array::new(rows, columns, self.array.pitch_mm, &self.array.name)?;
-        if self.array.exists.as_ref().is_some_and(|e| e.len() != self.array.len()) {
-            return Err(problem!("tare: exists must have {rows} x {columns} entries"));
-        }
+        self.array.check().map_err(|error| problem!("tare: {error}"))?;
         if self.rest.len() != self.array.len() {
             return Err(problem!("tare: {} rests for {rows} x {columns} taxels: must be one each", self.rest.len()));
         }
@@ -67,17 +64,17 @@ impl Tare {
     /// `Problem` if the tare is of an array of another shape.
     pub(super) fn rest_of(&self, array: &Array) -> Result<Rest<f64>> {
         let (of, to) = (&self.array, array);
-        if (of.rows, of.columns) != (to.rows, to.columns) {
+        if !of.fits(to) {
+            let others = if (of.rows, of.columns) == (to.rows, to.columns) { ", of which others exist" } else { "" };
             return Err(problem!(
-                "tare of {} x {} taxels: the array has {} x {}",
+                "tare of {} x {} taxels: the array has {} x {}{others}",
                 of.rows,
                 of.columns,
                 to.rows,
                 to.columns
             ));
         }
-        let exists = |place: usize| array.exists.as_ref().is_none_or(|exists| exists[place]);
-        let of_place = |(place, rest): (usize, &Option<f64>)| rest.filter(|_| exists(place)).unwrap_or(f64::NO_REST);
+        let of_place = |(place, rest): (usize, &Option<f64>)| rest.filter(|_| array.has(place)).unwrap_or(f64::NO_REST);
         Ok(Rest::measured(self.rest.iter().enumerate().map(of_place).collect()))
     }
 

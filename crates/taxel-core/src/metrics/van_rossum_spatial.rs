@@ -68,13 +68,8 @@ impl Smoothing {
 
     pub(super) fn check(&self) -> Result<()> {
         self.check_ranges()?;
-        Array::new(self.array.rows, self.array.columns, self.array.pitch_mm, &self.array.name)?;
-        match &self.array.exists {
-            Some(exists) if exists.len() != self.array.len() => {
-                Err(problem!("exists has {} entries: must be one a taxel, {}", exists.len(), self.array.len()))
-            }
-            _ => Ok(()),
-        }
+        self.array.check()?;
+        self.array.pitch("the distance over the array").map(|_| ())
     }
 
     /// The kernel for these patterns; each train must have a taxel in the array.
@@ -95,7 +90,7 @@ impl Smoothing {
                 }
             }
         }
-        Ok(Kernel::new(self))
+        Kernel::new(self)
     }
 }
 
@@ -185,18 +180,21 @@ pub(super) enum Gauge {
 const HIGHEST: f64 = 200.0;
 
 impl Kernel {
-    fn new(smoothing: &Smoothing) -> Self {
+    fn new(smoothing: &Smoothing) -> Result<Self> {
         let array = &smoothing.array;
+        let pitch = array.pitch("the distance over the array")?;
+        // In units of the columns' pitch.
+        let down = pitch.rows / pitch.columns;
         let (rows, columns) = (usize::from(array.rows), usize::from(array.columns));
         let mut by_offset = Vec::with_capacity((2 * rows - 1) * (2 * columns - 1));
         for row in 0..2 * rows - 1 {
             for column in 0..2 * columns - 1 {
                 let (dy, dx) = (row.abs_diff(rows - 1) as f64, column.abs_diff(columns - 1) as f64);
                 let own = row + 1 == rows && column + 1 == columns && smoothing.own_train == OwnTrain::Twice;
-                by_offset.push((-dx.hypot(dy) * array.pitch_mm / smoothing.sigma).exp() + f64::from(u8::from(own)));
+                by_offset.push((-dx.hypot(dy * down) * pitch.columns / smoothing.sigma).exp() + f64::from(u8::from(own)));
             }
         }
-        Self { rows, columns, exists: array.exists.clone(), by_offset }
+        Ok(Self { rows, columns, exists: array.exists.clone(), by_offset })
     }
 
     fn taxels(&self) -> usize {

@@ -105,7 +105,7 @@ mod tests {
     /// A readout that detects once, some 7 ms after a change at taxel 0.
     fn readout() -> Ahead {
         let neuron = Neuron { tau: 20.0, refractory: 500.0, theta_0: 0.3, ..Neuron::default() };
-        let one = TrainedNeuron { delay_ms: 0.0, weights: vec![1.2; 8], neuron };
+        let one = TrainedNeuron { delay_ms: 0.0, inputs: vec![], weights: vec![1.2; 8], neuron };
         let readout = Readout {
             encoder: Encoder::from_json(r#"{"name": "change_events"}"#).unwrap(),
             array: None,

@@ -177,7 +177,9 @@ fn array_of(text: &str, size: &str) -> Result<Array> {
     if (rows, columns) == (thesis.rows, thesis.columns) {
         return Ok(thesis);
     }
-    Ok(Array::new(rows, columns, thesis.pitch_mm, size)?)
+    let array = Array { pitch_mm: thesis.pitch_mm, ..Array::unmeasured(rows, columns, size) };
+    array.check()?;
+    Ok(array)
 }
 
 /// The columns that the options define, if any.

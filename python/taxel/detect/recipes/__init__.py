@@ -1,9 +1,9 @@
 """Recipes by name, one data file each: where none is named, `taxel train` chooses the one that fits the recording.
 
 A recipe's file says `about` what it is, its `source`, which recordings it `fits` ("events", or units of frames), the
-encoder, whether labels are moved to what the sensor felt (`align`), what all neurons share (`learner`), what is a
-neuron's own (`neurons`), and whose parameters any `other` label has; without `other` it is for its neurons' labels
-alone. A new recipe is a new file in this folder.
+encoder, or several as `encoders` by name, whether labels are moved to what the sensor felt (`align`), what all neurons
+share (`learner`), what is a neuron's own (`neurons`), and the parameters of any `other` label, or whose they are;
+without `other` it is for its neurons' labels alone. A new recipe is a new file in this folder.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -40,10 +40,8 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in Path(__file__).parent.glob("*.toml")))
 
 
-def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
-    """Return the name of the recipe that fits a recording, by what it holds (events, or the frames' unit) and labels.
-
-    Where several fit what it holds, a recipe for certain labels comes first, if all labels are among them.
+def fitting(source: Events | Frames) -> str:
+    """Return the name of the recipe that fits a recording, by what it holds (events, or the frames' unit).
 
     Examples
     --------
@@ -51,10 +49,7 @@ def fitting(source: Events | Frames, labels: Sequence[str] = ()) -> str:
     ('gait_insole', 'gait_channel')
     """
     kind = source.unit if isinstance(source, Frames) else "events"
-    fit = {name: recipe for name in names() if kind in (recipe := read(name)).get("fits", ())}
-    asked = {_plain(label) for label in labels}
-    certain = [name for name, recipe in fit.items() if "other" not in recipe and asked <= set(recipe["neurons"])]
-    return next(iter(certain or [name for name, recipe in fit.items() if "other" in recipe]), _ANY)
+    return next((name for name in names() if kind in read(name).get("fits", ())), _ANY)
 
 
 def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
@@ -92,8 +87,8 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
 def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     """Return a recipe's values with one neuron a label, if it is one that is chosen by the recording (`fits`).
 
-    "foot off", "Foot-off" and "foot_off" are one. Any other label than the recipe's own has the parameters of the
-    neuron that it names as `other`. A recipe with neither `fits` nor `other` stays as it is.
+    "foot off", "Foot-off" and "foot_off" are one. Any other label than the recipe's own has the parameters that `other`
+    holds, or those of the neuron that it names. A recipe with neither `fits` nor `other` stays as it is.
 
     Raises
     ------
@@ -108,7 +103,9 @@ def for_labels(values: dict[str, Any], labels: Sequence[str]) -> dict[str, Any]:
     if not {"fits", "other"} & set(values):
         return values
     own = values.get("neurons", {})
-    other = own[text("recipe: other", values["other"], own)] if "other" in values else None
+    other = values.get("other")
+    if other is not None and not isinstance(other, Mapping):
+        other = own[text("recipe: other", other, own)]
     neurons = {}
     for label in labels:
         neuron = own.get(label, own.get(_plain(text("label", label)), other))

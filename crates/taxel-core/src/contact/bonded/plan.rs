@@ -1,7 +1,7 @@
 //! How many cells a layer is cut into, and how large the plane is on which their influence is convolved.
 
 use super::super::waves::fast_length;
-use super::super::{Foam, within};
+use super::super::{Foam, pitch_of, within};
 use crate::allowed::Range;
 use crate::{Array, Error, Result};
 
@@ -27,8 +27,8 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub fn of(foam: &Foam, array: &Array, per_pitch: usize) -> Self {
-        let reach = (REACH * foam.thickness_mm / array.pitch_mm).ceil().max(1.0) as usize;
+    pub fn of(foam: &Foam, array: &Array, pitch_mm: f64, per_pitch: usize) -> Self {
+        let reach = (REACH * foam.thickness_mm / pitch_mm).ceil().max(1.0) as usize;
         let margin = reach.min(usize::from(array.rows.max(array.columns)));
         // The plane repeats: so far apart that no cell is moved by another's repetition, for a layer thinner than the plane.
         let apart = |taxels: u16| {
@@ -51,7 +51,7 @@ impl Plan {
 pub fn check_cells(foam: &Foam, array: &Array, cells_per_pitch: u16) -> Result<()> {
     let cells = f64::from(cells_per_pitch);
     within("scene", "cells_per_pitch", cells, "", Range::within(1.0, f64::from(MOST_PER_PITCH)))?;
-    let most = most_cells(foam, array);
+    let most = most_cells(foam, array)?;
     if cells_per_pitch > most {
         return Err(Error::Scene(format!(
             "scene: cells_per_pitch is {cells_per_pitch}: must be {most} or less on {} x {} taxels and {} mm of foam, where \
@@ -63,6 +63,11 @@ pub fn check_cells(foam: &Foam, array: &Array, cells_per_pitch: u16) -> Result<(
 }
 
 /// The most cells along a pitch that the layer can be solved on.
-pub fn most_cells(foam: &Foam, array: &Array) -> u16 {
-    (2..=MOST_PER_PITCH).rev().find(|n| Plan::of(foam, array, usize::from(*n)).fits()).unwrap_or(1)
+///
+/// # Errors
+///
+/// `Scene` if the pitch of the array is not known.
+pub fn most_cells(foam: &Foam, array: &Array) -> Result<u16> {
+    let pitch_mm = pitch_of(array)?;
+    Ok((2..=MOST_PER_PITCH).rev().find(|n| Plan::of(foam, array, pitch_mm, usize::from(*n)).fits()).unwrap_or(1))
 }

@@ -1,6 +1,6 @@
 //! One ball that moves straight up and down on columns, as the taxels sense it.
 
-use super::super::{Footprint, Scene, Shape, Taxels, Track};
+use super::super::{Footprint, Scene, Shape, Taxels, Track, pitch_of};
 use super::groups::{GROUPS, place};
 use crate::{Array, Result};
 
@@ -36,11 +36,12 @@ impl Columns {
             return Err(super::super::scene::columns_take_one_ball());
         };
         let footprint = Footprint::new(&scene.foam, radius_mm)?;
+        let pitch_mm = pitch_of(array)?;
         let mut reach = [const { Vec::new() }; GROUPS];
         for y in 0..array.rows {
             for x in 0..array.columns {
-                let across = f64::from(x) * array.pitch_mm - x_mm;
-                let along = f64::from(y) * array.pitch_mm - y_mm;
+                let across = f64::from(x) * pitch_mm - x_mm;
+                let along = f64::from(y) * pitch_mm - y_mm;
                 if let Some((ring, share)) = Footprint::ring(across.hypot(along)) {
                     let group = GROUPS * usize::from(x) / usize::from(array.columns);
                     reach[group].push(Reached { index: array.index(x, y) as u32, ring: ring as u32, share });

@@ -15,6 +15,7 @@ fn readout() -> Readout {
     let one = |delay_ms, first: f64| TrainedNeuron {
         neuron: neuron.clone(),
         delay_ms,
+        inputs: vec![],
         weights: (0..10).map(|k| first / f64::from(k + 3)).collect(),
     };
     Readout {
@@ -157,7 +158,7 @@ fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
         let encoder = Encoder::from_json(&format!(r#"{{"name": "{name}"}}"#)).unwrap();
         let weights = (0..encoder.trains(&array)).map(|_| random.random_range(-0.2..1.0)).collect();
         let neuron = Neuron { tau: 0.5, refractory: 0.5, theta_0: 0.3, ..Neuron::default() };
-        let one = TrainedNeuron { neuron: neuron.clone(), delay_ms: 0.0, weights };
+        let one = TrainedNeuron { neuron: neuron.clone(), delay_ms: 0.0, inputs: vec![], weights };
         let neurons = [("touch".to_owned(), one)].into();
         let readout =
             Readout { encoder, array: None, time: neuron.time, after_spike: neuron.after_spike, neurons, ..readout() };

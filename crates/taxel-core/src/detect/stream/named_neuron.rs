@@ -4,10 +4,41 @@ use crate::detect::TrainedNeuron;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
 use crate::{Result, Spike};
 
+/// Which of the encoder's trains a neuron receives.
+#[derive(Clone)]
+pub(in crate::detect) struct Inputs {
+    /// The number of the input that each train is, for all delays; `None`: each train is the input of its own number.
+    of_trains: Option<Vec<Option<u32>>>,
+}
+
+impl Inputs {
+    /// Those of the trains marked `received`, or all, each at so many delays.
+    pub fn new(received: Option<Vec<bool>>, delays: usize) -> Self {
+        let number = |received: Vec<bool>| {
+            let trains = received.len() * delays;
+            let inputs = received.into_iter().cycle().take(trains).scan(0, |next, received| {
+                let input = received.then_some(*next);
+                *next += u32::from(received);
+                Some(input)
+            });
+            inputs.collect()
+        };
+        Self { of_trains: received.map(number) }
+    }
+
+    fn of(&self, train: u32) -> Option<u32> {
+        match &self.of_trains {
+            Some(inputs) => inputs[train as usize],
+            None => Some(train),
+        }
+    }
+}
+
 /// A neuron with its label.
 #[derive(Clone)]
-pub(super) struct NamedNeuron {
+pub(in crate::detect) struct NamedNeuron {
     pub label: String,
+    inputs: Inputs,
     neuron: Neuron,
     weights: Vec<f64>,
     threshold: f64,
@@ -22,12 +53,13 @@ pub(super) struct NamedNeuron {
 
 impl NamedNeuron {
     /// A trained neuron before its first spike.
-    pub fn new(label: String, one: TrainedNeuron, threshold: f64, latency_ms: f64) -> Self {
+    pub fn new(label: &str, one: &TrainedNeuron, threshold: f64, latency_ms: f64, inputs: Inputs) -> Self {
         Self {
-            label,
+            label: label.to_owned(),
+            inputs,
             offset_ms: latency_ms + one.delay_ms,
-            neuron: one.neuron,
-            weights: one.weights,
+            neuron: one.neuron.clone(),
+            weights: one.weights.clone(),
             threshold,
             stream: None,
             crossings: vec![],
@@ -35,12 +67,13 @@ impl NamedNeuron {
         }
     }
 
-    /// Passes a spike, whose train is the number of an input, to the neuron.
+    /// Passes a spike of an encoder's train to the neuron; returns whether it is one of its inputs.
     ///
     /// # Errors
     ///
     /// Those of [`NeuronStream::push`].
-    pub fn push(&mut self, spike: Spike) -> Result<()> {
+    pub fn push(&mut self, spike: Spike) -> Result<bool> {
+        let Some(input) = self.inputs.of(spike.train) else { return Ok(false) };
         let stream = match &mut self.stream {
             Some(stream) => stream,
             None => {
@@ -51,7 +84,8 @@ impl NamedNeuron {
                 self.stream.insert(self.neuron.stream(&self.weights, self.threshold, start.min(spike.t))?)
             }
         };
-        stream.push(spike, &mut self.crossings)
+        stream.push(Spike { train: input, ..spike }, &mut self.crossings)?;
+        Ok(true)
     }
 
     /// Moves the crossings so far to `out`, each with the neuron's number and whether it may rest on repaired taxels.

@@ -8,7 +8,7 @@ use crate::{Result, Spike, SpikeKind};
 
 /// Neurons with the delays at which they receive the encoder's trains.
 #[derive(Clone)]
-pub(super) struct Neurons {
+pub(in crate::detect) struct Neurons {
     neurons: Vec<NamedNeuron>,
     /// The delays at which each train enters the neurons, ms.
     delays_ms: Vec<f64>,
@@ -51,8 +51,7 @@ impl Neurons {
         let mut crossings: Vec<(OutputSpike, usize, bool)> = Vec::new();
         for (k, one) in self.neurons.iter_mut().enumerate() {
             for (spike, repaired) in &self.waiting[..certain] {
-                one.push(*spike)?;
-                if *repaired {
+                if one.push(*spike)? && *repaired {
                     // Crossings up to here cannot rest on the repaired taxel.
                     one.drain_crossings(k, &mut crossings);
                     one.repaired = Some(spike.t);

@@ -55,16 +55,15 @@ fn array() -> Array {
 fn stream(neuron: &Neuron, latency_ms: f64, period_us: f64) -> ReadoutStream {
     let on = vec![0.9, 0.5, 0.0, 0.2, -0.6, 0.0, 0.1, -0.3];
     let off = vec![-0.4, 0.0, -0.2, 0.0, 0.8, 0.6, 0.4, 0.3];
-    let neurons = [("contact", on, 0.2), ("lift", off, 0.5)];
+    let neurons = [("contact", on, 0.2), ("lift", off, 0.5)].into_iter().map(|(label, weights, delay_ms)| {
+        let one = TrainedNeuron { neuron: neuron.clone(), inputs: vec![], weights, delay_ms };
+        NamedNeuron::new(label, &one, 0.9, latency_ms, Inputs::new(None, 1))
+    });
     ReadoutStream::new(
         Box::new(Plain { latency_ms }),
         array(),
         FrameClock::new(period_us).unwrap(),
-        0.9,
-        vec![0.0],
-        neurons.into_iter().map(|(label, weights, delay_ms)| {
-            (label.to_owned(), TrainedNeuron { neuron: neuron.clone(), weights, delay_ms })
-        }),
+        Neurons::new(neurons.collect(), vec![0.0]),
     )
 }
 

@@ -1,0 +1,365 @@
+"""The recipe of a training: which encoder, and of each label's neuron what it is and what it receives."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Any
+
+from taxel._base.arguments import finite, flag, instance, mapping, number, parameters, several, shown, text
+from taxel._core import ProblemError
+from taxel.detect import recipes
+from taxel.detect.examples import Example
+from taxel.encode import Composite, Encoder
+from taxel.learn import ConeR
+from taxel.neuron import Neuron
+from taxel.spikes import to_us
+
+__all__ = ["Recipe", "changed", "learner_from"]
+
+
+#: Keys of a recipe's file that a recipe does not hold: which recordings it fits, whose parameters other labels have.
+_OF_THE_FILE = ("fits", "other")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Describe how to train a readout.
+
+    Parameters
+    ----------
+    encoder : Encoder
+        Several side by side are a `taxel.encode.Composite`, in a file tables ``[encoders.NAME]``.
+    learner : mapping
+        Parameters of `taxel.learn.ConeR` for all neurons, and `delay_ms`: how much later than the event a neuron is
+        trained to fire, the encoder's latency apart. Of a composite encoder also `inputs`: the names of the parts
+        whose trains a neuron receives, in any order; all where there is none.
+    neurons : mapping of str to mapping
+        The same by label, before those for all; a `search` lists other points, each as changes of that neuron. Where
+        there are any, only these labels are learnt.
+    run_threshold : float, above 0
+        See `taxel.Readout`.
+    about, source : str
+        What it is for, and where its values come from.
+    align : bool
+        Whether labels are moved to what the sensor felt (`Alignment`) before they are learnt: then `t` of a detection
+        is when the sensor felt the event. For labels that one input follows each time, as it does contact and lift;
+        labels that say of which kind a touch is have none, so recipes for them leave it off. Scores are against the
+        labels as given.
+
+    Raises
+    ------
+    ProblemError : a parameter that is not known (names it) or is invalid; a `delay_ms` that is none of the encoder's
+        `ages_ms`
+
+    Examples
+    --------
+    >>> from taxel.encode import ContactArea
+    >>> recipe = Recipe(ContactArea(), {"refractory": 15.0}, {"contact": {"tau": 0.5, "delay_ms": 0.2}})
+    >>> recipe.learner_of("contact")
+    (ConeR(neuron=Neuron(tau=0.5, refractory=15.0, time='grid')), 0.2)
+    """
+
+    encoder: Encoder
+    learner: Mapping[str, Any] = field(default_factory=dict)
+    neurons: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    run_threshold: float = 1.0
+    about: str = ""
+    source: str = ""
+    align: bool = False
+
+    def __post_init__(self) -> None:
+        instance("encoder", self.encoder, Encoder)
+        if not finite("run_threshold", self.run_threshold) > 0:
+            raise ProblemError(f"run_threshold is {shown(self.run_threshold)}: must be above 0 and finite")
+        text("about", self.about)
+        text("source", self.source)
+        flag("align", self.align)
+        if not isinstance(self.neurons, Mapping):
+            raise ProblemError(f"neurons is {shown(self.neurons)}: must be parameters by label")
+        learner_from("learner", self.learner)
+        for label in self.neurons:
+            self.learner_of(text("label", label))
+            for point in self.points_of(label):
+                self._checked(f"neurons.{label}.search", {**self.learner, **point})
+
+    def learner_of(self, label: str) -> tuple[ConeR, float]:
+        """Return the learner of a label, not yet fitted, and the delay with which it is trained.
+
+        Parameters
+        ----------
+        label : str
+
+        Returns
+        -------
+        ConeR
+        float, ms
+
+        Raises
+        ------
+        ProblemError : a label that the recipe does not know, or a delay that is none of the encoder's `ages_ms`
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> Recipe(LevelCrossing([1.0]), {"delay_ms": 1.0}, {"contact": {"ub": 2.0}}).learner_of("contact")[1]
+        1.0
+        """
+        own = self.neurons.get(text("label", label), {})
+        if not isinstance(own, Mapping):
+            raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
+        return self._checked(f"neurons.{label}", self._of(label))
+
+    def _checked(self, place: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
+        """Return the learner and the delay of one point, whose inputs exist and whose delay is one of their ages."""
+        learner, delay_ms = learner_from(place, values)
+        try:
+            parts = self._received(values)._each()
+        except ProblemError as error:
+            raise ProblemError(f"{place}: {error}") from None
+        for part in parts:
+            _check_age(place, delay_ms, part)
+        return learner, delay_ms
+
+    def _received(self, values: Mapping[str, Any]) -> Encoder:
+        """Return the encoder whose trains a neuron with these parameters receives."""
+        inputs = values.get("inputs")
+        if inputs is None:
+            return self.encoder
+        if not isinstance(self.encoder, Composite):
+            raise ProblemError(f"inputs is {shown(inputs)}: there is one encoder, so leave it out")
+        return self.encoder.only(several("inputs", inputs))
+
+    def inputs_of(self, label: str) -> tuple[str, ...]:
+        """Return the parts of a composite encoder that a label's neuron receives; none where it receives all trains.
+
+        Parameters
+        ----------
+        label : str
+
+        Returns
+        -------
+        tuple of str
+
+        Raises
+        ------
+        ProblemError : a label that the recipe does not know
+
+        Examples
+        --------
+        >>> from taxel.encode import Composite, ContactArea, Moments
+        >>> encoder = Composite({"area": ContactArea(), "moments": Moments()})
+        >>> Recipe(encoder, neurons={"contact": {"inputs": ["area"]}, "ball": {}}).inputs_of("contact")
+        ('area',)
+        """
+        return tuple(several("inputs", self._of(label).get("inputs", ())))
+
+    def _trained_delay_of(self, label: str) -> float:
+        """Return how much later than the event, ms, a label's neuron is trained to fire.
+
+        Where an age of the touch begins then it is a step later: a spike at that age acts after its time.
+        """
+        learner, delay_ms = self.learner_of(label)
+        aged = any(getattr(part, "ages_ms", None) is not None for part in self._received(self._of(label))._each())
+        return delay_ms + (learner.neuron.step_ms if aged and learner.neuron is not None else 0.0)
+
+    def _narrowed(self, labels: Sequence[str], *, search: bool = False) -> Recipe:
+        """Return the recipe without the parts of a composite encoder that no neuron of these labels receives.
+
+        Without `search` that is a working copy: points that it would try may name parts that are left out.
+        """
+        if not isinstance(self.encoder, Composite):
+            return self
+        points = [{**self.learner, **p} for label in labels for p in self.points_of(label)[: None if search else 1]]
+        received = {name for point in points for name in point.get("inputs", self.encoder.parts)}
+        parts = {name: part for name, part in self.encoder.parts.items() if name in received}
+        narrowed = copy(self)
+        object.__setattr__(narrowed, "encoder", Composite(parts) if parts else self.encoder)
+        return narrowed
+
+    def _of(self, label: str) -> dict[str, Any]:
+        """Return the parameters of a label's neuron, those for all among them."""
+        return {**self.learner, **self.points_of(label)[0]}
+
+    def points_of(self, label: str) -> list[dict[str, Any]]:
+        """Return the parameters of a label's neuron, and behind them the others that the recipe lists for a search.
+
+        Parameters
+        ----------
+        label : str
+
+        Raises
+        ------
+        ProblemError : a label that the recipe does not know
+
+        Examples
+        --------
+        >>> from taxel.encode import LevelCrossing
+        >>> recipe = Recipe(LevelCrossing([1.0]), {}, {"contact": {"ub": 2.0, "search": [{"ub": 3.0}]}})
+        >>> recipe.points_of("contact")
+        [{'ub': 2.0}, {'ub': 3.0}]
+        """
+        own = dict(self.neurons.get(text("label", label), {}))
+        listed = several(f"neurons.{label}.search", own.pop("search", ()))
+        return [own, *({**own, **mapping(f"neurons.{label}.search", point)} for point in listed)]
+
+    def _labels(self, examples: Sequence[Example]) -> tuple[str, ...]:
+        """Return the labels that are learnt: the recipe's, or where it has none those of the examples."""
+        return tuple(self.neurons) or tuple(sorted({label for example in examples for label in example.labels}))
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Recipe:
+        """Build a recipe from plain values, whose keys are its parameters.
+
+        The encoder is a table with its `name` and parameters, where "none" stands for None: TOML has no word for it.
+        Instead of `encoder` there may be `encoders`: several such tables by name, as the parts of one composite.
+        What a recipe's file says of the recordings that it `fits` and of any `other` label is for `load`.
+
+        Parameters
+        ----------
+        values : mapping
+
+        Returns
+        -------
+        Recipe
+
+        Raises
+        ------
+        ProblemError : a key that is not known (names it), or no encoder
+
+        Examples
+        --------
+        >>> Recipe.from_dict({"encoder": {"name": "fa1"}, "learner": {"tau": 5.0}}).learner
+        {'tau': 5.0}
+        """
+        if not isinstance(values, Mapping):
+            raise ProblemError(f"recipe is {shown(values)}: must be values by name")
+        known = tuple(inspect.signature(cls).parameters)
+        for key in values:
+            if key not in (*known, "encoders", *_OF_THE_FILE):
+                raise ProblemError(f"recipe: no key {shown(key)}: there are {', '.join(known)}, encoders")
+        own = {key: value for key, value in values.items() if key in known}
+        return cls(**{**own, "encoder": _encoder_of(values)})
+
+    @classmethod
+    def load(
+        cls,
+        recipe: str | os.PathLike[str],
+        changes: Mapping[str, Any] | None = None,
+        labels: Sequence[str] | None = None,
+    ) -> Recipe:
+        """Load one of `taxel.detect.recipes.names`, or a TOML or JSON file, whose path holds a dot or a slash.
+
+        Parameters
+        ----------
+        recipe : str or path
+        changes : mapping, optional
+            Other values by dotted key, as ``learner.tau``: those of ``learner`` come before what the recipe has for
+            one neuron, those of ``neurons.LABEL`` before all.
+        labels : sequence of str, optional
+            What is to be learnt: a recipe that has parameters for any `other` label gets a neuron for each.
+
+        Raises
+        ------
+        FormatError : neither TOML nor JSON
+        ProblemError : a name or key that is not known, or a value that is invalid
+        FileNotFoundError : no such file
+
+        Examples
+        --------
+        >>> recipe = Recipe.load("gait_insole", {"learner.tau": 20.0}, labels=["contact", "foot off"])
+        >>> recipe.learner_of("foot off")[1], sorted(recipe.neurons)
+        (8.0, ['contact', 'foot off'])
+        """
+        for key in changes if isinstance(changes, Mapping) else ():
+            if text("key", key).partition(".")[0] in _OF_THE_FILE:
+                raise ProblemError(
+                    f"{key}: says for what a recipe's file is chosen, so a change of it does nothing: change learner "
+                    "or neurons, or write a recipe of your own"
+                )
+        values = recipes.read(recipe)
+        if labels is not None:
+            values = recipes.for_labels(values, several("labels", labels))
+        return cls.from_dict(changed(values, {} if changes is None else changes))
+
+
+def _encoder_of(values: Mapping[str, Any]) -> Encoder:
+    """Return the encoder of a recipe's plain values, or several as a composite."""
+    one, each = values.get("encoder"), values.get("encoders")
+    if isinstance(one, Mapping) == isinstance(each, Mapping):
+        wrong = "both encoder and encoders: name one of the two" if one is not None and each is not None else ""
+        raise ProblemError(
+            f"recipe: says {wrong or 'no encoder: name one, as --encoder contact_area or [encoder] in the recipe'}"
+        )
+
+    def stated(encoder: Mapping[str, Any]) -> Encoder:
+        return Encoder.from_json(parameters({n: None if v == "none" else v for n, v in encoder.items()}))
+
+    if isinstance(one, Mapping):
+        return stated(one)
+    assert each is not None
+    parts = {}
+    for name, table in each.items():
+        try:
+            parts[name] = stated(mapping(f"encoders.{name}", table))
+        except ProblemError as error:
+            raise ProblemError(f"recipe: encoders.{name}: {error}") from None
+    return Composite(parts)
+
+
+def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values changed at dotted keys; a change for all neurons takes precedence over a neuron's own value."""
+    if not isinstance(changes, Mapping):
+        raise ProblemError(f"changes is {shown(changes)}: must be values by dotted key")
+    values = json.loads(json.dumps(values))
+    for key in changes:
+        table, _, name = text("key", key).partition(".")
+        own = values.get("neurons")
+        for neuron in own.values() if table == "learner" and isinstance(own, dict) else ():
+            if isinstance(neuron, dict):
+                neuron.pop(name, None)
+    for key, value in changes.items():
+        *tables, last = key.split(".")
+        place = values
+        for table in tables:
+            place = place.setdefault(table, {})
+            if not isinstance(place, dict):
+                raise ProblemError(f"{key}: {table} is a value and holds no other")
+        place[last] = value
+    return values
+
+
+def _check_age(place: str, delay_ms: float, encoder: Encoder) -> None:
+    """Refuse a delay at which none of the encoder's trains of ages begins: such a neuron fires late, or never."""
+    ages = getattr(encoder, "ages_ms", None)
+    if ages is not None and round(to_us(delay_ms)) not in {round(to_us(age)) for age in ages}:
+        listed = ", ".join(f"{age:g}" for age in ages)
+        raise ProblemError(
+            f"{place}: delay_ms is {delay_ms:g}, and the encoder's ages_ms are {listed}: must be one of them, as a "
+            "neuron is trained to fire where an age begins"
+        )
+
+
+def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
+    """Return the learner that plain values describe, and the delay it is trained with (ms); `name` is for errors."""
+    if not isinstance(values, Mapping):
+        raise ProblemError(f"{name} is {shown(values)}: must be parameters by name")
+    values = {key: value for key, value in values.items() if key != "inputs"}
+    delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0), "ms")
+    # In a recipe a neuron's parameters stand among the learner's, which is trained on a grid whatever its clock.
+    cone = ConeR()
+    own = [key for key in cone.get_params(deep=False) if key != "neuron"]
+    neuron = [key for key in Neuron().get_params() if key != "time"]
+    for key in values:
+        if key not in own + neuron:
+            raise ProblemError(
+                f"{name}: no parameter {shown(key)}: there are {', '.join(neuron + own)}, delay_ms and inputs"
+            )
+    nested = {f"neuron__{key}" if key in neuron else key: value for key, value in values.items()} | {
+        "neuron__time": "grid"
+    }
+    return cone.set_params(**nested), delay_ms

@@ -1,0 +1,176 @@
+"""Several encoders side by side, each with a name."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import instance, several, shown, text
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.encode._encoder import Encoder
+from taxel.encode._tared import Tared
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recorded import Recorded, recorded
+from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
+
+__all__ = ["Composite"]
+
+
+@dataclass(eq=False, repr=False)
+class Composite(Encoder):
+    """Set several encoders side by side, so that one neuron can receive the trains of all of them, or of some.
+
+    The trains are those of all parts, as `SpikeTrains.side_by_side` joins them, in the order of the parts' names: the
+    signed trains of a part are split into ON and OFF; if a part is graded, the whole is, and the spikes of the others
+    have the value 1. The latency is the largest of a part.
+
+    Parameters
+    ----------
+    parts : mapping of str to Encoder, one or more
+        The encoders by name; none of them a composite.
+
+    Raises
+    ------
+    ProblemError : no part, a part that is no encoder, or an invalid parameter of one (names it)
+
+    Examples
+    --------
+    >>> from taxel.encode import FA1, LevelCrossing
+    >>> both = Composite({"skin": FA1(), "level": LevelCrossing([10.0])})
+    >>> both.encode(Frames([[[0.0]], [[12.0]]], [0, 1000]))
+    SpikeTrains(4 trains, 2 spikes, 0 to 1 ms)
+    """
+
+    name = "composite"
+
+    parts: Mapping[str, Encoder]
+
+    def _json(self) -> str:
+        if not isinstance(self.parts, Mapping):
+            raise ProblemError(f"parts is {shown(self.parts)}: must be encoders by name")
+        # The parts write themselves, as a tare is inserted as text.
+        each = [
+            f"{json.dumps(text('a name in parts', name))}: {instance(f'parts[{name!r}]', part, Encoder)._json()}"
+            for name, part in self.parts.items()
+        ]
+        return f'{{"name": "{self.name}", "parts": {{{", ".join(each)}}}}}'
+
+    @classmethod
+    def _from_values(cls, values: Mapping[str, Any]) -> Self:
+        return cls({name: Encoder._of(part) for name, part in values["parts"].items()})
+
+    def _each(self) -> list[Encoder]:
+        return [self.parts[name] for name in sorted(self.parts)]
+
+    def with_tare(self, tare: Tare) -> Self:
+        """Return the same encoders with this tare; a part without a parameter `tare` is unchanged.
+
+        Parameters
+        ----------
+        tare : Tare
+            The taxels' rest.
+
+        Returns
+        -------
+        Composite
+            A copy; this encoder is not changed.
+
+        Raises
+        ------
+        ProblemError : no tare
+        """
+        return type(self)({name: part.with_tare(tare) for name, part in self.parts.items()})
+
+    def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
+        """Return the spikes of a whole recording; a part's tare in seconds is measured at its beginning.
+
+        Parameters
+        ----------
+        x : Events, Frames or Recording
+            As in `Encoder.encode`.
+
+        Returns
+        -------
+        SpikeTrains
+
+        Raises
+        ------
+        ProblemError : as `Encoder.encode` of each part
+        """
+        held = recorded(x)
+        parts = {n: part._with_rest_of(held)[0] if isinstance(part, Tared) else part for n, part in self.parts.items()}
+        return super(Composite, type(self)(parts)).encode(held)
+
+    def only(self, names: Sequence[str]) -> Encoder:
+        """Return some of the parts side by side; of one alone the part itself.
+
+        Parameters
+        ----------
+        names : sequence of str, one or more
+            In any order.
+
+        Returns
+        -------
+        Encoder
+
+        Raises
+        ------
+        ProblemError : a name of no part, or one that comes twice
+
+        Examples
+        --------
+        >>> from taxel.encode import FA1, LevelCrossing
+        >>> Composite({"skin": FA1(), "level": LevelCrossing([10.0])}).only(["level"])
+        LevelCrossing(levels=[10.0])
+        """
+        chosen = {name: self.parts[name] for name in self._named(names)}
+        return type(self)(chosen) if len(chosen) > 1 else next(iter(chosen.values()))
+
+    def places(self, names: Sequence[str], array: Array) -> NDArray[np.bool_]:
+        """Return which of the trains are those of some of the parts.
+
+        Parameters
+        ----------
+        names : sequence of str, one or more
+            In any order.
+        array : Array
+            On which the number of trains of some encoders depends.
+
+        Returns
+        -------
+        bool, shape (trains,)
+
+        Raises
+        ------
+        ProblemError : a name of no part, or one that comes twice
+
+        Examples
+        --------
+        >>> from taxel.encode import FA1, LevelCrossing
+        >>> both = Composite({"skin": FA1(), "level": LevelCrossing([10.0])})
+        >>> both.places(["level"], Array(1, 1)).tolist()
+        [True, True, False, False]
+        """
+        chosen = self._named(names)
+        counts = [part.trains(array) * (2 if part.signed else 1) for part in self._each()]
+        return np.repeat([name in chosen for name in sorted(self.parts)], counts)
+
+    def _named(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Return names of parts in their order."""
+        given = [text("inputs", name) for name in several("inputs", names)]
+        for n, name in enumerate(given):
+            if name not in self.parts:
+                raise ProblemError(f"inputs: no encoder {name!r}: there are {', '.join(sorted(self.parts))}")
+            if name in given[:n]:
+                raise ProblemError(f"inputs: {name!r} comes twice")
+        if not given:
+            raise ProblemError("inputs is empty: must be names of encoders, one or more")
+        return tuple(sorted(given))

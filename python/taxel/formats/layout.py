@@ -1,0 +1,271 @@
+"""Layout files: what a recording lacks, in one TOML file beside it.
+
+A layout says of a sensor its rows, columns, pitch or places, side and heel; of readings whether they fall with
+pressure, their unit and their rate; and how to read a table or an array of somebody else. docs/files.md lists the keys.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from taxel._base.arguments import finite, flag, mapping, shown, text, whole
+from taxel._base.messages import first_line
+from taxel._core import FormatError, ProblemError
+from taxel.array import Array, Places
+
+__all__ = ["Data", "Layout", "Table", "packaged"]
+
+#: Times of a table in units of these, us.
+UNITS_US = {"s": 1e6, "ms": 1e3, "us": 1.0}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Say how to read a table of text: a line a picture, a column a taxel.
+
+    Parameters
+    ----------
+    separator : str
+        Between cells; " " stands for any number of blanks.
+    skip_lines : int, 0 or more
+        Lines before the names of the columns, or before the numbers if there are no names.
+    time_column : str or int, optional
+        The column of times, by its name or its number from 1; default: none. All other columns are taxels.
+    time_unit : {"s", "ms", "us"}
+    missing : str, optional
+        A cell without a value; default: every cell is a number.
+
+    Raises
+    ------
+    ProblemError : a value of another kind
+    """
+
+    separator: str = ","
+    skip_lines: int = 0
+    time_column: str | int | None = None
+    time_unit: str = "s"
+    missing: str | None = None
+
+    def __post_init__(self) -> None:
+        if len(text("separator", self.separator)) != 1:
+            raise ProblemError(f"separator is {shown(self.separator)}: must be one character")
+        whole("skip_lines", self.skip_lines, 0)
+        if isinstance(self.time_column, str):
+            text("time_column", self.time_column)
+        elif self.time_column is not None:
+            whole("time_column", self.time_column, 1)
+        text("time_unit", self.time_unit, UNITS_US)
+        if self.missing is not None:
+            text("missing", self.missing)
+
+
+@dataclass(frozen=True)
+class Data:
+    """Say which array of a .npz or .h5 of somebody else holds the pictures; a .npy holds one array without a name.
+
+    Parameters
+    ----------
+    array : str, optional
+        Of shape (pictures, rows, columns) or (pictures, taxels).
+    time : str, optional
+        An array of one time a picture; default: none.
+    time_unit : {"s", "ms", "us"}
+
+    Raises
+    ------
+    ProblemError : a value of another kind
+    """
+
+    array: str | None = None
+    time: str | None = None
+    time_unit: str = "s"
+
+    def __post_init__(self) -> None:
+        for name in ("array", "time"):
+            if getattr(self, name) is not None:
+                text(name, getattr(self, name))
+        text("time_unit", self.time_unit, UNITS_US)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Hold what a layout file says.
+
+    Parameters
+    ----------
+    place : Path
+        The file, for errors.
+    rows, columns : int, 1 or more, optional
+        Both or neither.
+    pitch_mm : float or (float, float), mm, optional
+        As of `Array`.
+    places : Places, optional
+        One a taxel, row by row.
+    side : {"left", "right"}, optional
+        The foot or hand that the sensor is of. For a recording of the other foot the places are mirrored.
+    heel : {"top", "bottom"}, optional
+        At which rows, or at which end of the places, the heel lies.
+    falls : bool or float
+        Whether readings fall with pressure, and are turned: to their negative, or, of a number, to that number less the
+        reading.
+    unit : str, optional
+        Of the readings, turned or not.
+    rate_hz : float, Hz, above 0, optional
+        Pictures a second, where the recording has no times.
+    table : Table, optional
+    data : Data, optional
+    ros : mapping, optional
+        The topic and what else opens it, by the names of the arguments of `taxel.open`.
+
+    Raises
+    ------
+    ProblemError : a value of another kind, or values that contradict each other
+    """
+
+    place: Path
+    rows: int | None = None
+    columns: int | None = None
+    pitch_mm: float | tuple[float, float] | None = None
+    places: Places | None = None
+    side: str = ""
+    heel: str = ""
+    falls: bool | float = False
+    unit: str | None = None
+    rate_hz: float | None = None
+    table: Table | None = None
+    data: Data | None = None
+    ros: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if (self.rows is None) != (self.columns is None):
+            raise ProblemError("rows and columns: give both or neither")
+        if self.side:
+            text("side", self.side, ("left", "right"))
+        if self.heel:
+            text("heel", self.heel, ("top", "bottom"))
+        if not isinstance(self.falls, bool):
+            object.__setattr__(self, "falls", finite("falls", self.falls))
+        if self.unit is not None and not text("unit", self.unit):
+            raise ProblemError("unit is '': must say what the readings are in")
+        if self.rate_hz is not None:
+            rate = finite("rate_hz", self.rate_hz, "Hz")
+            if not 1e-9 <= rate <= 1e6:
+                raise ProblemError(f"rate_hz is {shown(self.rate_hz)}: must be above 0, at most 1000000")
+        # Refuses a pitch beside places, and places of another number than rows x columns.
+        self.array(self.places.x.size if self.places is not None else 1)
+
+    @classmethod
+    def read(cls, path: Path) -> Layout:
+        """Read a layout file.
+
+        Parameters
+        ----------
+        path : Path
+
+        Raises
+        ------
+        FormatError : not TOML, a key that is not known, or a value of another kind (names the key)
+        OSError : the file cannot be read
+        """
+        try:
+            document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise FormatError(f"{path}: not TOML: {first_line(error)}") from None
+        except RecursionError:
+            raise FormatError(f"{path}: nested too deeply") from None
+        try:
+            return cls(place=path, **_values(document))
+        except (ProblemError, TypeError) as error:
+            raise FormatError(f"{path}: {first_line(error)}") from None
+
+    @staticmethod
+    def beside(path: Path) -> Path | None:
+        """Return the layout file of a recording or a folder; None if there is none.
+
+        Parameters
+        ----------
+        path : Path
+            Beside ``walk.csv`` it is ``walk.layout.toml``, or, for all recordings of the folder, ``layout.toml``.
+
+        Examples
+        --------
+        >>> Layout.beside(Path("a recording that is not there.csv")) is None
+        True
+        """
+        stem = path.name.removesuffix(".gz").rpartition(".")[0] or path.name
+        folder = [path / "layout.toml"] if path.is_dir() else []
+        for candidate in (path.with_name(f"{stem}.layout.toml"), *folder, path.with_name("layout.toml")):
+            if candidate.is_file():
+                return candidate
+        return None
+
+    def grid(self) -> Array | None:
+        """Return a sensor of its rows and columns; None if it does not say them."""
+        return None if self.rows is None or self.columns is None else Array(self.rows, self.columns)
+
+    def array(self, taxels: int, own: Array | None = None, side: str = "") -> Array:
+        """Return the sensor that it describes.
+
+        Parameters
+        ----------
+        taxels : int
+            How many taxels the recording holds.
+        own : Array, optional
+            The sensor that the recording states, whose name and taxels are kept.
+        side : {"left", "right", ""}
+            The foot of the recording, if it is known.
+
+        Raises
+        ------
+        ProblemError : another number of taxels than the recording holds
+        """
+        shape = (self.rows, self.columns) if self.rows is not None else (1, taxels) if own is None else own.shape
+        rows, columns = (whole(name, n, 1, 65_535) for name, n in zip(("rows", "columns"), shape, strict=True))
+        if own is not None and rows * columns != own.rows * own.columns:
+            raise ProblemError(f"says {rows} x {columns} taxels; the recording holds {own.rows} x {own.columns}")
+        places, other = self.places, bool(self.side and side and self.side != side)
+        if places is not None and other:
+            places = Places(-places.x, places.y, places.area, places.unit)
+        exists = None if own is None or own.exists is None else own.exists.reshape(rows, columns)
+        name = f"{rows}x{columns}" if own is None else own.name
+        return Array(rows, columns, self.pitch_mm, exists, name, places)
+
+
+def _values(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of a file by the names of the fields of `Layout`."""
+    tables: dict[str, type[Any]] = {"places": Places, "table": Table, "data": Data, "ros": dict}
+    _known("", document, [one.name for one in fields(Layout) if one.name != "place"])
+    values: dict[str, Any] = {}
+    for name, value in document.items():
+        if name in tables:
+            inner = mapping(name, value)
+            if name != "ros":
+                _known(f"{name}.", inner, [one.name for one in fields(tables[name])])
+            else:
+                _known("ros.", inner, ["topic", "field", "types", "ros"])
+            try:
+                values[name] = tables[name](**inner)
+            except (ProblemError, TypeError) as error:
+                raise ProblemError(f"[{name}]: {first_line(error)}") from None
+        else:
+            values[name] = tuple(value) if name == "pitch_mm" and isinstance(value, list) else value
+    if "falls" in values and isinstance(values["falls"], str):
+        flag("falls", values["falls"])
+    return values
+
+
+def _known(before: str, values: Mapping[str, Any], names: list[str]) -> None:
+    unknown = next((name for name in values if name not in names), None)
+    if unknown is not None:
+        raise ProblemError(f"unknown key {before}{unknown}; there are {', '.join(names)}")
+
+
+@cache
+def packaged(name: str) -> Layout:
+    """Return the layout that comes along for a format whose source says where its sensors are."""
+    return Layout.read(Path(__file__).parent / "layouts" / f"{name}.layout.toml")

@@ -1,0 +1,112 @@
+"""Applies a layout file to a recording: its sensor, its unit, its times, and readings that fall with pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taxel._base.messages import first_line
+from taxel._core import FormatError, ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.formats.layout import Layout, packaged
+from taxel.frames import Frames
+from taxel.recording.contents import Contents, alone, once
+
+__all__ = ["laid_out", "on_array"]
+
+#: Units that say nothing: what a table or a stream of numbers holds.
+_UNSAID = ("counts", "as sent")
+
+
+def on_array(of: Contents, array: Array) -> Contents:
+    """Return the same recording on another description of its sensor, of as many taxels."""
+
+    def events() -> Events | None:
+        if of.events is None:
+            return None
+        same = of.events[:]
+        same.array = array
+        return same
+
+    if of.has_events:
+        return of.but(array=array, events=once(events))
+
+    def frames() -> Frames | None:
+        own = of.frames
+        return own and Frames(own.values.reshape(-1, *array.shape), own.t, unit=own.unit, array=array)
+
+    return of.but(array=array, frames=once(frames))
+
+
+def laid_out(of: Contents, layout: Layout) -> Contents:
+    """Return a recording with what its layout says of it.
+
+    Raises
+    ------
+    FormatError : the layout is of another number of taxels, or contradicts the file (names the layout)
+    """
+    if of.sources:
+        sources = {n: one if one.columns else laid_out(one.but(sources={}), layout) for n, one in of.sources.items()}
+        for name, one in sources.items():
+            sources[name] = one.but(sources=sources)
+        return alone(sources)
+    try:
+        array = _array(of, layout)
+    except ProblemError as error:
+        raise FormatError(f"{layout.place}: {of.name}: {first_line(error)}") from None
+    same = of if array == of.array else on_array(of, array)
+    if (layout.falls is not False or layout.unit or layout.rate_hz) and same.has_events:
+        raise FormatError(f"{layout.place}: {of.name} holds events; falls, unit and rate_hz are of pictures")
+    if not same.has_events and same.frames is not None:
+        # Read at once, so that a layout that contradicts the file is refused where the file is opened.
+        same = same.but(frames=_read(same.frames, layout, of.name))
+    untimed = same.untimed and layout.rate_hz is None
+    return same.but(side=of.side or layout.side, heel=layout.heel or of.heel, untimed=untimed)
+
+
+def _array(of: Contents, layout: Layout) -> Array:
+    """Return the sensor of a recording as its layout says, which may not contradict the file."""
+    own = of.array
+    array = layout.array(own.rows * own.columns, own, of.side)
+    if of.has_events and array.shape != own.shape:
+        raise ProblemError(f"says {array.rows} x {array.columns} taxels; its events are of {own.rows} x {own.columns}")
+    if min(own.shape) > 1 and array.shape != own.shape:
+        raise ProblemError(f"says {array.rows} x {array.columns} taxels; the file says {own.rows} x {own.columns}")
+    if not array._is_measured:
+        kept = own if array.shape == own.shape else Array(*array.shape, own.pitch_mm, array.exists, own.name)
+        return kept if own.places is None or array.shape == own.shape else array
+    along = own.places is not None and of.kind in _ALONG and own.places == _places_along(of)
+    if own._is_measured and not along and (own.pitch_mm, own.places) != (array.pitch_mm, array.places):
+        raise ProblemError(f"says taxels {array._apart()}; the file says {own._apart()}")
+    return array
+
+
+#: Formats with a layout that comes along, which another layout may replace.
+_ALONG = ("gaitpdb",)
+
+
+def _places_along(of: Contents) -> object:
+    return packaged(of.kind).array(of.array.columns, of.array, of.side).places
+
+
+def _read(own: Frames, layout: Layout, name: str) -> Frames:
+    """Return pictures in the unit, at the rate and in the direction that a layout says."""
+    unit, t, values = own.unit, own.t, own.values
+    if layout.unit is not None:
+        if unit not in (*_UNSAID, layout.unit):
+            raise FormatError(f"{layout.place}: says unit {layout.unit}; {name} is in {unit}")
+        unit = layout.unit
+    if layout.rate_hz is not None:
+        counted = np.arange(len(t))
+        if np.array_equal(t, counted):
+            t = np.rint(counted * (1e6 / layout.rate_hz)).astype(np.int64)
+        elif len(t) > 1 and abs(layout.rate_hz * (step := float(np.median(np.diff(t)))) / 1e6 - 1) > _SLACK:
+            raise FormatError(f"{layout.place}: says {layout.rate_hz:g} Hz; the times of {name} make {1e6 / step:g} Hz")
+    if layout.falls is not False:
+        full = 0.0 if layout.falls is True else layout.falls
+        values = np.float32(full) - values
+    return Frames(values, t, unit=unit, array=own.array)
+
+
+#: The share by which a rate that a layout says may differ from that of a file's own times.
+_SLACK = 0.05

@@ -1,0 +1,299 @@
+"""Readouts of several encoders side by side: each neuron receives its inputs, as if it stood behind them alone."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from refusal import refused
+
+import taxel
+from taxel import Array, Detections, Events, Frames, Neuron, Readout, Tare
+from taxel.detect import Example, Fold, Part, Recipe, TrainedNeuron, choose, judge, run, train
+from taxel.encode import FA1, ChangeEvents, Composite, ContactArea, LevelCrossing, Moments, ThresholdIzhikevich
+
+ARRAY = Array(4, 4, 2.0)
+REST = Tare.take(Frames(np.full((2, 4, 4), 50.0), [0, 1000], unit="ticks", array=ARRAY))
+#: Signed, graded, unsigned, and one whose spikes come late.
+PARTS = {
+    "change": ChangeEvents(),
+    "moments": Moments(levels=2, graded=True, ages_ms=[0.0, 1.0, 4.0], period_ms=0.2, tare=REST),
+    "area": ContactArea(levels=[2, 4], tare=REST),
+    "late": ThresholdIzhikevich([60.0], period_ms=0.2),
+}
+INPUTS = {"a": ["area"], "b": ["moments", "change"], "c": ["late", "area"], "d": None, "e": ["change"]}
+DELAYS = [0.0, 1.5]
+
+
+def held(seed: int, n: int = 3000) -> Events:
+    """Touches of all taxels, as events with held values."""
+    rng = np.random.default_rng(seed)
+    t = np.sort(rng.integers(0, 60_000, n))
+    level = 50 + 30 * (np.sin(t / 400) > 0) * (t < 50_000)
+    ticks = level + rng.integers(0, 9, n) * (t < 50_000)
+    return Events(t, rng.integers(0, 4, n), rng.integers(0, 4, n), rng.random(n) < 0.5, intensity=ticks, array=ARRAY)
+
+
+def pictures(seed: int) -> Frames:
+    return Frames.from_events(held(seed), 200)
+
+
+def neurons(seed: int, **options: object) -> dict[str, TrainedNeuron]:
+    """One a label, of random weights."""
+    rng = np.random.default_rng(seed)
+    made = {}
+    for label, names in INPUTS.items():
+        parts = PARTS if names is None else names
+        counts = [PARTS[name].trains(ARRAY) * (1 + PARTS[name].signed) for name in parts]
+        neuron = Neuron(**({"tau": 2.0, "refractory": 1.0} | options))
+        made[label] = TrainedNeuron(
+            neuron, rng.normal(1.2 / sum(counts), 0.2, 2 * sum(counts)), 0.5, tuple(names or ())
+        )
+    return made
+
+
+def composite(seed: int, **options: object) -> Readout:
+    return Readout(Composite(PARTS), neurons(seed, **options), array=ARRAY, delays_ms=DELAYS)
+
+
+@pytest.mark.parametrize("source", [held, pictures])
+@pytest.mark.parametrize("options", [{}, {"time": "grid", "step_ms": 0.2, "kernel": "exponential"}])
+def test_a_neuron_detects_what_it_would_behind_its_inputs_alone(source, options) -> None:
+    """`t` too, so that the latency is the largest of its own inputs."""
+    readout = composite(1, **options)
+    recording = source(2)
+    whole = run(readout, recording)
+    for label, one in readout.neurons.items():
+        encoder = Composite(PARTS) if INPUTS[label] is None else Composite(PARTS).only(INPUTS[label])
+        assert readout.encoder_of(label) == encoder
+        alone = run(Readout(encoder, {label: one._replace(inputs=())}, array=ARRAY, delays_ms=DELAYS), recording)
+        own = whole[label]
+        assert len(own) > 0
+        assert (own.t.tolist(), own.known.tolist()) == (alone.t.tolist(), alone.known.tolist())
+        assert own.slope.tobytes() == alone.slope.tobytes()
+    assert len(whole) > 30
+    assert Composite(PARTS).only(INPUTS["c"]).latency_ms == PARTS["late"].latency_ms > 0
+
+
+def same(one: Detections, two: Detections) -> None:
+    assert sorted(zip(one.label, one.t, strict=True)) == sorted(zip(two.label, two.t, strict=True))
+
+
+def test_a_recording_its_pieces_and_its_trains_give_the_same() -> None:
+    events, readout = held(3), composite(4)
+    whole = run(readout, events)
+    stream, found = readout.stream(ARRAY), []
+    for start in range(0, 61_000, 777):
+        found += list(stream.push(events.between(start, start + 777)))
+        found += list(stream.advance(start + 500))
+    found += list(stream.advance(3_000_000))
+    assert [(d.label, d.t) for d in found] == list(zip(whole.label, whole.t, strict=True))
+    # What is held at the end causes spikes of the late part for as long as the readout runs on.
+    same(run(readout, Composite(PARTS).encode(events)), whole[whole.known < 75_000])
+
+
+def test_the_file_holds_encoders_and_inputs_and_one_without_them_stays_as_it_is(tmp_path: Path) -> None:
+    readout = composite(5)
+    again = Readout.load(readout.save(tmp_path / "several.json"))
+    assert again == readout
+    assert {label: one.inputs for label, one in again.neurons.items()} == {
+        label: tuple(names or ()) for label, names in INPUTS.items()
+    }
+    assert sorted(json.loads(again.to_json())["encoder"]["parts"]) == sorted(PARTS)
+    assert run(again, held(6), tare=REST) == run(readout, held(6))
+    one = Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4)})
+    assert "inputs" not in one.to_json()
+    assert '"inputs"' not in json.dumps(json.loads(readout.to_json())["neurons"]["d"])
+
+
+def test_inputs_are_given_by_label_too() -> None:
+    encoder = Composite({"area": PARTS["area"], "change": PARTS["change"]})
+    pair = (Neuron(), [1.0] * 4)
+    by_label = Readout(encoder, {"a": pair, "b": (Neuron(), [0.5] * 32, 1.0, ("change",))}, inputs={"a": ["area"]})
+    assert [one.inputs for one in by_label.neurons.values()] == [("area",), ("change",)]
+
+
+@pytest.mark.parametrize(
+    ("neuron", "more", "text"),
+    [
+        ((Neuron(), [1.0] * 4, 0.0, ("b",)), {}, 'a: inputs: no encoder "b": there are area, change'),
+        ((Neuron(), [1.0] * 4, 0.0, ("area", "area")), {}, 'a: inputs: "area" comes twice'),
+        ((Neuron(), [1.0] * 5, 0.0, ("area",)), {}, "a: 5 weights, the encoder makes 4 trains"),
+        ((Neuron(), [1.0] * 4), {}, "a: 4 weights, the encoder makes 36 trains"),
+        ((Neuron(), [1.0] * 4), {"inputs": {"b": ["area"]}}, "inputs: no neuron 'b': there are a"),
+        ((Neuron(), [1.0] * 4), {"inputs": ["area"]}, "inputs is "),
+        ((Neuron(), [1.0] * 4), {"inputs": {"a": 3}}, "a: inputs is 3"),
+    ],
+)
+def test_inputs_that_do_not_exist_are_refused(neuron: tuple, more: dict, text: str) -> None:
+    with refused(text):
+        Readout(Composite({"area": PARTS["area"], "change": PARTS["change"]}), {"a": neuron}, array=ARRAY, **more)
+
+
+def test_one_encoder_has_no_inputs() -> None:
+    with refused("a: inputs are .*: the encoder is no composite"):
+        Readout(PARTS["area"], {"a": (Neuron(), [1.0] * 4, 0.0, ("area",))})
+    for call in (
+        composite(1).encoder_of,
+        lambda label: composite(1).trains_of(label, Composite(PARTS).encode(held(1))),
+    ):
+        with refused("label 'z': there are a, b, c, d, e"):
+            call("z")
+
+
+def test_live_they_detect_what_they_detect_in_the_recording(tmp_path: Path) -> None:
+    from live.boards import LOOPBACK, SMALL, play, wait_for
+
+    from taxel.live import Live, heard
+
+    events = held(7)
+    readout = Readout(Composite(PARTS), neurons(8, tau=0.5, refractory=5.0), array=SMALL, delays_ms=DELAYS)
+    called: list[taxel.Detection] = []
+    options = {"array": SMALL, "readout": readout, "tare": REST, "guard_frames": 1e6, "say": called.append}
+    with Live(0, host=LOOPBACK, record=tmp_path / "several.mcap", **options) as live:
+        thread = threading.Thread(target=play, args=(events, live.address[1]), kwargs={"pace": 0.0005})
+        thread.start()
+        thread.join()
+        wait_for(live, len(np.unique(events.t)))
+    live.stop()
+    recorded = taxel.open(tmp_path / "several.mcap")
+    again = run(readout, recorded, tare=REST)
+    found = heard(called)
+    assert len(found) > 20
+    assert list(found.label) == list(again.label[: len(found)])
+    np.testing.assert_array_equal(found.t, again.t[: len(found)])
+    np.testing.assert_array_equal(found.known, again.known[: len(found)])
+
+
+def test_nir_holds_what_is_not_graded_and_refuses_what_is(tmp_path: Path) -> None:
+    pytest.importorskip("nir")
+    encoder = Composite({name: PARTS[name] for name in ("area", "change", "late")})
+    given = {label: one for label, one in neurons(9).items() if label in ("a", "c", "e")}
+    readout = Readout(encoder, given, array=ARRAY, delays_ms=DELAYS)
+    readout.to_nir(tmp_path / "several.nir")
+    assert Readout.from_nir(tmp_path / "several.nir") == readout
+    import nir
+
+    graph = nir.read(tmp_path / "several.nir")
+    graph.nodes["weights_1"].weight[:] *= 2.0
+    nir.write(tmp_path / "changed.nir", graph)
+    changed = Readout.from_nir(tmp_path / "changed.nir")
+    for label, one in changed.neurons.items():
+        half = len(one.weights) // 2
+        assert one.inputs == given[label].inputs
+        np.testing.assert_allclose(one.weights[half:], 2 * given[label].weights[half:])
+    graph.nodes["weights_0"].weight[:] += 1e-4
+    nir.write(tmp_path / "more.nir", graph)
+    assert all(one.inputs == () for one in Readout.from_nir(tmp_path / "more.nir").neurons.values())
+    with refused("graded"):
+        composite(1).to_nir(tmp_path / "graded.nir")
+
+
+LEARNER = {"tau": 1.0, "ub": 2.0, "lb": -2.0, "delay_ms": 1.0, "refractory": 5.0, "after_spike": "reset"}
+
+
+def touches(seed: int) -> Example:
+    """Touches of two strengths, labelled where they begin; with contact at each."""
+    rng = np.random.default_rng(seed)
+    values = np.full((600, 4, 4), 50.0)
+    at = np.arange(40, 560, 65)
+    strong = rng.permutation(np.arange(len(at)) % 2)
+    for k, one in zip(at, strong, strict=True):
+        values[k : k + 30, 1:3, 1:3] += rng.uniform(40, 50) if one else rng.uniform(10, 14)
+    labels = {"contact": 1000 * at, "strong": 1000 * at[strong == 1], "weak": 1000 * at[strong == 0]}
+    return Example(Frames(values, 1000 * np.arange(600), unit="ticks", array=ARRAY), labels, REST)
+
+
+def recipe(**more: object) -> Recipe:
+    encoder = {
+        "area": {"name": "contact_area"},
+        "moments": {
+            "name": "moments",
+            "levels": 0,
+            "graded": True,
+            "ages_ms": [0.0, 4.0, 6.0],
+            "displacement_mm": "none",
+        },
+    }
+    kind = {
+        "inputs": ["moments"], "kernel": "alpha", "tau": 0.5, "step_ms": 1.0, "ub": 50.0, "lb": -50.0, "delay_ms": 4.0,
+        "lambdas": [0.0, 0.001, 0.0, 1.0, 1.0], "divide_c_by": "targets", "divide_d_by": "targets", "norm": "square",
+        "sides_c": "below", "margin": 0.1,
+    }  # fmt: skip
+    values = {
+        "encoders": encoder,
+        "align": True,
+        "run_threshold": 0.9,
+        "learner": LEARNER,
+        "neurons": {"contact": {"inputs": ["area"]}, "strong": kind, "weak": kind},
+    }
+    return Recipe.from_dict(values | more)
+
+
+def test_each_neuron_is_trained_on_its_inputs_as_if_they_were_the_encoder() -> None:
+    examples = [touches(seed) for seed in range(3)]
+    readout = train(examples, recipe())
+    assert isinstance(readout.encoder, Composite)
+    assert {label: one.inputs for label, one in readout.neurons.items()} == {
+        "contact": ("area",), "strong": ("moments",), "weak": ("moments",)
+    }  # fmt: skip
+    alone = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples]
+    single = train(alone, Recipe(ContactArea(), LEARNER, run_threshold=0.9, align=True))
+    assert single.neurons["contact"].weights.tobytes() == readout.neurons["contact"].weights.tobytes()
+    new = touches(9)
+    found = run(readout, new.source, tare=REST)
+    # A spike at an age acts a step later, and `t` is the onset all the same.
+    for label in ("strong", "weak"):
+        assert found[label].t.tolist() == new.labels[label].tolist()
+    # Of one input the readout is one of that encoder, as before.
+    plain = train(alone, recipe(neurons={"contact": {"inputs": ["area"]}}))
+    assert plain == single
+
+
+def test_inputs_are_chosen_among_the_points_and_what_none_uses_is_not_encoded() -> None:
+    examples = [touches(seed) for seed in range(4)]
+    alone = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples]
+    strong = {"name": "contact_area", "noise_floor": 20.0}  # feels half of the touches
+    points = {"contact": {"inputs": ["strong"], "search": [{"inputs": ["area"]}]}}
+    plan = recipe(encoders={"area": {"name": "contact_area"}, "strong": strong}, neurons=points)
+    chosen = choose(alone, plan, k=2)
+    assert chosen.inputs_of("contact") == ("area",)
+    assert chosen.encoder == plan.encoder
+    assert train(alone, chosen).encoder == ContactArea()
+    result = judge(alone, plan, [Fold([Part(0), Part(1), Part(2)], [Part(3)])], search=True)
+    assert (result.together["contact"].missed, result.together["contact"].false) == (0, 0)
+    assert result.trained[0].recipe == chosen
+    # The skin's trains would be thousands; without a tare the area could not be encoded at all.
+    free = recipe(
+        encoders={"area": {"name": "contact_area"}, "level": {"name": "level_crossing", "levels": [60.0]}},
+        neurons={"contact": {"inputs": ["level"]}},
+    )
+    assert train([one._replace(tare=None) for one in alone], free).encoder == LevelCrossing([60.0])
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"neurons": {"a": {"inputs": ["skin"]}}}, "neurons.a: inputs: no encoder 'skin': there are area, moments"),
+        ({"neurons": {"a": {"inputs": []}}}, "neurons.a: inputs is empty"),
+        ({"neurons": {"a": {"inputs": ["moments"], "delay_ms": 3.0}}}, "neurons.a: delay_ms is 3, and .* 0, 4, 6"),
+        ({"neurons": {"a": {"delay_ms": 4.0, "search": [{"inputs": ["b"]}]}}}, "neurons.a.search: inputs: no encoder"),
+        ({"encoders": {"area": {"name": "areas"}}}, "recipe: encoders.area: encoder areas: must be one of"),
+        ({"encoders": {"area": 3}}, "recipe: encoders.area"),
+        ({"encoders": 3}, "recipe: says no encoder"),
+        ({"encoder": {"name": "fa1"}}, "both encoder and encoders"),
+    ],
+)
+def test_recipes_that_make_no_sense_are_refused(changes: dict, text: str) -> None:
+    with refused(text):
+        recipe(**changes)
+
+
+def test_a_delay_needs_an_age_of_its_own_inputs_alone() -> None:
+    made = recipe(neurons={"a": {"inputs": ["area"], "delay_ms": 3.3}})
+    assert made.learner_of("a")[1] == 3.3
+    with refused("there is one encoder, so leave it out"):
+        Recipe(FA1(), {"inputs": ["skin"]}, {"a": {}})

@@ -1,0 +1,124 @@
+"""Encoders side by side: the spikes of each part as `SpikeTrains.side_by_side` joins them, in the order of names."""
+
+import json
+
+import numpy as np
+import pytest
+from refusal import refused
+
+import taxel
+from taxel import Array, Frames, SpikeTrains, Tare
+from taxel.encode import FA1, FA2, ChangeEvents, Composite, ContactArea, Encoder, Moments, ThresholdIzhikevich
+
+from . import scenes
+from .scenes import rest, spikes_of, touch, wander
+
+ARRAY = scenes.ARRAY
+TARE = rest(ARRAY)
+#: Examples for the laws of all encoders (test_laws.py).
+EXAMPLES = {
+    "composite": Composite(
+        {
+            "moments": Moments(levels=2, graded=True, ages_ms=[0.0, 0.4, 2.0], period_ms=0.3, tare=TARE),
+            "change": ChangeEvents(),
+            "area": ContactArea(levels=[1, 2, 4, 8], tare=TARE),
+        }
+    ),
+    "composite, not graded, one of them late": Composite(
+        {"fine": ThresholdIzhikevich([60.0], period_ms=0.3), "area": ContactArea(levels=[2], tare=TARE), "b": FA2()}
+    ),
+}
+each_example = pytest.mark.parametrize("encoder", EXAMPLES.values(), ids=EXAMPLES)
+
+
+@each_example
+@pytest.mark.parametrize("seed", range(3))
+def test_the_spikes_are_those_of_the_parts_in_the_order_of_their_names(encoder: Composite, seed: int) -> None:
+    events = touch(np.random.default_rng(seed), ARRAY)
+    frames = Frames(wander(np.random.default_rng(seed), 300, 12).reshape(300, 3, 4), np.arange(300) * 300, array=ARRAY)
+    for source in (events, frames):
+        each = [encoder.parts[name].encode(source) for name in sorted(encoder.parts)]
+        wanted = SpikeTrains.side_by_side(each)
+        found = encoder.encode(source)
+        assert found.kind == wanted.kind == encoder.kind
+        assert (found.start, found.stop, len(found)) == (wanted.start, wanted.stop, encoder.trains(ARRAY))
+        assert spikes_of(found) == spikes_of(wanted)
+        assert min(len(one.times) for one in each) > 0, "every part has something to say"
+    assert encoder.latency_ms == max(part.latency_ms for part in encoder.parts.values())
+
+
+def test_some_parts_have_the_places_of_their_trains() -> None:
+    encoder = EXAMPLES["composite"]
+    events = touch(np.random.default_rng(7), ARRAY)
+    whole = encoder.encode(events)
+    for names in (["change"], ["moments", "area"], ["moments", "change", "area"]):
+        part = encoder.only(names)
+        assert isinstance(part, Composite) == (len(names) > 1)
+        own = part.encode(events)
+        own = own.split_by_sign() if own.signed else own
+        assert spikes_of(whole.select(encoder.places(names, ARRAY))) == spikes_of(own)
+
+
+def test_a_part_s_tare_in_seconds_is_taken_at_the_beginning() -> None:
+    values = np.full((400, 3, 4), 50.0)
+    values[200:300, :2, :2] = 90.0
+    frames = Frames(values, np.arange(400) * 200, unit="ticks", array=ARRAY)
+    parts = {"a": ContactArea(tare=0.02), "b": Moments(graded=True, tare=0.01), "c": FA1(period_ms=0.2)}
+    given = Tare.take(frames, stop_us=20_000)
+    assert Composite(parts).encode(frames) == Composite(parts).with_tare(given).encode(frames)
+    with refused("a: contact area without a tare"):
+        Composite({"a": ContactArea()}).encode(frames)
+
+
+def test_the_order_in_which_parts_are_given_says_nothing() -> None:
+    one, two = ContactArea(), FA1(bits=2)
+    assert Composite({"x": one, "b": two}) == Composite({"b": two, "x": one})
+    assert Composite({"x": one, "b": two}) != Composite({"b": one, "x": two})
+    again = Encoder.from_json(Composite({"x": one, "b": two}).to_json())
+    assert again == Composite({"b": two, "x": one})
+    assert json.loads(again.to_json())["parts"]["b"]["name"] == "fa1"
+    assert repr(again).startswith("Composite(parts={'b': FA1(")
+
+
+@pytest.mark.parametrize(
+    ("parts", "text"),
+    [
+        ({}, "parts is empty"),
+        (None, "parts is None: must be encoders by name"),
+        ({"a": 3}, r"parts\['a'\] is 3: must be a taxel.Encoder"),
+        ({" ": FA1()}, "a part without a name"),
+        ({3: FA1()}, "a name in parts is 3"),
+        ({"a": Composite({"b": FA1()})}, "a is a composite itself"),
+    ],
+)
+def test_parts_that_make_no_sense_are_refused(parts: object, text: str) -> None:
+    with pytest.raises(taxel.ProblemError, match=text):
+        Composite(parts)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("parts", "text"),
+    [
+        ({"area": {"name": "contact_area", "noise_floor": -1.0}}, "area: noise_floor is -1"),
+        ({"area": {"name": "contact_area", "wings": 2}}, "area: encoder contact_area: wings is not known"),
+        ({"area": {"name": "composed"}}, "area: encoder composed: must be one of"),
+        ({"area": {}}, "area: encoder without a name"),
+        (3, "parts is 3"),
+    ],
+)
+def test_an_error_in_a_part_names_it(parts: object, text: str) -> None:
+    with pytest.raises(taxel.ProblemError, match=text):
+        Encoder.from_json(json.dumps({"name": "composite", "parts": parts}))
+
+
+@pytest.mark.parametrize(
+    ("names", "text"),
+    [(["b"], "no encoder 'b': there are a"), (["a", "a"], "'a' comes twice"), ([], "inputs is empty"), (3, "sequence")],
+)
+def test_parts_are_chosen_by_their_names(names: object, text: str) -> None:
+    for call in (
+        lambda: Composite({"a": FA1()}).only(names),
+        lambda: Composite({"a": FA1()}).places(names, Array(1, 1)),
+    ):
+        with pytest.raises(taxel.ProblemError, match=text):
+            call()

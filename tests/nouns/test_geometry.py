@@ -1,0 +1,285 @@
+"""How far apart taxels are, or where: what needs mm refuses without them; files of before read with the new rule."""
+
+from __future__ import annotations
+
+import json
+import re
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Calibration, Events, Frames, Places, ProblemError, Readout, Tare
+from taxel.calibration import Load
+
+#: Files that the version before wrote, in which a pitch was always a number.
+OLD = Path(__file__).parent.parent / "data" / "geometry"
+PLATE = Array(4, 3, (7.62, 5.08), name="plate")
+FOOT = Array(1, 3, name="foot", places=Places([0.0, 10.0, 4.0], [0.0, 2.0, 8.0], [4.0, 9.0, 1.0], "mm"))
+VAGUE = Array(1, 3, name="vague", places=Places([0.0, 10.0, 4.0], [0.0, 2.0, 8.0]))
+
+
+@st.composite
+def arrays(draw: st.DrawFn) -> Array:
+    """Draw a sensor of any kind of geometry."""
+    rows, columns = draw(st.integers(1, 5)), draw(st.integers(1, 5))
+    exists = draw(st.none() | st.lists(st.booleans(), min_size=rows * columns, max_size=rows * columns))
+    grid = None if exists is None else np.array(exists).reshape(rows, columns)
+    if grid is not None:
+        grid[0, 0] = True
+    length = st.floats(1e-6, 1e6) | st.just(1.0)
+    pitch = draw(st.none() | length | st.tuples(length, length))
+    places = None
+    if pitch is None and draw(st.booleans()):
+        where = st.lists(st.floats(-1e9, 1e9), min_size=rows * columns, max_size=rows * columns)
+        area = draw(st.none() | st.lists(st.floats(1e-9, 1e9), min_size=rows * columns, max_size=rows * columns))
+        places = Places(draw(where), draw(where), area, draw(st.none() | st.just("mm")))
+    return Array(rows, columns, pitch, grid, draw(st.text(max_size=8)), places)
+
+
+@given(arrays())
+def test_files_and_the_compiled_part_keep_all_of_a_sensor(array: Array) -> None:
+    assert Array._from_geometry(json.loads(json.dumps(array._geometry()))) == array
+    assert Array._from_parts(array._parts()) == array
+
+
+@given(array=arrays())
+@settings(max_examples=20, deadline=None)
+@pytest.mark.parametrize("ending", [".npz", ".h5"])
+def test_converted_files_keep_all_of_a_sensor(
+    array: Array, ending: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    place = tmp_path_factory.mktemp("kept") / f"one{ending}"
+    taxel.convert(Frames(np.zeros((2, *array.shape)), [0, 1000], array=array), place)
+    assert taxel.open(place).array == array
+
+
+@given(arrays())
+@settings(max_examples=20, deadline=None)
+def test_tares_readouts_and_recordings_of_events_keep_all_of_a_sensor(
+    tmp_path_factory: pytest.TempPathFactory, array: Array
+) -> None:
+    tare = Tare.take(Frames(np.ones((2, *array.shape)), [0, 1000], array=array))
+    assert Tare.from_json(tare.to_json()).array == array
+    encoder = taxel.encode.LevelCrossing([10.0])
+    weights = np.zeros(2 * encoder.trains(array))
+    readout = Readout(encoder, {"contact": (taxel.Neuron(), weights, 0.0)}, array=array)
+    assert Readout.from_json(readout.to_json()).array == array
+    place = tmp_path_factory.mktemp("events") / "one.mcap"
+    taxel.convert(Events([0], [0], [0], [True], array=array, intensity=[5]), place)
+    assert taxel.open(place).array == array
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("insole.npz", None), ("insole.h5", None), ("mat.npz", None), ("some.npz", None), ("some.h5", None),
+        ("plate.npz", 5.08), ("events.mcap", None), ("skin.mcap", 5.0), ("board.mcap", 2.67),
+    ],
+)  # fmt: skip
+def test_a_pitch_of_1_of_before_is_unknown_and_others_are_kept(name: str, expected: float | None) -> None:
+    recording = taxel.open(OLD / name)
+    assert recording.array.pitch_mm == expected
+    table = recording.events if recording.has_events else recording.frames()
+    assert table.array == recording.array
+    assert len(table) > 0
+
+
+def test_the_board_s_recording_of_before_is_of_the_thesis_array_and_is_written_the_same(tmp_path: Path) -> None:
+    recording = taxel.open(OLD / "board.mcap")
+    assert recording.array == Array.thesis()
+    again = tmp_path / "again.mcap"
+    taxel.convert(recording, again)
+    header = re.search(rb'"array":\{[^}]*\}', (OLD / "board.mcap").read_bytes())
+    assert header is not None
+    assert header[0] in again.read_bytes()
+
+
+def test_tare_calibration_and_readout_of_before_load() -> None:
+    assert Tare.load(OLD / "tare.json").array.pitch_mm is None
+    calibration = Calibration.load(OLD / "mat.calibration.json")
+    assert calibration.array.pitch_mm is None
+    readout = Readout.load(OLD / "readout.json")
+    assert readout.array is not None
+    assert (readout.array.pitch_mm, readout.array.is_channels) == (None, True)
+    taxel.detect.run(readout, taxel.open(OLD / "insole.npz"))
+    assert taxel.open(OLD / "mat.npz").calibrated().unit == "N"
+
+
+@pytest.mark.parametrize(
+    "value", [0.0, -1.0, np.nan, np.inf, (1.0,), (1.0, 2.0, 3.0), (1.0, 0.0), "wide", [[1.0, 2.0]]]
+)
+def test_a_pitch_that_makes_no_sense_is_refused(value: Any) -> None:
+    with pytest.raises(ProblemError, match="pitch_mm"):
+        Array(2, 2, pitch_mm=value)
+
+
+@pytest.mark.parametrize(
+    ("make", "match"),
+    [
+        (lambda: Array(2, 2, 1.0, places=Places(np.zeros(4), np.zeros(4))), "both given"),
+        (lambda: Array(2, 2, places=Places(np.zeros(3), np.zeros(3))), "one a taxel"),
+        (lambda: Places(np.zeros(3), np.zeros(4)), "y has shape"),
+        (lambda: Places(np.zeros(3), np.zeros(3), unit="inch"), "unit"),
+        (lambda: Array(1, 2, places=Places([0.0, np.nan], [0.0, 0.0])), "x of row 0, column 1 is nan: must be finite"),
+        (lambda: Array(1, 2, places=Places([0.0, 1.0], [0.0, 0.0], [1.0, 0.0])), "area of row 0, column 1 is 0.0"),
+    ],
+)
+def test_places_that_make_no_sense_are_refused(make: Callable[[], object], match: str) -> None:
+    with pytest.raises(ProblemError, match=match):
+        make()
+
+
+def test_places_of_taxels_that_do_not_exist_do_not_matter() -> None:
+    there = np.array([[True, False]])
+    one = Array(1, 2, exists=there, places=Places([1.0, np.nan], [2.0, np.inf], [3.0, -1.0]))
+    assert one == Array(1, 2, exists=there, places=Places([1.0, 7.0], [2.0, 8.0], [3.0, 9.0]))
+
+
+def test_the_unit_of_a_centre_says_what_is_known() -> None:
+    units = [Array(2, 2, 3.0), PLATE, FOOT, VAGUE, Array(2, 3), Array(1, 3), Array(3, 1), Array(1, 1), Array(1, 3, 2.0)]
+    assert [a.centre_unit for a in units] == ["mm", "mm", "mm", "places", "taxels", None, None, None, "mm"]
+    assert [a.is_channels for a in units] == [False] * 5 + [True] * 3 + [False]
+
+
+def test_area_and_centre_use_both_pitches_and_each_place() -> None:
+    values = np.zeros((1, 4, 3))
+    values[0, 2, 1], values[0, 0, 0] = 3.0, 1.0
+    of = Frames(values, [0], array=PLATE)
+    np.testing.assert_allclose(of.area(), [2 * 7.62 * 5.08])
+    np.testing.assert_allclose(of.centre(), [[0.75 * 5.08, 0.75 * 2 * 7.62]])
+    weights = np.array([[[1.0, 2.0, 5.0]]])
+    for array in (FOOT, VAGUE):
+        np.testing.assert_allclose(Frames(weights, [0], array=array).centre(), [[40 / 8, 44 / 8]])
+    np.testing.assert_allclose(Frames(weights, [0], array=FOOT).area(above=1.5), [10.0])
+    assert Frames(weights, [0], array=VAGUE).loaded(above=1.5).tolist() == [2]
+
+
+def test_without_a_pitch_a_grid_counts_in_columns_and_rows_and_channels_refuse() -> None:
+    grid = Frames([[[0.0, 2.0], [0.0, 2.0]]], [0])
+    assert grid.centre().tolist() == [[1.0, 0.5]]
+    assert grid.loaded().tolist() == [2]
+    channels = Frames([[[0.0, 2.0]]], [0])
+    for refused, match in ((grid.area, "mm2"), (channels.area, "mm2"), (channels.centre, "no position")):
+        with pytest.raises(ProblemError, match=match):
+            refused()
+
+
+@pytest.mark.parametrize(
+    ("work", "match"),
+    [
+        (lambda: taxel.encode.Skin(seed=1).afferents(Array(8, 8, name="mat")), "skin needs mm, and the pitch of mat"),
+        (lambda: taxel.encode.Skin(seed=1).afferents(FOOT), "skin needs one pitch, and foot has a place"),
+        (lambda: _moments(Array(4, 4, name="mat"), displacement_mm=(1.0, 9.0)), "displacement_mm needs mm"),
+        (lambda: _moments(Array(1, 4, name="foot"), area=(1.0, 9.0)), "moments needs neighbours on a grid; foot"),
+        (lambda: _encode(taxel.encode.ContactArea, Array(1, 4, name="foot")), "contact area needs neighbours"),
+        (lambda: _encode(taxel.encode.LocalLoad, Array(1, 4, name="foot")), "local load needs neighbours"),
+        (lambda: taxel.simulate.Layer(array=Array(8, 8, name="mat")), "the pitch of mat is not known"),
+        (lambda: taxel.simulate.Layer(array=Array(8, 8, (2.0, 3.0), name="mat")), "same pitch between rows"),
+        (lambda: taxel.metrics.van_rossum_spatial(_trains(), _trains(), array=Array(2, 2, name="mat")), "pitch of mat"),
+        (lambda: Array(2, 2, name="mat").row_mm, "row_mm needs mm, and the pitch of mat"),
+    ],
+)
+def test_what_needs_mm_or_neighbours_refuses_by_name(work: Callable[[], object], match: str) -> None:
+    with pytest.raises((ProblemError, taxel.SceneError), match=match):
+        work()
+
+
+def _trains() -> taxel.SpikeTrains:
+    return taxel.SpikeTrains.from_lists([[1.0], [], [], []])
+
+
+def _moments(array: Array, **levels: Any) -> None:
+    frames = Frames(np.ones((3, *array.shape)), [0, 1000, 2000], array=array)
+    taxel.encode.Moments(tare=Tare.take(frames), **levels).encode(frames)
+
+
+def _encode(encoder: Any, array: Array) -> None:
+    frames = Frames(np.ones((3, *array.shape)), [0, 1000, 2000], array=array)
+    encoder(tare=Tare.take(frames)).encode(frames)
+
+
+def test_displacement_is_measured_along_each_axis_s_own_pitch_and_by_places() -> None:
+    """A load that moves a row, and one that moves a column, pass the levels of their own distance."""
+    values = np.zeros((3, 4, 4))
+    values[1, 1:3, 1:3], values[2, 2:4, 1:3] = 50.0, 50.0
+
+    def spikes(array: Array) -> int:
+        frames = Frames(values, [0, 1000, 2000], array=array)
+        tare = Tare.take(Frames(values[:1].repeat(2, 0), [0, 1000], array=array))
+        only = {"area": None, "total": None, "peak": None}
+        encoder = taxel.encode.Moments(displacement_mm=(5.0, 7.0), levels=2, tare=tare, **only)
+        return len(encoder.encode(frames).times)
+
+    y, x = np.indices((4, 4)) * np.array([7.62, 5.08])[:, None, None]
+    # 7.62 mm down passes both levels, 5.08 mm one, 2.67 mm none; each level makes a spike up, and one at the end.
+    many = [spikes(Array(4, 4, pitch)) for pitch in ((7.62, 5.08), (5.08, 7.62), 2.67)]
+    assert many[0] > many[1] > many[2] == 0
+    assert spikes(Array(4, 4, places=Places(x, y, unit="mm"))) == many[0]
+    with pytest.raises(ProblemError, match="places in mm"):
+        spikes(Array(4, 4, places=Places(x, y)))
+
+
+@pytest.mark.parametrize(
+    ("array", "weights"), [(PLATE, np.full((4, 3), 7.62 * 5.08)), (FOOT, np.array([[4.0, 9.0, 1.0]]))]
+)
+def test_newtons_from_kpa_use_each_taxel_s_area(array: Array, weights: np.ndarray) -> None:
+    pressed = np.arange(1.0, 1.0 + array.rows * array.columns).reshape(1, *array.shape)
+    load = float((10.0 * pressed[0] * weights).sum() * 1e-3)
+    fitted = Calibration.fit([Load(Frames(pressed, [0], array=array), load, "N")], unit="kPa", exponent=1.0)
+    np.testing.assert_allclose(fitted.apply(Frames(pressed, [0], array=array)).values, 10.0 * pressed, rtol=1e-6)
+    without = Array(*array.shape, name="flat")
+    with pytest.raises(ProblemError, match="area of each taxel, which is not known"):
+        Calibration.fit([Load(Frames(pressed, [0], array=without), load, "N")], unit="kPa")
+
+
+def test_another_pitch_is_said_and_never_refused() -> None:
+    values = np.arange(1.0, 13.0).reshape(1, 4, 3).repeat(3, 0)
+    t = [0, 1000, 2000]
+    here, there = Frames(values, t, array=PLATE), Frames(values, t, array=Array(4, 3, 5.08, name="old"))
+    calibration = Calibration.fit([Load(there, 3.0)], exponent=1.0)
+    with pytest.warns(UserWarning, match=r"plate has its taxels rows 7.62 mm and columns 5.08 mm apart, not 5.08 mm"):
+        of_here = calibration.apply(here)
+    assert np.array_equal(of_here.values, calibration.apply(there).values)
+    with pytest.warns(UserWarning, match="plate has its taxels"):
+        Tare.take(there).off(here)
+    encoder = taxel.encode.LevelCrossing([2.0])
+    readout = Readout(encoder, {"contact": (taxel.Neuron(), np.zeros(24), 0.0)}, array=there.array)
+    with pytest.warns(UserWarning, match="plate has its taxels"):
+        taxel.detect.run(readout, here)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for unknown in (Array(4, 3), Array(4, 3, exists=np.ones((4, 3), bool), name="any")):
+            calibration.apply(Frames(values, t, array=unknown))
+            taxel.detect.run(readout, Frames(values, t, array=unknown))
+    for others in (Array(3, 4), Array(4, 3, exists=np.eye(4, 3, dtype=bool))):
+        frames = Frames(np.zeros((1, *others.shape)), [0], array=others)
+        for work in (calibration.apply, Tare.take(there).off):
+            with pytest.raises(ProblemError):
+                work(frames)
+        with pytest.raises(ProblemError):
+            taxel.detect.run(readout, frames)
+
+
+def test_recordings_of_other_pitches_merge_and_the_loss_is_said(tmp_path: Path) -> None:
+    values = np.ones((2, 4, 3))
+    for name, array, t in (("a", PLATE, [0, 1]), ("b", Array(4, 3, 5.08), [5, 6]), ("c", Array(4, 3), [8, 9])):
+        taxel.convert(Frames(values, t, array=array), tmp_path / f"{name}.npz")
+    parts = [taxel.open(tmp_path / f"{name}.npz") for name in "abc"]
+    whole = taxel.merge(parts)
+    assert whole.array == PLATE
+    assert [line for line in whole.lost if "pitch" in line] == ["the pitch or places of b.npz (5.08 mm apart)"]
+
+
+def test_a_region_keeps_its_part_of_places_and_both_pitches() -> None:
+    values = np.arange(12.0).reshape(1, 4, 3)
+    assert Frames(values, [0], array=PLATE).region(slice(0, 2), slice(1, 3)).array.pitch_mm == (7.62, 5.08)
+    y, x = np.indices((4, 3), dtype=float)
+    part = Frames(values, [0], array=Array(4, 3, places=Places(x, y))).region(slice(1, 3), slice(2, 4)).array
+    assert part.places == Places(x[2:4, 1:3], y[2:4, 1:3])
