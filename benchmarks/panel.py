@@ -8,8 +8,8 @@ Recordings of pictures are an hour of both insoles, 2 x 99 sensors at 100 Hz, as
 insole. Times of opening are from the request to the first picture and to the overview, the file in the page cache.
 
 Peer: a hundred clients of its own, as nothing else speaks its protocol. Unit: pictures/s; cores; ms of a seek. Goal: 50
-pictures/s beside 99 others, nothing lost, a GB indexed within 2 s, any time within 50 ms; an hour of insoles opens in 2 s
-and is complete within 5, a text table shows its first picture in 2 s.
+pictures/s beside 99 others, nothing lost, a GB indexed within 2 s, any time within 50 ms; an hour of insoles opens in
+2 s and is complete within 5, a text table shows its first picture in 2 s.
 """
 
 from __future__ import annotations

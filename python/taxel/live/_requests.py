@@ -84,7 +84,7 @@ def _reasons() -> Iterator[None]:
 
 
 def _rest(recording: Recording) -> Tare:
-    """Return the rest of taxels: before the first label and the board's start marker, or at the recording's beginning."""
+    """Return the rest of taxels: before the first label and the board's start marker, or at the beginning."""
     source = recorded(recording)
     first = int(source.t[0]) if len(source) else 0
     ends = [note.t - _BEFORE_US for note in recording.notes if note.t is not None]
