@@ -28,7 +28,7 @@ __all__ = ["TURN_US", "Labels", "Note", "ahead_us", "beside", "write_labels"]
 TURN_US = 6_553_600
 
 #: The columns of a table, as an error lists them; those in brackets are optional.
-_WANTED, _OTHERS = ("label", "t_us"), ("recording", "host_ns")
+_WANTED, _OTHERS = ("label", "t_us"), ("recording", "source", "host_ns")
 
 
 @dataclass(frozen=True)
@@ -45,17 +45,20 @@ class Note:
         Time by the host's clock; 0 if unknown.
     recording : str
         In a table of several recordings (`Labels`) the path, name or stem of the file; else "".
+    source : str
+        The source of the recording that it is of, as "left"; "" for all of them.
 
     Examples
     --------
     >>> Note("left heel", 5000)
-    Note(text='left heel', t=5000, at_ns=0, recording='')
+    Note(text='left heel', t=5000, at_ns=0, recording='', source='')
     """
 
     text: str
     t: int | None = None
     at_ns: int = 0
     recording: str = ""
+    source: str = ""
 
     def __getattr__(self, name: str) -> Any:
         """Return a field by its old name in `taxel.Label`; this is removed in the next version."""
@@ -85,7 +88,8 @@ class Labels:
     Parameters
     ----------
     path : path
-        A CSV ``recording,label,t_us,host_ns``, its columns in any order; `recording` and `host_ns` may be absent.
+        A CSV ``recording,source,label,t_us,host_ns``, its columns in any order; `recording`, `source` and `host_ns` may
+        be absent. A label without a source is of all sources of its recording.
 
     Attributes
     ----------
@@ -155,12 +159,12 @@ class Labels:
         # The class is checked, not the attribute: reading the clock may take long.
         if isinstance(recording, type) or not (hasattr(recording, "path") and hasattr(type(recording), "clock")):
             raise ProblemError(f"recording is {shown(recording)}: must be a taxel.Recording")
-        return self._of(recording.path, lambda: recording.clock)
+        return self._of(recording.path, lambda: recording.clock, getattr(recording, "label", ""))
 
-    def _of(self, path: Path, clock_of: Callable[[], Clock | None]) -> dict[str, NDArray[np.int64]]:
-        """Return the events of the recording at this path; its clock is read only if it is needed."""
+    def _of(self, path: Path, clock_of: Callable[[], Clock | None], source: str) -> dict[str, NDArray[np.int64]]:
+        """Return the events of a source of the recording at this path; its clock is read only if it is needed."""
         name = self.named(path)
-        rows = [row for row in self.rows if row.recording == name]
+        rows = [row for row in self.rows if row.recording == name and row.source in ("", source)]
         clock = clock_of() if any(row.at_ns for row in rows) else None
         by_label: dict[str, list[int]] = {}
         for row in rows:
@@ -203,8 +207,14 @@ def beside(recording: str | os.PathLike[str]) -> Path:
     return place.with_name(f"{place.stem}.notes.csv")
 
 
-def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int]]) -> None:
+def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int] | tuple[str, int, str]]) -> None:
     r"""Write a table `label,t_us` in the order of time; an existing one is replaced atomically.
+
+    Parameters
+    ----------
+    path : path
+    labels : iterable of (label, us) or (label, us, source)
+        The table has a column `source` if any label has one that is not "".
 
     Raises
     ------
@@ -218,11 +228,13 @@ def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int]]
     >>> place.read_text()
     'label,t_us\ncontact,400\nlift,900\n'
     """
-    rows = sorted(labels, key=lambda row: row[1])
+    rows = sorted((tuple(row) for row in labels), key=lambda row: row[1])
+    of_sources = any(row[2:] > ("",) for row in rows)
+    columns = (*_WANTED, "source") if of_sources else _WANTED
     with whole_file(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(_WANTED)
-        table.writerows(rows)
+        table.writerow(columns)
+        table.writerows([(*row, "")[: len(columns)] for row in rows])
 
 
 def _row(place: str, cells: Mapping[str, str]) -> Note:
@@ -240,4 +252,5 @@ def _row(place: str, cells: Mapping[str, str]) -> Note:
         raise FormatError(f"{place}: must name a label, and a time within 2^52 us")
     if not 0 <= times.get("host_ns", 0) < 2**63:
         raise FormatError(f"{place}: host_ns must be ns since 1970")
-    return Note(values["label"], times["t_us"], times.get("host_ns", 0), values.get("recording", ""))
+    named = values.get("recording", ""), values.get("source", "")
+    return Note(values["label"], times["t_us"], times.get("host_ns", 0), *named)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._core import ProblemError
 from taxel.clock import Clock
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
@@ -37,6 +38,11 @@ class Recorded(Protocol):
         ...
 
     @property
+    def timed(self) -> bool:
+        """Whether it has times; else its pictures are numbered, one a us."""
+        ...
+
+    @property
     def events(self) -> Events:
         """The changes at taxels."""
         ...
@@ -52,9 +58,19 @@ class Recorded(Protocol):
 
 
 def recorded(x: Events | Frames | Recorded | T) -> Events | Frames | T:
-    """Return a recording's events, preceded by the values held at its beginning, or its pictures; else `x` itself."""
+    """Return a recording's events, preceded by the values held at its beginning, or its pictures; else `x` itself.
+
+    Raises
+    ------
+    ProblemError : pictures without times
+    """
     if isinstance(x, type) or not all(hasattr(x, name) for name in ("has_events", "frames")):
         return x  # type: ignore[return-value]
+    if not getattr(x, "timed", True):
+        raise ProblemError(
+            f"{x.path}: its pictures have no times; say how many there are a second: --rate-hz HZ, or "  # type: ignore[union-attr]
+            "recording.at_rate(HZ)"
+        )
     if not x.has_events:  # type: ignore[union-attr]
         return x.frames()  # type: ignore[union-attr]
     return _begun(x.events, getattr(x, "held", None))  # type: ignore[union-attr]

@@ -144,7 +144,7 @@ def test_a_npz_keeps_notes_detections_registers_and_the_sensor(tmp_path: Path) -
     assert taxel.open(tmp_path / "mat.npz").array == array
 
 
-@pytest.mark.parametrize(("first", "second"), list(itertools.product((".npz", ".csv"), repeat=2)))
+@pytest.mark.parametrize(("first", "second"), list(itertools.product((".npz", ".csv", ".mcap"), repeat=2)))
 def test_pictures_survive_to_the_last_bit(tmp_path: Path, first: str, second: str) -> None:
     frames = some_frames()
     one, two = tmp_path / f"one{first}", tmp_path / f"two{second}"
@@ -184,10 +184,9 @@ def test_pictures_of_events_are_written_where_a_rate_is_asked_for(tmp_path: Path
     assert np.array_equal(back.values, Frames.from_events(events, 1000).values)
 
 
-@pytest.mark.parametrize("kind", [".mcap", ".lsa"])
-def test_pictures_do_not_go_into_files_of_events(tmp_path: Path, kind: str) -> None:
+def test_pictures_do_not_go_into_files_of_events(tmp_path: Path) -> None:
     with pytest.raises(ProblemError, match="holds events and no pictures"):
-        taxel.convert(some_frames(), tmp_path / f"a{kind}")
+        taxel.convert(some_frames(), tmp_path / "a.lsa")
     assert not list(tmp_path.iterdir())
 
 

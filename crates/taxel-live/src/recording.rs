@@ -16,6 +16,7 @@ mod mcap_reader;
 mod mcap_writer;
 mod metadata;
 mod output;
+mod pictures;
 mod stream;
 mod topic;
 
@@ -33,6 +34,7 @@ pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
+pub use pictures::{Encoding, PictureSource, Pictures};
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 
@@ -85,10 +87,19 @@ pub struct Header {
     /// Name of this source among the sources of its file.
     #[serde(default = "board", skip_serializing_if = "is_board")]
     pub name: String,
+    /// The side of the body that the sensor is of, "left" or "right"; empty if it is unknown.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub side: String,
+    /// Where on the sensor the heel lies, "top" or "bottom"; empty if it is unknown.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub heel: String,
     /// For a stream of numbers, the content of its lines; none for a board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stream: Option<Stream>,
-    /// The other sources of the file, each with its own clock.
+    /// For a source of pictures, their unit and more; none for a board.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pictures: Option<PictureSource>,
+    /// The other sources of the file: pictures on the same clock, any other with a clock of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Header>,
 }
@@ -179,6 +190,12 @@ impl Header {
                 return Err(problem!("source {}: {n} columns of values, and {} taxels", self.name, self.array.len()));
             }
         }
+        if let Some(pictures) = &self.pictures {
+            pictures.check(&self.name, self.array.columns)?;
+            if self.stream.is_some() {
+                return Err(problem!("source {}: is both a stream of numbers and pictures", self.name));
+            }
+        }
         let driven = self.driven.as_ref().unwrap_or(&self.array);
         driven.check()?;
         self.registers.map_or(Ok(()), |registers| registers.check(driven))?;
@@ -214,7 +231,10 @@ impl Header {
             source,
             started_ns,
             name: board(),
+            side: String::new(),
+            heel: String::new(),
             stream: None,
+            pictures: None,
             sources: vec![],
         }
     }

@@ -75,6 +75,8 @@ pub struct ArrayState {
     places: Arc<[(u16, u16)]>,
     floor: u16,
     columns: usize,
+    /// Whether pictures are shown ([`ArrayState::of_pictures`]).
+    pictures: bool,
     held: Held,
     rest: Rest<u16>,
     /// The rest as it is tracked; `None` where it was given.
@@ -114,6 +116,7 @@ impl ArrayState {
             places: (0..from.held.len()).map(place).collect(),
             floor,
             columns,
+            pictures: false,
             held: from.held.clone().into(),
             rest: Rest::measured(from.rest.clone()),
             tracked: Some(from.tracked.clone().unwrap_or_else(|| Box::new(tracked_from(columns, floor, &from.rest)))),
@@ -138,6 +141,17 @@ impl ArrayState {
             state.advance(t);
         }
         state
+    }
+
+    /// The state where pictures are shown: the rest is that of the keyframe, a change without a value is a value that is
+    /// missing from then on, and pictures are counted as events are.
+    #[must_use]
+    pub fn of_pictures(mut self, from: &Keyframe) -> Self {
+        self.pictures = true;
+        (self.tracked, self.track_at) = (None, None);
+        self.rest = Rest::measured(from.rest.clone());
+        self.sum_above_rest();
+        self
     }
 
     /// A keyframe of the current state.
@@ -186,7 +200,7 @@ impl ArrayState {
         for together in changes.chunk_by(|one, next| one.t == next.t) {
             let t = together[0].t;
             self.advance(t);
-            self.events += together.len() as u64;
+            self.events += if self.pictures { 1 } else { together.len() as u64 };
             together.iter().for_each(|change| self.apply_to_taxel(change));
             let column = match self.column {
                 Some(column) if self.within.contains(&t) => column,
@@ -207,6 +221,11 @@ impl ArrayState {
     #[inline]
     fn apply_to_taxel(&mut self, change: &Change) {
         let taxel = change.taxel as usize;
+        if change.ticks == UNKNOWN && self.pictures {
+            let above = self.above(taxel);
+            self.held.set(taxel, UNKNOWN);
+            return self.change_above_rest(taxel, above, 0);
+        }
         if change.ticks == UNKNOWN {
             let size = if change.up { UNVALUED } else { -UNVALUED };
             self.change[taxel] = self.change[taxel].saturating_add(size).max(-127);

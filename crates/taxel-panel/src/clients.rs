@@ -18,6 +18,8 @@ pub(super) enum Broadcast {
     Counters(Arc<Map<String, Value>>),
     /// The labels of a recording have changed: for the clients that show it.
     Labels(String),
+    /// A recording of which the beginning was shown is read as a whole.
+    Whole(String),
     /// The contents of `hello` have changed.
     Hello,
 }

@@ -6,10 +6,12 @@ use std::sync::{Arc, Mutex, Weak};
 use std::time::UNIX_EPOCH;
 
 use taxel_core::problem;
+use taxel_live::Result;
 use taxel_live::locked::lock;
-use taxel_live::{Error, Result};
 
+use super::keyframe_index::pictures::PictureIndex;
 use super::keyframe_index::recording::RecordingIndex;
+use super::opening::Indexed;
 
 /// Maximum number of recordings in a list.
 const MOST_LISTED: usize = 1000;
@@ -22,17 +24,29 @@ pub(super) struct Listed {
     pub(super) modified_ns: u64,
 }
 
+/// Endings of recordings, those of other makers' files among them.
+const ENDINGS: [&str; 12] =
+    [".mcap", ".lsa", ".npz", ".h5", ".csv", ".csv.gz", ".txt", ".txt.gz", ".asc", ".asf", ".lst", ".hea"];
+
+/// Endings of the names of tables beside recordings, which are none.
+const TABLES: [&str; 5] = ["notes.csv", "labels.csv", "events.csv", "steps.csv", "trials.csv"];
+
+/// A file, and its trial where it holds several.
+pub(super) type Key = (PathBuf, Option<String>);
+
 /// See the module.
 pub(super) struct Folder {
     path: PathBuf,
-    /// The indices in use, so that a recording is indexed once however many clients show it.
-    indices: Mutex<HashMap<PathBuf, Weak<RecordingIndex>>>,
+    /// The indices in use, so that a recording is indexed once however many clients show it, with the sizes of the files.
+    indices: Mutex<HashMap<Key, (u64, WeakIndex)>>,
+    /// The index that was built last.
+    last: Mutex<Option<Indexed>>,
 }
 
 impl Folder {
     /// `path` is canonical.
     pub(super) fn new(path: PathBuf) -> Self {
-        Self { path, indices: Mutex::default() }
+        Self { path, indices: Mutex::default(), last: Mutex::default() }
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -44,7 +58,7 @@ impl Folder {
         let mut files = vec![];
         for entry in std::fs::read_dir(&self.path).into_iter().flatten().flatten() {
             let name = entry.file_name().to_string_lossy().into_owned();
-            let (Ok(about), true) = (entry.metadata(), name.ends_with(".mcap") || name.ends_with(".lsa")) else {
+            let (Ok(about), true) = (entry.metadata(), may_be_recording(&name)) else {
                 continue;
             };
             if !about.is_file() || checked_name(&name).is_err() {
@@ -86,23 +100,48 @@ impl Folder {
         }
     }
 
-    /// The keyframe index of a recording, built unless a client shows it already.
-    ///
-    /// # Errors
-    ///
-    /// As [`Folder::file`] and [`RecordingIndex::open`].
-    pub(super) async fn index(&self, name: &str) -> Result<Arc<RecordingIndex>> {
-        let path = self.file(name)?;
-        let length = std::fs::metadata(&path).map_err(Error::file(&path))?.len();
-        let known = lock(&self.indices).get(&path).and_then(Weak::upgrade);
-        if let Some(index) = known.filter(|index| index.bytes == length) {
-            return Ok(index);
+    /// An index that is in memory, of a file of this size.
+    pub(super) fn known(&self, key: &Key, bytes: u64) -> Option<Indexed> {
+        lock(&self.indices).get(key).filter(|(length, _)| *length == bytes).and_then(|(_, index)| index.upgrade())
+    }
+
+    /// Remembers an index for as long as it is shown; the last one for longer.
+    pub(super) fn remember(&self, key: Key, bytes: u64, indexed: &Indexed) {
+        *lock(&self.last) = Some(indexed.clone());
+        lock(&self.indices).insert(key, (bytes, WeakIndex::of(indexed)));
+    }
+
+    /// Forgets an index, so that it is built anew.
+    pub(super) fn forget(&self, key: &Key) {
+        lock(&self.indices).remove(key);
+    }
+}
+
+/// Whether a file may be a recording, by its name.
+fn may_be_recording(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    ENDINGS.iter().any(|ending| lower.ends_with(ending)) && !TABLES.iter().any(|table| lower.ends_with(table))
+}
+
+/// An index that others hold.
+enum WeakIndex {
+    Events(Weak<RecordingIndex>),
+    Pictures(Weak<PictureIndex>),
+}
+
+impl WeakIndex {
+    fn of(indexed: &Indexed) -> Self {
+        match indexed {
+            Indexed::Events(index) => Self::Events(Arc::downgrade(index)),
+            Indexed::Pictures(index) => Self::Pictures(Arc::downgrade(index)),
         }
-        let file = path.clone();
-        let index = tokio::task::spawn_blocking(move || RecordingIndex::open(&file)).await;
-        let index = index.map_err(|_| problem!("{name}: failed within taxel; please report it"))??;
-        lock(&self.indices).insert(path, Arc::downgrade(&index));
-        Ok(index)
+    }
+
+    fn upgrade(&self) -> Option<Indexed> {
+        match self {
+            Self::Events(index) => index.upgrade().map(Indexed::Events),
+            Self::Pictures(index) => index.upgrade().map(Indexed::Pictures),
+        }
     }
 }
 

@@ -10,6 +10,7 @@ use taxel_core::Array;
 use taxel_core::wire::Command;
 
 use super::keyframe_index::Activity;
+use super::keyframe_index::pictures::PictureIndex;
 
 /// The answer to a request, or the reason for a refusal in words for a person.
 pub type Reply<T> = Result<T, String>;
@@ -53,6 +54,8 @@ pub struct LabelRow {
     pub label: String,
     /// Board time, us.
     pub t_us: i64,
+    /// The source that it is of; empty for all of them.
+    pub source: String,
 }
 
 /// Taxels (column, row) that do not work as they should.
@@ -68,11 +71,35 @@ pub struct UnhealthyTaxels {
     pub untold: u64,
 }
 
+/// How much of a file is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Opening {
+    /// Of a large text table the beginning, so that something is shown soon; of any other file all.
+    Beginning,
+    /// All of it.
+    Whole,
+}
+
+/// A file that the program that started the panel has read.
+#[derive(Debug)]
+pub enum ReadFile {
+    /// Events: a `.mcap` that holds them.
+    Events(PathBuf),
+    /// Pictures.
+    Pictures(PicturesRead),
+}
+
+/// Pictures that were read.
+#[derive(Debug)]
+pub struct PicturesRead(pub Box<PictureIndex>);
+
 /// The stretch of a recording that is to be cut out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cut<'a> {
     /// The recording.
     pub path: &'a Path,
+    /// Its trial, where the file holds several.
+    pub trial: Option<&'a str>,
     /// The new file.
     pub out: &'a Path,
     /// Start, us of the board's clock.
@@ -109,6 +136,12 @@ pub trait RequestHandler: Send + Sync {
 
     /// Finds taxels that are dead, stuck or noisy.
     fn health(&self, array: &Array, activity: &Activity) -> Reply<UnhealthyTaxels>;
+
+    /// Reads a recording that is no file of a board's events.
+    fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile>;
+
+    /// Finds taxels of a recording of pictures that are dead, stuck or noisy.
+    fn health_of_pictures(&self, path: &Path, trial: Option<&str>) -> Reply<UnhealthyTaxels>;
 
     /// Writes a stretch of a recording to a new file; returns what that file cannot hold.
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>>;

@@ -6,6 +6,7 @@
 mod activity;
 mod event_rate;
 pub mod live;
+pub mod pictures;
 pub mod recording;
 
 use taxel_core::Array;
@@ -45,6 +46,11 @@ pub trait KeyframeIndex: Send + Sync {
 
     /// The noise floor, ticks above rest.
     fn noise_floor(&self) -> u16;
+
+    /// Whether it holds pictures: then its rest is fixed, and a change without a value is a value that is missing from then on.
+    fn holds_pictures(&self) -> bool {
+        false
+    }
 
     /// First and last time with events, us; `None` without events.
     fn range(&self) -> Option<(i64, i64)>;

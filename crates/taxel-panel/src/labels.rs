@@ -25,6 +25,16 @@ pub(super) enum LabelChange {
 }
 
 impl LabelChange {
+    /// The same change at a whole multiple of `us`: at a picture, where pictures are numbered.
+    pub(super) fn at_whole(self, us: i64) -> Self {
+        let whole = |t: i64| t.div_euclid(us) * us;
+        match self {
+            Self::Mark(row) => Self::Mark(LabelRow { t_us: whole(row.t_us), ..row }),
+            Self::Move { id, t_us } => Self::Move { id, t_us: whole(t_us) },
+            other => other,
+        }
+    }
+
     /// Applies it to the labels; a new one gets the number `next_id`.
     fn apply(self, labels: &mut Vec<Label>, next_id: u64) -> Result<(), String> {
         match self {
@@ -125,7 +135,7 @@ impl LabelTables {
 
     /// The `labels` message.
     pub(super) fn message(&self, recording: &str) -> Value {
-        let one = |Label { id, row }: Label| json!({ "label_id": id, "label": row.label, "t_us": row.t_us });
+        let one = |Label { id, row }: Label| json!({ "label_id": id, "label": row.label, "t_us": row.t_us, "source": row.source });
         let labels: Vec<_> = self.get(recording).into_iter().map(one).collect();
         json!({ "type": "labels", "name": recording, "path": file_of(recording), "labels": labels })
     }

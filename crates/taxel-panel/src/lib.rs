@@ -18,6 +18,7 @@ mod labels;
 mod limits;
 mod live_source;
 mod messages;
+mod opening;
 mod options;
 mod picture;
 mod player;
@@ -33,8 +34,10 @@ mod taxel_history;
 mod time_columns;
 
 pub use handler::{
-    BoardLines, Cut, LabelRow, PresetValue, Reply, RequestHandler, UnhealthyTaxels, UserPreset, UserPresets,
+    BoardLines, Cut, LabelRow, Opening, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler, UnhealthyTaxels,
+    UserPreset, UserPresets,
 };
 pub use keyframe_index::Activity;
+pub use keyframe_index::pictures::{PictureFile, PictureIndex, PicturePlace};
 pub use options::PanelOptions;
 pub use server::Panel;

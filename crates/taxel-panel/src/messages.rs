@@ -9,6 +9,9 @@ use taxel_live::recording::now_ns;
 use super::keyframe_index::KeyframeIndex;
 use super::live_source::LiveSource;
 
+/// Maximum number of detections of a recording in a message.
+pub(super) const MOST_DETECTIONS: usize = 10_000;
+
 /// A sensor.
 pub(super) fn array(array: &Array) -> Value {
     let digit = |&exists: &bool| if exists { '1' } else { '0' };

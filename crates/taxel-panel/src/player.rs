@@ -78,7 +78,10 @@ impl Player {
         let columns = index.array().columns;
         let unit_us = options.column_us.min(COLUMN_US);
         let bytes = TimeColumns::bytes_for(index.array().rows.into(), span / unit_us);
-        let state = ArrayState::new(columns, index.noise_floor(), &keyframe, unit_us, bytes);
+        let mut state = ArrayState::new(columns, index.noise_floor(), &keyframe, unit_us, bytes);
+        if index.holds_pictures() {
+            state = state.of_pictures(&keyframe);
+        }
         let first_own = keyframe.latest.map_or(i64::MIN, |latest| column_of(latest + LATE_US, unit_us));
         let history = options.watched.map(|taxel| {
             let held = keyframe.held.get(taxel as usize).copied().unwrap_or(UNKNOWN);

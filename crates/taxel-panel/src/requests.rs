@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use taxel_core::Array;
 use taxel_core::held::UNKNOWN;
 use taxel_live::locked::lock;
 use taxel_live::ports::ports;
@@ -13,9 +14,19 @@ use super::handler::{Cut, LabelRow, UnhealthyTaxels};
 use super::hub::Hub;
 use super::labels::{LabelChange, file_of};
 use super::live_source::LiveSource;
+use super::opening::Indexed;
 use super::recorder::{RecordingFormat, RecordingPlan};
 use super::request::{Answer, Refusal, Request};
 use super::{recording_session, registers};
+
+/// The recording that a client shows.
+#[derive(Debug, Clone)]
+pub(super) struct Shown {
+    pub(super) name: String,
+    /// Its trial, where the file holds several.
+    pub(super) trial: Option<String>,
+    pub(super) indexed: Indexed,
+}
 
 /// Carries out a request; `shown` is the recording that the client shows. Returns the message for that client alone.
 ///
@@ -25,7 +36,7 @@ use super::{recording_session, registers};
 pub(super) async fn carry_out(
     hub: Arc<Hub>,
     what: &str,
-    shown: Option<&str>,
+    shown: Option<&Shown>,
     request: Request<'_>,
 ) -> Answer<Option<Value>> {
     match what {
@@ -39,7 +50,8 @@ pub(super) async fn carry_out(
         "stop" => hub.recorder.end()?,
         "note" => board(&hub)?.handle.note(request.text("text", 200)?)?,
         "mark" => {
-            let row = LabelRow { label: label_text(&request)?, t_us: request.time("t_us")? };
+            let source = request.optional_text("source", 64)?.unwrap_or_default().to_owned();
+            let row = LabelRow { label: label_text(&request)?, t_us: request.time("t_us")?, source };
             change_label(&hub, shown, LabelChange::Mark(row)).await?;
         }
         "rename" => {
@@ -174,8 +186,8 @@ fn record(hub: &Arc<Hub>, request: &Request<'_>) -> Answer {
 
 // ---------------------------------------------------------------------------------------------- labels
 
-/// Reads the labels of a recording from their file.
-pub(super) async fn read_labels(hub: &Hub, recording: &str) -> Answer {
+/// Reads the labels of a recording from their file; one us of the file is `us` in the view ([`Indexed::us`]).
+pub(super) async fn read_labels(hub: &Hub, recording: &str, us: i64) -> Answer {
     let _turn = hub.file_turn().await;
     let table = hub.folder.file(&file_of(recording))?;
     if !table.exists() {
@@ -183,7 +195,8 @@ pub(super) async fn read_labels(hub: &Hub, recording: &str) -> Answer {
         return Ok(());
     }
     let name = recording.to_owned();
-    let rows = hub.ask(move |handler| handler.read_labels(&table, &name)).await?;
+    let mut rows = hub.ask(move |handler| handler.read_labels(&table, &name)).await?;
+    rows.iter_mut().for_each(|row| row.t_us *= us);
     hub.labels.replace(recording, rows);
     Ok(())
 }
@@ -197,14 +210,28 @@ fn label_text(request: &Request<'_>) -> Answer<String> {
 }
 
 /// Changes a label of the recording that is shown or being recorded, and writes the table.
-async fn change_label(hub: &Hub, shown: Option<&str>, change: LabelChange) -> Answer {
+async fn change_label(hub: &Hub, shown: Option<&Shown>, change: LabelChange) -> Answer {
     let recorded = hub.recorder.file();
-    let name = shown.or(recorded.as_deref()).ok_or("a label belongs to a recording: open one, or record")?;
+    let name = shown.map(|shown| shown.name.as_str()).or(recorded.as_deref());
+    let name = name.ok_or("a label belongs to a recording: open one, or record")?;
+    if shown.is_some_and(|shown| shown.indexed.trial().is_some()) {
+        return Err(
+            format!("{name}: holds several trials; taxel convert {name} FOLDER makes a recording of each").into()
+        );
+    }
+    let us = shown.map_or(1, |shown| shown.indexed.us());
+    let change = change.at_whole(us);
     let table = hub.folder.file(&file_of(name))?;
     let turn = hub.file_turn().await;
     let (before, rows) = hub.labels.change(name, change)?;
     // The lock is held until the file is written, also if the client disconnects.
-    let (written, _turn) = hub.ask(move |handler| Ok((handler.write_labels(&table, &rows), turn))).await?;
+    let (written, _turn) = hub
+        .ask(move |handler| {
+            let in_file = |row: LabelRow| LabelRow { t_us: row.t_us / us, ..row };
+            let rows: Vec<LabelRow> = rows.into_iter().map(in_file).collect();
+            Ok((handler.write_labels(&table, &rows), turn))
+        })
+        .await?;
     if let Err(reason) = written {
         hub.labels.restore(name, before);
         return Err(reason.into());
@@ -216,9 +243,9 @@ async fn change_label(hub: &Hub, shown: Option<&str>, change: LabelChange) -> An
 // ---------------------------------------------------------------------------------------------- training
 
 /// Trains a readout on the labels of the recording that is shown.
-async fn train(hub: &Hub, shown: Option<&str>) -> Answer<Value> {
-    let name = shown.ok_or("train: open a recording with labels first")?;
-    let readout = format!("{}.readout.json", name.rsplit_once('.').map_or(name, |(stem, _)| stem));
+async fn train(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
+    let name = &shown.ok_or("train: open a recording with labels first")?.name;
+    let readout = format!("{}.readout.json", name.rsplit_once('.').map_or(&**name, |(stem, _)| stem));
     let (recording, out) = (hub.folder.file(name)?, hub.folder.file(&readout)?);
     let text = hub.ask(move |handler| handler.train(&recording, &out)).await?;
     hub.clients.send_json(&hub.recordings_message());
@@ -226,10 +253,10 @@ async fn train(hub: &Hub, shown: Option<&str>) -> Answer<Value> {
 }
 
 /// Runs a readout: on the recording that is shown, or on the live source from now on.
-async fn read_out(hub: &Hub, shown: Option<&str>, request: &Request<'_>) -> Answer<Option<Value>> {
+async fn read_out(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> Answer<Option<Value>> {
     let readout = request.text("readout", 110)?;
     let path = hub.folder.file(readout).map_err(|error| Refusal::of("readout", error))?;
-    let Some(name) = shown else {
+    let Some(Shown { name, .. }) = shown else {
         check_restart(hub)?;
         hub.ask(move |handler| handler.read_out(&path)).await?;
         return Ok(None);
@@ -243,11 +270,23 @@ async fn read_out(hub: &Hub, shown: Option<&str>, request: &Request<'_>) -> Answ
 
 // ---------------------------------------------------------------------------------------------- health, cutting
 
-async fn health(hub: &Hub, name: Option<&str>) -> Answer<Value> {
-    let (array, activity) = match name {
-        Some(name) => {
-            let index = hub.folder.index(name).await?;
-            (index.header().array.clone(), index.activity.clone())
+/// Number of taxels that exist.
+fn taxels(array: &Array) -> usize {
+    array.exists.as_ref().map_or(array.len(), |exists| exists.iter().filter(|&&one| one).count())
+}
+
+async fn health(hub: &Hub, shown: Option<&Shown>) -> Answer<Value> {
+    let name = shown.map(|shown| shown.name.as_str());
+    let (array, activity) = match shown {
+        Some(Shown { indexed: Indexed::Events(index), .. }) => (index.header().array.clone(), index.activity.clone()),
+        Some(Shown { name, trial, indexed: indexed @ Indexed::Pictures(_) }) => {
+            let (path, trial, taxels) = (hub.folder.file(name)?, trial.clone(), taxels(indexed.index().array()));
+            let found = hub.ask(move |handler| handler.health_of_pictures(&path, trial.as_deref())).await?;
+            let UnhealthyTaxels { dead, stuck, noisy, untold } = found;
+            return Ok(json!({
+                "type": "health", "source": name, "taxels": taxels, "heard": taxels, "dead": dead, "stuck": stuck,
+                "noisy": noisy, "untold": untold,
+            }));
         }
         None => {
             let live = hub.live().ok_or("nothing is shown")?;
@@ -255,7 +294,7 @@ async fn health(hub: &Hub, name: Option<&str>) -> Answer<Value> {
             (live.array().clone(), activity)
         }
     };
-    let taxels = array.exists.as_ref().map_or(array.len(), |exists| exists.iter().filter(|&&one| one).count());
+    let taxels = taxels(&array);
     let with_events = activity.events.iter().filter(|&&n| n > 0).count();
     let UnhealthyTaxels { dead, stuck, noisy, untold } =
         hub.ask(move |handler| handler.health(&array, &activity)).await?;
@@ -265,19 +304,24 @@ async fn health(hub: &Hub, name: Option<&str>) -> Answer<Value> {
     }))
 }
 
-async fn cut(hub: &Hub, shown: Option<&str>, request: &Request<'_>) -> Answer<Value> {
-    let name = shown.ok_or("cut: open a recording first")?;
+async fn cut(hub: &Hub, shown: Option<&Shown>, request: &Request<'_>) -> Answer<Value> {
+    let Shown { name, trial, indexed } = shown.ok_or("cut: open a recording first")?.clone();
     let (start_us, stop_us) = (request.time("start_us")?, request.time("stop_us")?);
     if start_us >= stop_us {
         return Err(Refusal::of("stop_us", "must lie after start_us"));
     }
     let to = request.text("name", 100)?;
-    let path = hub.folder.file(name)?;
+    let (path, us) = (hub.folder.file(&name)?, indexed.us());
     let out = hub.folder.file(to).map_err(|error| Refusal::of("name", error))?;
     if out.exists() {
         return Err(Refusal::of("name", format!("{to} exists already; name another")));
     }
-    let lost = hub.ask(move |handler| handler.cut(&Cut { path: &path, out: &out, start_us, stop_us })).await?;
+    // The first picture from the start on, and the first after the end.
+    let in_file = |t: i64| -(-t).div_euclid(us);
+    let (start_us, stop_us) = (in_file(start_us), in_file(stop_us));
+    let lost = hub
+        .ask(move |handler| handler.cut(&Cut { path: &path, trial: trial.as_deref(), out: &out, start_us, stop_us }))
+        .await?;
     hub.clients.send_json(&hub.recordings_message());
     Ok(json!({ "type": "cut", "name": to, "lost": lost }))
 }

@@ -136,6 +136,15 @@ impl Session {
                 };
                 if shows { self.connection.send_json(&self.hub.labels.message(&name)).await } else { Ok(()) }
             }
+            Broadcast::Whole(name) => {
+                let hub = Arc::clone(&self.hub);
+                if let Some(messages) = self.viewport.reopen_whole(&hub, &name).await {
+                    for message in messages {
+                        self.connection.send_json(&message).await?;
+                    }
+                }
+                Ok(())
+            }
             Broadcast::Hello => {
                 self.viewport.set_live(self.hub.live());
                 self.connection.send_json(&self.hub.hello_message()).await?;
@@ -207,7 +216,7 @@ impl Session {
             }
             Some(Err(refusal)) => self.refuse(&id, &what, refusal).await,
             None => {
-                let shown = self.viewport.recording_name().map(str::to_owned);
+                let shown = self.viewport.shown();
                 if let Some(busy) = self.pending.begin(&self.hub, id, what, message, shown) {
                     self.count_refusal();
                     self.connection.send_json(&busy).await?;
@@ -224,7 +233,7 @@ impl Session {
             "watch" => self.viewport.watch(request).await,
             "encode" => self.viewport.encode(request).await,
             "zoom" => self.viewport.zoom(request).await,
-            "open" => return Some(self.viewport.open(&self.hub, request).await),
+            "open" => return Some(self.viewport.open(&Arc::clone(&self.hub), request).await),
             "overview" => return Some(self.viewport.overview_message().map(|message| vec![message])),
             "seek" | "play" | "pause" | "step" | "live" => {
                 let moved = match what {

@@ -2,7 +2,7 @@
 
 import { part, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
-import { counted, seconds, whole } from "./words.js";
+import { counted, rounded, seconds, whole } from "./words.js";
 
 /** @typedef {import("./timeline.js").Timeline} Timeline */
 
@@ -26,6 +26,8 @@ export class Cursor {
     this.timeline = timeline;
     this.window = window;
     this.track = part("track", HTMLElement);
+    /** Unit of the values, size of a tick in it, and ticks of the value 0. */
+    this.values = { unit: "ticks", step: 1, zero: 0 };
     /** Where a press began, and whether it has become a drag. @type {{ x: number, drags: boolean } | null} */
     this.press = null;
     const lanes = part("lanes", HTMLElement);
@@ -121,13 +123,17 @@ export class Cursor {
       return;
     }
     const [least, greatest, last] = timeline.history.subarray(3 * place, 3 * place + 3);
-    write(part("taxel-now", HTMLElement), last === UNKNOWN_VALUE ? "" : least === greatest ? `${last} ticks` : `${last} ticks (${least} to ${greatest})`);
-    write(part("force-sum", HTMLElement), `${whole(timeline.sum[place])} ticks`);
+    const { unit, step, zero } = this.values;
+    const value = (/** @type {number} */ ticks) => rounded((ticks - zero) * step);
+    const now = `${value(last)} ${unit}`;
+    write(part("taxel-now", HTMLElement), last === UNKNOWN_VALUE ? "" : least === greatest ? now : `${now} (${value(least)} to ${value(greatest)})`);
+    const sum = step === 1 ? whole(timeline.sum[place]) : rounded(timeline.sum[place] * step);
+    write(part("force-sum", HTMLElement), `${sum} ${unit}`);
     write(part("force-area", HTMLElement), counted(timeline.area[place], "taxel"));
     const [x, y] = [timeline.x[place], timeline.y[place]];
     const centre = Number.isNaN(x) ? "nothing pressed" : `column ${x.toFixed(1)}, row ${y.toFixed(1)}`;
     write(part("centre-now", HTMLElement), centre);
-    const force = `${whole(timeline.sum[place])} ticks over ${counted(timeline.area[place], "taxel")}`;
+    const force = `${sum} ${unit} over ${counted(timeline.area[place], "taxel")}`;
     write(part("picture-info", HTMLElement), `${force}, centre: ${centre}`);
   }
 }

@@ -22,6 +22,8 @@ export class Lanes {
     this.plots = new Map();
     this.limits = { rows: 64, columns: 64 };
     /** Times from the left edge of the window, s, and curves at them. @type {Record<Name, [number[], ...Curve[]]>} */
+    /** Size of a tick in the unit of the values, and ticks of the value 0. */
+    this.values = { step: 1, zero: 0 };
     this.data = { taxel: [[], [], [], []], force: [[], [], []], centre: [[], [], []] };
     /** The length of the window, s, and where the axis has numbers, s from its left edge. */
     this.span_s = 1;
@@ -60,13 +62,13 @@ export class Lanes {
     /** @type {uPlot.Series} the edge of a band */
     const bound = { scale: "value", points: { show: false } };
     /** @type {uPlot.Scale.Range} */
-    const fromZero = (_, __, most) => [0, Math.max(8, (most ?? 0) * 1.1)];
+    const fromZero = (_, __, most) => [0, Math.max(8 * this.values.step, (most ?? 0) * 1.1)];
     const { rows, columns } = this.limits;
     const extent = Math.max(rows, columns);
     /** @type {Record<Name, { scales: uPlot.Scales, series: uPlot.Series[], axes: uPlot.Axis[], bands?: uPlot.Band[] }>} */
     const plans = {
       taxel: {
-        scales: { value: { range: (_, least, most) => (least === null ? [0, 10] : [Math.floor(least) - 2, Math.ceil(most) + 2]) } },
+        scales: { value: { range: (_, least, most) => (least === null ? [0, 10] : [least - 2 * this.values.step, most + 2 * this.values.step]) } },
         series: [{}, bound, bound, line(one, "value")],
         bands: [{ series: [2, 1], fill: band }],
         axes: [time, axis("value", 3, text)],
@@ -123,6 +125,7 @@ export class Lanes {
   /** @param {Timeline} timeline */
   draw(timeline) {
     const { columns, window, column_us, history, sum, area, x, y } = timeline;
+    const { step, zero } = this.values;
     if (!columns || !window) return;
     this.span_s = timeline.span_us / 1e6;
     this.splits = timeline.ticks(part("force-lane", HTMLElement).clientWidth / GRID_PX).map(({ share }) => share * this.span_s);
@@ -139,10 +142,10 @@ export class Lanes {
       // A curve has the value at the end of its column.
       times[i] = ((first + i) * column_us - window[0]) / 1e6;
       const known = place >= 0 && history[3 * place + 2] !== UNKNOWN_VALUE;
-      least[i] = known ? history[3 * place] : null;
-      greatest[i] = known ? history[3 * place + 1] : null;
-      last[i] = known ? history[3 * place + 2] : null;
-      force[i] = place >= 0 ? sum[place] : null;
+      least[i] = known ? (history[3 * place] - zero) * step : null;
+      greatest[i] = known ? (history[3 * place + 1] - zero) * step : null;
+      last[i] = known ? (history[3 * place + 2] - zero) * step : null;
+      force[i] = place >= 0 ? sum[place] * step : null;
       touched[i] = place >= 0 ? area[place] : null;
       const pressed = place >= 0 && !Number.isNaN(x[place]);
       column[i] = pressed ? x[place] : null;

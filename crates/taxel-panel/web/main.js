@@ -25,7 +25,7 @@ import { Timeline } from "./timeline.js";
 import { Training } from "./training.js";
 import { View } from "./view.js";
 import { TimeWindow } from "./window.js";
-import { counted, seconds, short } from "./words.js";
+import { counted, numbering, seconds, short } from "./words.js";
 
 /** @typedef {import("./protocol.js").Message} Message */
 /** @typedef {import("./protocol.js").Hello} Hello */
@@ -107,12 +107,33 @@ function writeState() {
   showState(connection, player.transport, hello, opened, recorder.status, counters);
 }
 
+/** The maps that are shown: of pictures there are no events, so that only their values are. */
+function mapsShown() {
+  return opened?.pictures ? "pressure" : settings.values.maps;
+}
+
+/** Shows values and times as the source has them: ticks and seconds, or a unit and the numbers of pictures. */
+function showUnits() {
+  const pictures = opened?.pictures;
+  const { unit, step, zero } = pictures ?? { unit: "ticks", step: 1, zero: 0 };
+  maps.values = { unit, step, zero, pictures: pictures !== null && pictures !== undefined };
+  lanes.values = { step, zero };
+  cursor.values = { unit, step, zero };
+  numbering.picture_us = pictures?.picture_us ?? null;
+  const trials = part("trials", HTMLSelectElement);
+  trials.hidden = !pictures?.trials.length;
+  trials.replaceChildren(...(pictures?.trials ?? []).map((name) => make("option", { value: name }, name)));
+  trials.value = pictures?.trial ?? "";
+  part("pressure-alone", HTMLButtonElement).hidden = maps.values.pictures;
+  showLanes();
+}
+
 /** What the page has to place: see `Layout`. */
 function arrangement() {
   const { values } = settings;
   /** @type {["raster" | "taxel" | "force" | "centre", boolean][]} */
-  const all = [["raster", values.showRaster], ["taxel", values.showTaxel && maps.taxel !== null], ["force", values.showForce], ["centre", values.showCentre]];
-  return { aspect: maps.aspect, maps: values.maps === "both" ? 2 : 1, lanes: all.flatMap(([name, shown]) => (shown ? [name] : [])) };
+  const all = [["raster", values.showRaster && !opened?.pictures], ["taxel", values.showTaxel && maps.taxel !== null], ["force", values.showForce], ["centre", values.showCentre]];
+  return { aspect: maps.aspect, maps: mapsShown() === "both" ? 2 : 1, lanes: all.flatMap(([name, shown]) => (shown ? [name] : [])) };
 }
 
 /** Lists the recordings, with the labels as the page knows them. */
@@ -220,6 +241,8 @@ function receive(message) {
       return board.connection.offer(message);
     case "cut":
       return notify(`wrote ${message.name}${message.lost.length ? `; left out: ${message.lost.join(", ")}` : ""}`);
+    case "loading":
+      return notify(message.share < 1 ? `${message.name}: ${Math.round(100 * message.share)} % read; its beginning is shown` : `${message.name} is read`);
     case "warning":
       return notify(message.text, true);
     case "refused":
@@ -286,6 +309,7 @@ function open(message) {
   player.reach = message.start_us === null || message.stop_us === null ? null : [message.start_us, message.stop_us];
   player.t_us = message.start_us;
   strip.overview = null;
+  showUnits();
   resize(message.array);
   timeWindow.forget();
   if (timeline && !again) {
@@ -334,6 +358,7 @@ function move(transport) {
   player.take(transport);
   if (transport.source === null && (opened || changed)) {
     opened = null;
+    showUnits();
     strip.overview = null;
     timeline = null;
     training.choose(null);
@@ -442,7 +467,7 @@ function showLanes() {
   const { lanes: shown } = arrangement();
   for (const id of /** @type {const} */ (["raster", "taxel", "force", "centre"])) part(`${id}-block`, HTMLElement).hidden = !shown.includes(id);
   for (const name of ["pressure", "change"]) {
-    part(`${name}-figure`, HTMLElement).hidden = values.maps !== "both" && values.maps !== name;
+    part(`${name}-figure`, HTMLElement).hidden = mapsShown() !== "both" && mapsShown() !== name;
     part(`${name}-alone`, HTMLButtonElement).setAttribute("aria-pressed", String(values.maps === name));
   }
   part("raster-changes", HTMLElement).hidden = values.raster === "spikes";
@@ -469,6 +494,10 @@ part("files", HTMLSelectElement).onchange = ({ target }) => {
   const { value } = /** @type {HTMLSelectElement} */ (target);
   if (value) server.request({ type: "open", name: value }).catch(failed);
   else player.follow();
+};
+part("trials", HTMLSelectElement).onchange = ({ target }) => {
+  const { value } = /** @type {HTMLSelectElement} */ (target);
+  if (opened) server.request({ type: "open", name: opened.name, trial: value }).catch(failed);
 };
 
 // A narrow page has only what must stay in sight in its header and footer, so that these stay low.

@@ -3,7 +3,7 @@
 import { MAPS, UNKNOWN, changeWords, pressureWords, word } from "./colours.js";
 import { ground, make, part, write } from "./dom.js";
 import { UNKNOWN_VALUE } from "./protocol.js";
-import { counted } from "./words.js";
+import { counted, rounded } from "./words.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
 /** @typedef {import("./protocol.js").Health} Health */
@@ -95,6 +95,8 @@ export class Maps {
     this.taxel = null;
     /** @type {Health | null} */
     this.health = null;
+    /** Unit of the values, size of a tick in it, and ticks of the value 0; `pictures` have no events. */
+    this.values = { unit: "ticks", step: 1, zero: 0, pictures: false };
     /** Taxels whose rest a person set. @type {Zeroing[]} */
     this.zeroed = [];
     /** @type {Picture | null} */
@@ -204,19 +206,20 @@ export class Maps {
   write() {
     const { contrast } = this.settings.values;
     const [scale, changes] = [this.pressureScale.top / contrast, this.changeScale.top / contrast];
-    write(part("pressure-half", HTMLElement), `${Math.round(scale / 2)}`);
-    write(part("pressure-top", HTMLElement), `${Math.round(scale)} ticks`);
+    const { unit, step, zero, pictures } = this.values;
+    write(part("pressure-half", HTMLElement), rounded((scale * step) / 2));
+    write(part("pressure-top", HTMLElement), `${rounded(scale * step)} ${unit}`);
     write(part("change-least", HTMLElement), `−${Math.round(changes)}`);
     write(part("change-top", HTMLElement), `+${Math.round(changes)} ticks`);
     write(part("rest-from", HTMLElement), this.picture ? REST_FROM[this.picture.restFrom] : "");
     const { unknown } = this.info;
     part("unknown", HTMLElement).hidden = unknown === 0;
-    write(part("unknown-count", HTMLElement), counted(unknown, "taxel without events", "taxels without events"));
+    write(part("unknown-count", HTMLElement), pictures ? counted(unknown, "missing value") : counted(unknown, "taxel without events", "taxels without events"));
     write(part("taxel-name", HTMLElement), this.named());
     const { value, rest } = this.info;
-    const above = value === null || rest === null ? "" : `, ${Math.max(0, value - rest)} above rest`;
+    const above = value === null || rest === null || pictures ? "" : `, ${Math.max(0, value - rest)} above rest`;
     const zeroed = this.zeroed.some(({ taxel: [x, y] }) => x === this.taxel?.[0] && y === this.taxel?.[1]) ? ", zeroed" : "";
-    write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? "no event yet" : `${value} ticks${above}${zeroed}`);
+    write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? (pictures ? "missing" : "no event yet") : `${rounded((value - zero) * step)} ${unit}${above}${zeroed}`);
   }
 
   /** @returns {string} row, column and traces of the taxel under the crosshair */

@@ -27,8 +27,11 @@ export const UNKNOWN_VALUE = 65535;
  *   last: { file: string, verdict: string } | null, error: string | null }} Recorder
  * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileInfo
  * @typedef {{ type: "recordings", folder: string, files: FileInfo[], readouts: string[] }} Recordings
+ * @typedef {{ count: number, unit: string, step: number, zero: number, picture_us: number | null,
+ *   sources: { name: string, left: number, rows: number, columns: number }[], trial: string | null, trials: string[], left_s: number | null }} Pictures
+ * @typedef {{ type: "loading", name: string, share: number }} Loading
  * @typedef {{ type: "opened", name: string, array: ArrayInfo, start_us: number | null, stop_us: number | null,
- *   touch_us: number | null, events: number, bytes: number,
+ *   touch_us: number | null, events: number, bytes: number, pictures: Pictures | null,
  *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null,
  *   frame_us: number | null, markers: { t_us: number, start: boolean }[],
  *   notes: { t_us: number | null, text: string }[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
@@ -51,7 +54,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "refused", id?: number, what: string | null, reason: string, field: string | null }} Refused
  * @typedef {{ type: "warning", text: string }} Warning
  * @typedef {Hello | RegistersMessage | Presets | Counters | Detection | Spikes | Recorder | Recordings | Opened | Overview | Transport | Labels |
- *   Health | Zeroed | Trained | DetectionsMessage | BoardLine | Cut | Places | Done | Refused | Warning} Message
+ *   Health | Zeroed | Trained | DetectionsMessage | BoardLine | Cut | Places | Loading | Done | Refused | Warning} Message
  */
 
 /**

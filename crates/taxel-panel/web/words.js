@@ -1,7 +1,14 @@
 // Numbers as people read them.
 
-/** @param {number | null} us @param {number} [places] @returns {string} seconds */
-export const seconds = (us, places = 3) => (us === null ? "–" : `${(us / 1e6).toFixed(places)} s`);
+/** How times are written: in seconds; of pictures without times, by their numbers, which are so many us apart. */
+export const numbering = { picture_us: /** @type {number | null} */ (null) };
+
+/** @param {number | null} us @param {number} [places] @returns {string} seconds, or the number of a picture */
+export const seconds = (us, places = 3) =>
+  us === null ? "–" : numbering.picture_us ? `picture ${whole(Math.floor(us / numbering.picture_us))}` : `${(us / 1e6).toFixed(places)} s`;
+
+/** @param {number} value @returns {string} in three digits, as many as a curve or a map shows */
+export const rounded = (value) => (Math.abs(value) >= 100 ? whole(value) : String(Number(value.toPrecision(3))));
 
 /** @param {number} value @returns {string} a whole number, in groups of three */
 export const whole = (value) => Math.round(value).toLocaleString("en");
@@ -16,6 +23,7 @@ export const counted = (count, one, many = `${one}s`) => `${whole(count)} ${coun
 
 /** @param {number} us @returns {string} a short time in the unit that suits */
 export function short(us) {
+  if (numbering.picture_us) return counted(us / numbering.picture_us, "picture");
   if (us < 1000) return `${us.toFixed(us < 10 ? 1 : 0)} µs`;
   if (us < 1e6) return `${(us / 1000).toFixed(us < 1e5 ? 1 : 0)} ms`;
   return `${(us / 1e6).toFixed(1)} s`;

@@ -3,23 +3,27 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use taxel_core::Array;
+use taxel_core::detect::Detection;
 use taxel_core::held::UNKNOWN;
 use taxel_core::wire::Command;
 use taxel_live::address::of_host;
+use taxel_live::recording::{Note, Remarks};
 use taxel_panel::assets::asset;
 use taxel_panel::{
-    Activity, BoardLines, Cut, LabelRow, Panel as Server, PanelOptions, PresetValue, Reply, RequestHandler,
-    UnhealthyTaxels, UserPreset, UserPresets,
+    Activity, BoardLines, Cut, LabelRow, Opening, Panel as Server, PanelOptions, PictureFile, PictureIndex,
+    PicturePlace, PicturesRead, PresetValue, ReadFile, Reply, RequestHandler, UnhealthyTaxels, UserPreset, UserPresets,
 };
 
-use crate::convert::{array, from_array};
+use crate::convert::{ArrayParts, array, from_array, slice, to_array};
 use crate::enter::enter;
-use crate::errors::core;
+use crate::errors::{ProblemError, core};
 use crate::held::by_taxel;
 use crate::live::Live;
+use crate::parameters::parsed;
 use crate::threaded::Threaded;
 
 /// Gives a file of the panel's page by its name below `web/`, as bytes.
@@ -85,9 +89,30 @@ impl RequestHandler for PythonHandler {
         Ok(UnhealthyTaxels { dead, stuck, noisy, untold })
     }
 
+    fn read(&self, path: &Path, trial: Option<&str>, opening: Opening) -> Reply<ReadFile> {
+        let whole = opening == Opening::Whole;
+        self.call(|handler| {
+            let (events, pictures): (Option<PathBuf>, Option<PicturesIn<'_>>) =
+                handler.call_method1("read", (path, trial, whole))?.extract()?;
+            match (events, pictures) {
+                (_, Some(pictures)) => {
+                    Ok(ReadFile::Pictures(PicturesRead(Box::new(to_index(handler.py(), pictures)?))))
+                }
+                (Some(path), None) => Ok(ReadFile::Events(path)),
+                (None, None) => Err(ProblemError::new_err("read: neither events nor pictures")),
+            }
+        })
+    }
+
+    fn health_of_pictures(&self, path: &Path, trial: Option<&str>) -> Reply<UnhealthyTaxels> {
+        let (dead, stuck, noisy, untold) =
+            self.call(|handler| handler.call_method1("health_of_pictures", (path, trial))?.extract())?;
+        Ok(UnhealthyTaxels { dead, stuck, noisy, untold })
+    }
+
     fn cut(&self, cut: &Cut<'_>) -> Reply<Vec<String>> {
-        let Cut { path, out, start_us, stop_us } = *cut;
-        self.call(|handler| handler.call_method1("cut", (path, out, start_us, stop_us))?.extract())
+        let Cut { path, trial, out, start_us, stop_us } = *cut;
+        self.call(|handler| handler.call_method1("cut", (path, trial, out, start_us, stop_us))?.extract())
     }
 
     fn train(&self, recording: &Path, out: &Path) -> Reply<String> {
@@ -107,13 +132,13 @@ impl RequestHandler for PythonHandler {
     }
 
     fn read_labels(&self, table: &Path, recording: &str) -> Reply<Vec<LabelRow>> {
-        let rows: Vec<(String, i64)> =
+        let rows: Vec<(String, i64, String)> =
             self.call(|handler| handler.call_method1("read_labels", (table, recording))?.extract())?;
-        Ok(rows.into_iter().map(|(label, t_us)| LabelRow { label, t_us }).collect())
+        Ok(rows.into_iter().map(|(label, t_us, source)| LabelRow { label, t_us, source }).collect())
     }
 
     fn write_labels(&self, table: &Path, labels: &[LabelRow]) -> Reply<()> {
-        let rows: Vec<(&str, i64)> = labels.iter().map(|row| (row.label.as_str(), row.t_us)).collect();
+        let rows: Vec<_> = labels.iter().map(|row| (row.label.as_str(), row.t_us, row.source.as_str())).collect();
         self.call(|handler| handler.call_method1("write_labels", (table, rows)).map(drop))
     }
 
@@ -148,6 +173,41 @@ impl RequestHandler for PythonHandler {
             handler.call_method1("write_presets", (all,)).map(drop)
         })
     }
+}
+
+/// A source of pictures: name, first column, rows, columns, times (us), values.
+type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>);
+
+/// Pictures as Python has read them: the array of all sources, the sources; unit, time from one picture to the next if they
+/// are numbered (us), notes (time, text) and detections (label, time, known) as JSON, the verdict, the trial and all
+/// trials of the file, how long the rest of the file takes (s).
+type PicturesIn<'py> =
+    (ArrayParts, Vec<SourceIn<'py>>, String, Option<i64>, String, String, Option<String>, Vec<String>, Option<f64>);
+
+fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> {
+    let (array, sources, unit, picture_us, remarks, verdict, trial, trials, left_s) = pictures;
+    let array = to_array(array)?;
+    let (notes, detections): (Vec<(Option<i64>, String)>, Vec<(String, i64, i64)>) = parsed("remarks", &remarks)?;
+    let remarks = Remarks {
+        notes: notes.into_iter().map(|(t_us, text)| Note { at_ns: 0, t_us, text }).collect(),
+        detections: detections
+            .into_iter()
+            .map(|(label, t, known)| (0, Detection { label, t, known, slope: f64::NAN, repaired: false }))
+            .collect(),
+        ..Remarks::default()
+    };
+    let file = PictureFile { unit, picture_us, remarks, verdict, trial, trials, left_s };
+    let mut placed = vec![];
+    for (name, left, rows, columns, t, values) in &sources {
+        let (t, values) = (slice("t", t)?, slice("values", values)?);
+        let inside = *left <= array.columns && *columns <= array.columns - left && *rows <= array.rows;
+        if !inside || values.len() != t.len() * usize::from(*rows) * usize::from(*columns) {
+            return Err(ProblemError::new_err(format!("source {name}: does not fit the array")));
+        }
+        let place = PicturePlace { name: name.clone(), left: *left, rows: *rows, columns: *columns };
+        placed.push((place, t.to_vec(), values));
+    }
+    enter(py, |_| Ok::<_, taxel_core::Error>(PictureIndex::new(array, file, placed)))
 }
 
 /// A value of a preset, as a table in TOML has it.

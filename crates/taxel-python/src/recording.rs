@@ -1,6 +1,7 @@
 //! Recordings: the live format's reader and writer, and the manual's raw files.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -11,7 +12,7 @@ use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, wire};
 use taxel_live::clock::BoardClock;
 use taxel_live::recording::{
-    BoardChange, Counts, Header, LsaWriter, Reader, Writer, WriterOptions, decode_lsa, numbered,
+    BoardChange, Counts, Encoding, Header, LsaWriter, Reader, Track, Writer, WriterOptions, decode_lsa, numbered,
 };
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
@@ -47,6 +48,9 @@ type SamplesOut<'py> = (
 type DatagramsOut<'py> =
     (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u8>>);
 
+/// Time us of each picture, all values, messages that are no picture.
+type PicturesOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f32>>, u64);
+
 /// A recording of the live format, opened.
 #[pyclass(frozen)]
 struct RecordingReader {
@@ -75,6 +79,12 @@ impl RecordingReader {
         let all = enter(py, |stop| self.reader.samples(stop))?;
         let (arrived, number) = (array(py, all.arrived_ns), array(py, all.number));
         Ok((arrived, number, array(py, all.t), array(py, all.values), all.bad, all.resets))
+    }
+
+    /// All pictures of a source: time us of each, all values, messages that are no picture of its array.
+    fn pictures<'py>(&self, py: Python<'py>) -> PyResult<PicturesOut<'py>> {
+        let all = enter(py, |stop| self.reader.pictures(stop))?;
+        Ok((array(py, all.t), array(py, all.values), all.bad))
     }
 
     /// The header, how the recording ended, and what was rebuilt: JSON.
@@ -122,13 +132,20 @@ impl RecordingReader {
     }
 }
 
-/// A recording of the live format, being written.
+/// A recording of the live format, being written: one of its sources.
 #[pyclass(frozen)]
-struct RecordingWriter(Threaded<Writer>);
+struct RecordingWriter {
+    writer: Arc<Threaded<Writer>>,
+    /// The source, if it is not the first.
+    source: Option<String>,
+}
 
 impl RecordingWriter {
-    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Writer) -> taxel_live::Result<T> + Send) -> PyResult<T> {
-        self.0.with(py, work)
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Track) -> taxel_live::Result<T> + Send) -> PyResult<T> {
+        self.writer.with(py, |writer| match &self.source {
+            None => work(writer),
+            Some(name) => work(&writer.track(name)?),
+        })
     }
 }
 
@@ -140,7 +157,37 @@ impl RecordingWriter {
         let header: Header = parsed("header", header)?;
         let options = WriterOptions { compression: compression.parse().map_err(core)?, overwrite };
         let writer = enter(py, |_| Writer::create(&path, &header, options))?;
-        Ok(Self(Threaded::new("recording", "the recording is finished: begin a new one", writer)))
+        let writer = Threaded::new("recording", "the recording is finished: begin a new one", writer);
+        Ok(Self { writer: Arc::new(writer), source: None })
+    }
+
+    /// The writer of another source of the same recording.
+    fn track(&self, name: &str) -> Self {
+        Self { writer: Arc::clone(&self.writer), source: Some(name.to_owned()) }
+    }
+
+    /// Writes pictures: number of the first, time in the file (ns) and board time (us) of each, all values.
+    fn pictures(
+        &self,
+        py: Python<'_>,
+        first: u64,
+        at_ns: PyReadonlyArray1<'_, i64>,
+        t_us: PyReadonlyArray1<'_, i64>,
+        values: PyReadonlyArray1<'_, f32>,
+        whole: bool,
+    ) -> PyResult<()> {
+        let (at_ns, t_us, values) = (slice("at_ns", &at_ns)?, slice("t_us", &t_us)?, slice("values", &values)?);
+        let encoding = if whole { Encoding::Whole } else { Encoding::Float };
+        self.with(py, |track| track.pictures(first, at_ns, t_us, values, encoding))
+    }
+
+    /// Ends a source that is not the first, with the counts of what was received and lost, given as JSON.
+    fn end(&self, py: Python<'_>, counts: &str) -> PyResult<()> {
+        let (name, counts): (_, Counts) = (self.source.clone().unwrap_or_default(), parsed("counts", counts)?);
+        self.with(py, |track| {
+            track.end(&name, counts);
+            Ok(())
+        })
     }
 
     /// Writes datagrams: arrival ns, number, where each begins in `payload` (and where the last ends), bytes.
@@ -260,10 +307,10 @@ impl RecordingWriter {
     /// Ends the recording; counts in and out as JSON.
     fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<String> {
         let counts: Counts = parsed("counts", counts)?;
-        self.0.check()?;
-        let counts = enter(py, |_| match self.0.take() {
+        self.writer.check()?;
+        let counts = enter(py, |_| match self.writer.take() {
             Some(writer) => writer.finish(counts),
-            None => Err(self.0.ended()),
+            None => Err(self.writer.ended()),
         })?;
         Ok(json!(counts).to_string())
     }
@@ -329,9 +376,17 @@ fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
     numbered(&path, index)
 }
 
+/// Whether all values are whole and from 0 to 65 535, so that 16 bits hold them.
+#[pyfunction]
+fn whole_pictures(py: Python<'_>, values: PyReadonlyArray1<'_, f32>) -> PyResult<bool> {
+    let values = slice("values", &values)?;
+    enter(py, |_| Ok::<_, taxel_core::Error>(Encoding::of(values) == Encoding::Whole))
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<RecordingReader>()?;
     module.add_class::<RecordingWriter>()?;
+    module.add_function(wrap_pyfunction!(whole_pictures, module)?)?;
     module.add_function(wrap_pyfunction!(recording_verdict, module)?)?;
     module.add_function(wrap_pyfunction!(recording_damage, module)?)?;
     module.add_function(wrap_pyfunction!(read_lsa, module)?)?;

@@ -61,6 +61,10 @@ class FileOptions:
         str | None,
         typer.Option(metavar="NAME", help="The release of ROS, as humble, whose messages a bag holds undefined."),
     ] = None
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(help="Pictures a second, for recordings without times, whose pictures are numbered."),
+    ] = None
 
     def open(self, path: Path) -> Recording | list[Recording]:
         """Open a file or a folder; of a folder, or of another maker's file, all trials in it.
@@ -111,19 +115,35 @@ class FileOptions:
         wire = geometry(self.array[0])
         return type(recording)(on_array(recording._contents, Array(*own.shape, wire.pitch_mm, own.exists, wire.name)))
 
+    def joined(self, path: Path) -> list[Recording]:
+        """Open a file or a folder, with the feet of each trial joined as its sources."""
+        from taxel.recording.opening import joined  # noqa: PLC0415  the command line starts quickly
+
+        opened = self.open(path)
+        return [self._timed(one) for one in joined(opened if isinstance(opened, list) else [opened])]
+
     def all(self, paths: Sequence[Path]) -> list[Recording]:
-        """Open recordings one after the other; of a folder, or of another maker's file, all trials in it."""
+        """Open recordings one after the other; of a folder, or of another maker's file, all trials in it.
+
+        Each sensor of a file with several is a recording of its own (`Recording.title`).
+        """
+        from taxel.recording.opening import sensors  # noqa: PLC0415  the command line starts quickly
+
         opened = (self.open(path) for path in paths)
-        return [one for each in opened for one in (each if isinstance(each, list) else [each])]
+        every = (one for each in opened for one in (each if isinstance(each, list) else [each]))
+        return [self._timed(one) for each in every for one in sensors(each)]
+
+    def _timed(self, recording: Recording) -> Recording:
+        return recording if self.rate_hz is None else recording.at_rate(self.rate_hz)
 
     def one(self, path: Path) -> Recording:
-        """Open a file that holds one recording.
+        """Open a file that holds one recording, with its feet joined.
 
         Raises
         ------
         ProblemError : it holds several
         """
-        every = self.all([path])
+        every = self.joined(path)
         if len(every) != 1:
             some = ", ".join(one.name for one in every[:3]) + ", ..." * (len(every) > 3)
             raise ProblemError(f"{path}: holds {len(every)} recordings ({some}); must be one")

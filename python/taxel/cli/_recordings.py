@@ -178,6 +178,7 @@ def references(source: str | None, option: str, recordings: Sequence[Recording])
         raise ProblemError(
             f"{option} {source}: names no recording, and there are {len(recordings)}; must have the column recording"
         )
+    _check_sources(table, option, recordings)
     unnamed = [str(recording.path) for recording in recordings if table.named(recording.path) is None]
     known = {table.named(recording.path) for recording in recordings}
     others = [name for name in table.recordings if name not in known]
@@ -185,6 +186,17 @@ def references(source: str | None, option: str, recordings: Sequence[Recording])
         names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
         raise ProblemError(f"{option} {source}: names no event in {', '.join(unnamed)}; {names}")
     return [_within(table, recording, option) for recording in recordings]
+
+
+def _check_sources(table: Labels, option: str, recordings: Sequence[Recording]) -> None:
+    """Refuse labels of a source that their recording does not have."""
+    for row in table.rows:
+        labels = {one.label for one in recordings if row.recording == table.named(one.path)}
+        if row.source and labels and row.source not in labels:
+            there = ", ".join(sorted(labels))
+            raise ProblemError(
+                f"{option} {table.path}: {row.text} at {row.t} us is of source {row.source}; there is {there}"
+            )
 
 
 def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
@@ -204,7 +216,7 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
     inside = {label: t[(t >= first) & (t <= last + 1_000_000)] for label, t in events.items()}
     total = sum(map(len, events.values()))
     outside = total - sum(map(len, inside.values()))
-    span = f"{recording.path} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
+    span = f"{recording.title} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
     if total and outside == total:
         raise ProblemError(f"{option} {table.path}: holds {counted(total, 'event')}, none within {span}")
     if recording.clock is None and any(row.at_ns for row in table.rows):

@@ -52,7 +52,7 @@ class Result:
             "held_out": not self.why,
             "window_ms": self.window_ms,
             "recordings": [
-                {"recording": str(one.path), "score": each.to_dict()}
+                {"recording": one.title, "score": each.to_dict()}
                 for one, each in zip(self.opened, self.scored.scores, strict=True)
             ],
             "score": self.scored.together.to_dict(),
@@ -62,7 +62,7 @@ class Result:
         if self.made.alignments:
             result["alignment"] = {label: one.to_dict() for label, one in self.made.alignments.items()}
             for one in result["alignment"].values():
-                one["unpaired"] = [{"recording": str(self.opened[k].path), "t_us": t} for k, t in one["unpaired"]]
+                one["unpaired"] = [{"recording": self.opened[k].title, "t_us": t} for k, t in one["unpaired"]]
         if report is not None:
             result["report"] = str(report / "report.html")
         if self.searched:
@@ -86,7 +86,7 @@ class Result:
             point = self.made.recipe.neurons[label]
             chosen = ", ".join(f"{key} {value}" for key, value in point.items() if key != "search")
             lines.append(f"{label}, chosen: {chosen}")
-        lines += [f"\n{one.path}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
+        lines += [f"\n{one.title}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
         if len(self.scored.scores) > 1:
             lines.append(f"\nall recordings:\n{self.scored.together!r}")
         lines.append(f"\nwritten to {out}")
@@ -134,7 +134,7 @@ class Result:
                 f"{label}: labels moved to what the sensor felt: median {one.median_ms:+.3g} ms, largest "
                 f"{one.largest_ms:+.3g} ms"
             )
-            places = [f"{self.opened[k].path} at {t / 1e6:.3f} s" for k, t in one.to_dict()["unpaired"]]
+            places = [f"{self.opened[k].title} at {t / 1e6:.3f} s" for k, t in one.to_dict()["unpaired"]]
             if places:
                 more = f" and {len(places) - _NAMED} more" if len(places) > _NAMED else ""
                 of = counted(len(places), "label")

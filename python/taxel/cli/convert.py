@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
 
+from taxel._core import ProblemError
 from taxel.cli._app import app, with_out
 from taxel.cli._opening import FileOptions, with_file_options
 from taxel.cli._recordings import of_source
+
+if TYPE_CHECKING:
+    from taxel.recording import Recording
 
 __all__ = ["convert"]
 
@@ -20,12 +25,18 @@ __all__ = ["convert"]
 @with_out("target")
 @with_file_options
 def convert(
-    source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
-    target: Annotated[Path, typer.Argument(help="The new file; its extension gives the format.")],
+    source: Annotated[Path, typer.Argument(help="A recording, a file of another maker, or a folder.")],
+    target: Annotated[
+        Path,
+        typer.Argument(
+            help="The new file; its extension gives the format. Without one, or for several recordings: a folder, to "
+            "which a .mcap of each is written."
+        ),
+    ],
     files: FileOptions,
     frames: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Write frames at this rate (.npz, .csv, .h5) instead of events."),
+        typer.Option(metavar="HZ", help="Write frames at this rate instead of events (not .lsa)."),
     ] = None,
     part: Annotated[
         str | None, typer.Option("--source", metavar="NAME", help="The source to convert, of a recording with several.")
@@ -34,21 +45,50 @@ def convert(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target if it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Convert a recording to another format, and report what the target cannot hold.
+    """Convert recordings to another format, and report what the target cannot hold.
+
+    Both feet of a file become sources of one recording, `left` and `right`.
 
     Example: taxel convert walk.mcap walk.csv
+    Example: taxel convert trials/ recordings/
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
     from taxel._base.files import try_whole  # noqa: PLC0415
 
-    try_whole(target, overwrite=overwrite)
+    if target.suffix:
+        try_whole(target, overwrite=overwrite)
     # The status line is shown on a terminal only, and removed at the end.
-    with Console(stderr=True).status(f"{source} to {target}"):
-        recording = of_source(files.one(source), part)
-        lost = taxel.convert(recording, target, frames_hz=frames, compression=compression, overwrite=overwrite)
+    with Console(stderr=True).status(f"{source} to {target}") as status:
+        opened = [of_source(one, part) for one in files.joined(source)]
+        if target.suffix and len(opened) > 1:
+            raise ProblemError(
+                f"{source}: holds {len(opened)} recordings; {target} must be a folder, without an ending"
+            )
+        places = [target] if target.suffix else _places(opened, target)
+        for place in places if not target.suffix else ():
+            try_whole(place, overwrite=overwrite)
+        written = []
+        for k, (recording, place) in enumerate(zip(opened, places, strict=True)):
+            status.update(f"{recording.name} to {place} ({k + 1} of {len(places)})")
+            how: dict[str, Any] = {"frames_hz": frames, "compression": compression, "overwrite": overwrite}
+            written.append(
+                {"source": recording.title, "target": str(place), "lost": taxel.convert(recording, place, **how)}
+            )
     if as_json:
-        typer.echo(json.dumps({"source": str(source), "target": str(target), "lost": lost}))
+        typer.echo(json.dumps({**written[0], "source": str(source)} if target.suffix else {"written": written}))
         return
-    typer.echo(f"written to {target}")
-    for what in lost:
-        typer.echo(f"  lost: {what}")
+    for one in written:
+        typer.echo(f"written to {one['target']}")
+        for what in one["lost"]:
+            typer.echo(f"  lost: {what}")
+
+
+def _places(opened: list[Recording], folder: Path) -> list[Path]:
+    """Return the new files of recordings in a folder, which is created."""
+    folder.mkdir(parents=True, exist_ok=True)
+    stems = [Path(one.name).stem if one.path.name == one.name else one.name for one in opened]
+    places = [folder / f"{re.sub(r'[^A-Za-z0-9._-]+', '_', stem)}.mcap" for stem in stems]
+    twice = next((place for place in places if places.count(place) > 1), None)
+    if twice is not None:
+        raise ProblemError(f"{twice}: two recordings have this name; convert them one by one")
+    return places

@@ -77,13 +77,13 @@ def detect(
         if truth is not None and not any(events):
             raise ProblemError(f"--truth {truth}: names no event in {recording}")
         for one, labelled in zip(opened, events, strict=True):
-            update(f"reading {one.path}")
+            update(f"reading {one.title}")
             rest = tare_of(tare, one)
             detections, outside = run_counting(loaded, one, frame_us=frame_us, tare=rest)
             # Labels that the readout does not have do not count as missed.
             true = None if labelled is None else {label: labelled.get(label, _NONE) for label in loaded.labels}
             scored = None if true is None else score(detections, true, window_ms)
-            outcomes.append(Outcome(str(one.path), Example(one, true or {}, rest), detections, scored, outside))
+            outcomes.append(Outcome(one.title, Example(one, true or {}, rest), detections, scored, outside))
     truths = [one.example.labels for one in outcomes if one.score is not None]
     together = score_together([one.found for one in outcomes], truths, window_ms) if truths else None
     if csv is not None:

@@ -195,8 +195,7 @@ def _contents(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for name in ("side", "heel"):
         if facts[name]:
             yield name, facts[name]
-    if facts["from_us"] is not None:
-        yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
+    yield from _time(facts)
     if "events" in facts:
         words = f"{facts['intensities']} with intensity, {counted(len(facts['markers']), 'marker')}"
         yield "events", f"{facts['events']}, {words}"
@@ -226,6 +225,13 @@ def _taxels(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield f"{name} taxels", f"{len(places)}" + f", at (row, column) {shown}" * bool(places)
     if facts["taxels_untold"]:
         yield "other taxels", f"{facts['taxels_untold']} not touched enough to say whether they work"
+
+
+def _time(facts: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    if not facts["timed"]:
+        yield "time", "none: pictures are numbered; --rate-hz where a command needs times"
+    elif facts["from_us"] is not None:
+        yield "board time", f"{facts['from_us']} to {facts['to_us']} us ({facts['seconds']:.3f} s)"
 
 
 def _pressure(pressed: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -116,7 +116,7 @@ def train(
         update("reading")
         labelled = references(labels, "--labels", opened)
         if not any(labelled):
-            raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
+            raise ProblemError(f"--labels {labels}: names no event in {', '.join(one.title for one in opened)}")
         names = sorted({label for events in labelled for label in events})
         recipe, plan = _planned(recipe, changes, _source(opened[0]), names)
         assert plan is not None
@@ -173,7 +173,10 @@ def _examples(
         rest: Callable[..., Tare | None] = lambda _, one: tare_of(tare, one)  # noqa: E731
     else:
         rest = tare_before if rests else tare_if_any
-    return [Example(one, events, rest(events, one)) for one, events in zip(opened, labelled, strict=True)]
+    return [
+        Example(one, events, rest(events, one), one.title.removesuffix(one.label))
+        for one, events in zip(opened, labelled, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -237,11 +240,11 @@ class _Training:
 
         outcomes = []
         for one, example in zip(self.opened, self.examples, strict=True):
-            self.update(f"scoring on {one.path}")
+            self.update(f"scoring on {one.title}")
             truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
             detections, outside = run_counting(readout, one, tare=example.tare)
             own = score(detections, truth, self.window_ms)
-            outcomes.append(Outcome(str(one.path), Example(one, truth, example.tare), detections, own, outside))
+            outcomes.append(Outcome(one.title, Example(one, truth, example.tare), detections, own, outside))
         return outcomes
 
 

@@ -26,7 +26,10 @@ _CHECK_EVERY = 0.1
 @app.command()
 def view(
     recording: Annotated[
-        Path, typer.Argument(help="A recording: .mcap or .lsa. The page can open others in its folder.")
+        Path,
+        typer.Argument(
+            help="A recording, a file of another maker, or a folder. The page can open others in its folder."
+        ),
     ],
     panel_host: PanelHostOption = "127.0.0.1",
     panel_port: PanelPortOption = 0,

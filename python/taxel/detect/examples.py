@@ -36,6 +36,8 @@ class Example(NamedTuple):
         The times of the labelled events, by label, by the clock of the source (spike trains count it in ms).
     tare : Tare, optional
         The rest of the taxels, where the encoder needs it.
+    group : str
+        Examples of one group, as the two feet of a walk, share a fold; "": the example is alone.
 
     Raises
     ------
@@ -51,6 +53,7 @@ class Example(NamedTuple):
     source: Events | Frames | Recorded | SpikeTrains
     labels: Mapping[str, Any]
     tare: Tare | None = None
+    group: str = ""
 
 
 class Outcome(NamedTuple):
@@ -96,7 +99,7 @@ def checked(examples: Sequence[Example]) -> list[Example]:
         raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        whole = isinstance(example, tuple) and len(example) in (2, 3)
+        whole = isinstance(example, tuple) and len(example) in (2, 3, 4)
         source = recorded(example[0]) if whole else None
         if not isinstance(source, Events | Frames | SpikeTrains):
             raise ProblemError(
@@ -107,8 +110,9 @@ def checked(examples: Sequence[Example]) -> list[Example]:
         if not isinstance(labels, Mapping):
             raise ProblemError(f"example {k}: labels is {shown(labels)}: must be times (us) by label")
         times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
-        tare = rest[0] if rest else None
-        sound.append(Example(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
+        tare, group = (*rest, None, "")[:2] if len(rest) < 2 else rest
+        tare = None if tare is None else instance(f"example {k}: tare", tare, Tare)
+        sound.append(Example(source, times, tare, text(f"example {k}: group", group)))
     return sound
 
 

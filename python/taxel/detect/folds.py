@@ -337,14 +337,14 @@ def _quiet() -> Any:
 
 
 def _detected(readout: Readout, examples: Sequence[Example], part: Part, clocks: Sequence[Clock]) -> Detections:
-    (source, _, tare), (frame_us, version) = examples[part.example], clocks[part.example]
+    (source, _, tare, _), (frame_us, version) = examples[part.example], clocks[part.example]
     detections = run(readout, source, tare=tare, frame_us=frame_us, wire_version=version)  # type: ignore[arg-type]
     return detections[(detections.t >= part.start) & (detections.t < part.stop)]
 
 
 def _of(part: Part, patterns: Sequence[Example]) -> Example:
     """Return the part of an example's spike trains and labels."""
-    trains, labels, _ = pattern = patterns[part.example]
+    trains, labels, *_ = pattern = patterns[part.example]
     assert isinstance(trains, SpikeTrains)
     start, stop = max(to_ms(part.start), trains.start), min(to_ms(part.stop), trains.stop)
     inside = {label: _inside(times, part) for label, times in labels.items()}
@@ -391,15 +391,16 @@ def count_of_folds(examples: Sequence[Example]) -> tuple[int, str]:
         for label, times in example.labels.items():
             counts[label] += len(times)
     rarest = min(counts, key=lambda label: counts[label])
-    most = min(_MOST, counts[rarest] // 2, *([len(examples)] if len(examples) > 1 else []))
+    parts = [Part(n) for n in range(len(examples))]
+    recordings = len(_grouped(examples, parts))
+    most = min(_MOST, counts[rarest] // 2, *([recordings] if recordings > 1 else []))
     if most < 2:
         return 0, f"of {rarest} there {'is' if counts[rarest] == 1 else 'are'} {counts[rarest]}, and two folds need 4"
-    parts = [Part(n) for n in range(len(examples))]
     for count in range(most, 1, -1):
         lacking = [_lacks(examples, fold.train, counts) for fold in _split(examples, parts, count)]
         if not any(lacking):
             return count, ""
-    where = "recording" if len(examples) > 1 else "stretch of the recording"
+    where = "recording" if recordings > 1 else "stretch of the recording"
     return 0, f"every {next(filter(None, lacking))} is in one {where}"
 
 
@@ -421,10 +422,20 @@ def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequen
         _sound(k, len(examples))
         return k, f"{len(k)} given folds"
     count = whole("folds", k, 2, 2**31)
-    if len(examples) > 1 and count > len(examples):
-        raise ProblemError(f"folds is {count}: must be 2 to {len(examples)}, the number of recordings")
-    how = f"{count} blocks of time" if len(examples) == 1 else f"whole recordings, {count} folds"
-    return _split(examples, [Part(n) for n in range(len(examples))], count), how
+    parts = [Part(n) for n in range(len(examples))]
+    recordings = len(_grouped(examples, parts))
+    if recordings > 1 and count > recordings:
+        raise ProblemError(f"folds is {count}: must be 2 to {recordings}, the number of recordings")
+    how = f"{count} blocks of time" if recordings == 1 else f"whole recordings, {count} folds"
+    return _split(examples, parts, count), how
+
+
+def _grouped(examples: Sequence[Example], parts: Sequence[Part]) -> list[list[Part]]:
+    """Return the parts of each recording: those of examples of one group together."""
+    groups: dict[object, list[Part]] = {}
+    for n, part in enumerate(parts):
+        groups.setdefault(examples[part.example].group or n, []).append(part)
+    return list(groups.values())
 
 
 def _sound(folds: Sequence[Fold], examples: int) -> None:
@@ -455,15 +466,28 @@ def _sound(folds: Sequence[Fold], examples: int) -> None:
 def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> list[Fold]:
     """Return folds that test each part once.
 
-    Of several parts whole ones are tested; of one alone stretches between its events, with about equally many each.
+    Of several recordings whole ones are tested; of one alone stretches between its events, with about equally many
+    each.
     """
-    if len(parts) == 1:
-        (part,) = parts
-        events = _only_inside(examples[part.example], part)
-        edges = [part.start, *_between_events(events, count), part.stop]
-        parts = [Part(part.example, *both) for both in pairwise(edges)]
-    count = min(count, len(parts))
-    return [Fold([one for k, one in enumerate(parts) if k % count != n], parts[n::count]) for n in range(count)]
+    groups = _grouped(examples, parts)
+    if len(groups) == 1:
+        (group,) = groups
+        events = np.sort(np.concatenate([_only_inside(examples[part.example], part) for part in group]))
+        inner = list(_between_events(events, count))
+        cuts = [[part.start, *(t for t in inner if part.start < t < part.stop), part.stop] for part in group]
+        stretches = [list(pairwise(edges)) for edges in cuts]
+        groups = [
+            [Part(part.example, *own[n]) for part, own in zip(group, stretches, strict=True) if n < len(own)]
+            for n in range(max(map(len, stretches)))
+        ]
+    count = min(count, len(groups))
+    return [
+        Fold(
+            [one for k, group in enumerate(groups) if k % count != n for one in group],
+            [one for group in groups[n::count] for one in group],
+        )
+        for n in range(count)
+    ]
 
 
 def _only_inside(example: Example, part: Part) -> NDArray[np.int64]:

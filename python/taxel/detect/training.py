@@ -227,7 +227,7 @@ class Fitting:
 
 def _times(k: int, example: Example, label: str) -> NDArray[np.int64]:
     """Return the events of a label in the encoded example k, us, ascending; refuse one outside the example."""
-    source, labels, _ = example
+    source, labels, *_ = example
     assert isinstance(source, SpikeTrains)
     events = np.sort(labels.get(label, np.empty(0, np.int64)))
     times = to_ms(events)

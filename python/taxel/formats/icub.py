@@ -89,4 +89,5 @@ def trials(path: str | Path) -> Iterator[Trial]:
                 "",
                 series=dict(zip(_JOINTS, joints.T, strict=True)),
                 about={"object": name},
+                timed=False,
             )

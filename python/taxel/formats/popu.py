@@ -75,4 +75,5 @@ def trials(path: str | Path) -> Iterator[Trial]:
                 {},
                 "",
                 about={"posture": match[1], "pose": f"{match[1]}{match[2]}", "variant": match[3] or ""},
+                timed=False,
             )

@@ -47,6 +47,8 @@ class Trial:
         Further columns of the file, such as the total force computed by the manufacturer.
     about : mapping
         Other information: condition, speed, age ...
+    timed : bool
+        Whether the recording has times; else its pictures are numbered, one a us.
 
     Raises
     ------
@@ -70,6 +72,7 @@ class Trial:
     scored: tuple[int, int] | None = None
     series: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     about: Mapping[str, str | float] = field(default_factory=dict)
+    timed: bool = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.recorded, Frames | Events):

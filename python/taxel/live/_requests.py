@@ -25,11 +25,13 @@ from taxel.array import Array
 from taxel.detect import load, run
 from taxel.device import Cable
 from taxel.labels import Labels, write_labels
+from taxel.live._shown_files import ReadPictures, ShownFiles
 from taxel.recorded import recorded
-from taxel.recording import Recording, open_recording
+from taxel.recording import Recording
 from taxel.recording.convert import convert
 from taxel.recording.cut import cut
 from taxel.recording.health import TaxelStatistics, by_taxel, judged
+from taxel.recording.opening import sensors
 from taxel.tare import Tare
 from taxel.wire import Command
 
@@ -119,10 +121,15 @@ class RequestHandler:
         self._training: subprocess.Popen[str] | None = None
         self._training_lock = threading.Lock()
         self._cable_lock, self._file_lock = threading.Lock(), threading.Lock()
+        self._files = ShownFiles()
 
     def close(self) -> None:
-        """Close the serial line, and end a training that runs."""
+        """Close the serial line, end a training that runs, and remove temporary files."""
         self.end_training()
+        self._files.close()
+        self._disconnect()
+
+    def _disconnect(self) -> None:
         with self._cable_lock:
             if self._cable is not None:
                 self._cable.close()
@@ -150,10 +157,7 @@ class RequestHandler:
 
     def connect(self, place: str | None) -> None:
         """Connect the serial line to another place, or disconnect it."""
-        with self._cable_lock:
-            if self._cable is not None:
-                self._cable.close()
-                self._cable = None
+        self._disconnect()
         if place is not None:
             with _reasons():
                 cable = Cable(place)
@@ -203,10 +207,37 @@ class RequestHandler:
         taxels = result.named()
         return taxels["dead"], taxels["stuck"], taxels["noisy"], int(np.count_nonzero(result.untold))
 
-    def cut(self, path: Path, out: Path, start_us: int, stop_us: int) -> list[str]:
+    def read(self, path: Path, trial: str | None, whole: bool) -> tuple[Path | None, ReadPictures | None]:
+        """Read a recording that is no file of a board's events.
+
+        Parameters
+        ----------
+        path : path
+        trial : str or None
+            Of a file with several; default: the first.
+        whole : bool
+            Whether all of a large text table is read, not only its beginning.
+
+        Returns
+        -------
+        path or None
+            Of events, a .mcap that holds them, until `close`.
+        tuple or None
+            Pictures, as the compiled part reads them.
+        """
+        with _reasons():
+            return self._files.read(path, trial, whole=whole)
+
+    def health_of_pictures(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
+        """Return the taxels of a recording of pictures that are dead, stuck, noisy, and how many cannot be judged."""
+        with _reasons():
+            return self._files.health(path, trial)
+
+    def cut(self, path: Path, trial: str | None, out: Path, start_us: int, stop_us: int) -> list[str]:
         """Write a stretch of a recording to a new file; return what that file cannot hold."""
         with _reasons():
-            (part,) = cut(open_recording(path), start_us=start_us, stop_us=stop_us)
+            recording, _ = self._files.opened(path, trial)
+            (part,) = cut(recording, start_us=start_us, stop_us=stop_us)
             return list(convert(part, out))
 
     def train(self, recording: Path, out: Path) -> str:
@@ -240,25 +271,28 @@ class RequestHandler:
     def detect(self, recording: Path, readout: Path) -> list[tuple[str, int, int]]:
         """Return the detections of a readout in a recording: label, time and when it was known, us."""
         with _reasons():
-            loaded, opened = load(readout), open_recording(recording)
-            registers = opened.registers
-            frame_us = None if registers is None else registers.frame_us
-            found = run(loaded, opened, frame_us=frame_us, tare=_rest(opened))
-        return [(one.label, one.t, one.known) for one in found]
+            loaded = load(readout)
+            opened, _ = self._files.opened(recording, None)
+            found = []
+            for one in sensors(opened):
+                registers = one.registers
+                frame_us = None if registers is None else registers.frame_us
+                found += run(loaded, one, frame_us=frame_us, tare=_rest(one))
+        return sorted(((one.label, one.t, one.known) for one in found), key=lambda one: one[2])
 
     def read_out(self, readout: Path) -> None:
         """Read the board out with another readout."""
         with _reasons():
             self._read_out(readout)
 
-    def read_labels(self, table: Path, recording: str) -> list[tuple[str, int]]:
-        """Return the labels of a recording, each with its time (us), from a table."""
+    def read_labels(self, table: Path, recording: str) -> list[tuple[str, int, str]]:
+        """Return the labels of a recording, each with its time (us) and its source, from a table."""
         with _reasons():
             labels = Labels(table)
         name = labels.named(recording)
-        return [(row.text, row.t or 0) for row in labels.rows if row.recording == name]
+        return [(row.text, row.t or 0, row.source) for row in labels.rows if row.recording == name]
 
-    def write_labels(self, table: Path, rows: Sequence[tuple[str, int]]) -> None:
+    def write_labels(self, table: Path, rows: Sequence[tuple[str, int, str]]) -> None:
         """Write a table of labels."""
         with _reasons(), self._file_lock:
             write_labels(table, rows)

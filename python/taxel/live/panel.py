@@ -16,6 +16,7 @@ from taxel.device import Cable
 from taxel.frames import Frames
 from taxel.live._requests import RequestHandler
 from taxel.live.live import Live
+from taxel.recording.opening import check_recording, recordings_in
 from taxel.tare import Tare
 
 __all__ = ["Panel"]
@@ -30,7 +31,8 @@ class Panel:
     Parameters
     ----------
     shows : Live or path
-        A live board, or a recording (`.mcap`, `.lsa`) to show first; others of its folder can be opened too.
+        A live board; or a recording to show first, any file or folder that `taxel.open` reads: of a folder its first
+        recording. Others of the folder can be opened too.
     control : str, optional
         The board's serial line ("/dev/ttyUSB0", host:port), with which the page reads and sets registers.
     folder : path, optional
@@ -72,14 +74,7 @@ class Panel:
                 raise ProblemError("control: a recording has no board; give a taxel.live.Live")
             if folder is not None:
                 raise ProblemError("folder: is the recording's own")
-            if not place.is_file():
-                raise FileNotFoundError(2, "no such recording", str(place))
-            if place.suffix not in (".mcap", ".lsa"):
-                raise ProblemError(f"{place}: the panel shows .mcap and .lsa; taxel convert makes a .mcap")
-            if place.suffix == ".mcap":
-                # The server indexes it when a client opens it; a file that is no recording is refused now.
-                _core.RecordingReader(place)
-            folder, opened = place.resolve().parent, place.resolve().name
+            folder, opened = _shown(place)
         cable = None if control is None else Cable(text("control", control))
         self._requests = RequestHandler(self.listen, self.delta_intensity, self.read_out, cable)
         readout = None if self._live is None else self._live._labels
@@ -247,6 +242,22 @@ class Panel:
     def __repr__(self) -> str:
         # Without the token, because printed text may be stored.
         return f"Panel({'ended' if self._stopped else self._url.partition('#')[0]})"
+
+
+def _shown(place: Path) -> tuple[Path, str]:
+    """Return the folder of a recording and its name there; of a folder its first recording.
+
+    The server indexes it when a client opens it; what is no recording is refused now.
+    """
+    if place.is_dir():
+        files = recordings_in(place)
+        if not files:
+            raise ProblemError(f"{place}: holds no recording; name a file, or one of its folders")
+        place = files[0]
+    if not place.is_file():
+        raise FileNotFoundError(2, "no such recording", str(place))
+    check_recording(place)
+    return place.resolve().parent, place.resolve().name
 
 
 def _held(live: Live) -> Tare:

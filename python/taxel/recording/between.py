@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._base.messages import counted
 from taxel._core import ProblemError
-from taxel.recording.contents import UNKNOWN, Contents, once
+from taxel.recording.contents import UNKNOWN, Contents, once, together
 from taxel.recording.fates import after
 
 __all__ = ["Apart", "between"]
@@ -67,7 +67,7 @@ class Apart(Mapping[str, Contents]):
 def _sources(of: Contents, start: float, stop: float) -> Mapping[str, Contents]:
     """Return the same part of all sources of a file if they are on one clock; else refuse access to them."""
     sources = of.sources
-    if len(sources) > 1 and of.clock_of is None:
+    if len(sources) > 1 and of.clock_of is None and not together(sources):
         return Apart(of.path, sources)
     parts: dict[str, Contents] = {}
     for name, one in sources.items():

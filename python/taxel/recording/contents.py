@@ -22,7 +22,7 @@ from taxel.labels import Note
 from taxel.recording.notes import BoardChange, Datagrams, Samples, Zeroing
 from taxel.wire import Registers
 
-__all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "once", "several"]
+__all__ = ["FIELDS", "UNKNOWN", "Contents", "Once", "alone", "anything", "once", "several", "together"]
 
 T = TypeVar("T")
 
@@ -140,6 +140,8 @@ class Contents:
         The lines of a stream of numbers, as received.
     columns : tuple of str
         The names of the columns of a stream of numbers; None for a sensor.
+    untimed : bool
+        Whether the pictures have no times: they are numbered, one a us.
     truncated : bool
     rebuilt : mapping
         Counts of damage that the reader skipped or repaired.
@@ -180,6 +182,7 @@ class Contents:
     unmarked: tuple[int, ...] = ()
     samples: Samples | None = None
     columns: tuple[str, ...] | None = None
+    untimed: bool = False
     truncated: bool = False
     rebuilt: Mapping[str, int] = field(default_factory=dict)
     sources: Mapping[str, Contents] = field(default_factory=dict)
@@ -230,8 +233,9 @@ FIELDS = tuple(one.name for one in fields(Contents))
 
 
 def several(sources: Mapping[str, Contents]) -> Contents:
-    """Return the contents of a file of several boards; fields of a single board raise an error."""
+    """Return the contents of a file of several sensors; fields of a single one raise an error."""
     first = next(iter(sources.values()))
+    pictures = together(sources)
     names = ", ".join(sources)
 
     def refuse() -> Any:
@@ -242,12 +246,15 @@ def several(sources: Mapping[str, Contents]) -> Contents:
 
     of_one_board = [
         *("events", "held", "registers", "register_changes", "board_changes", "zeroings", "clock", "calibration"),
-        *("datagrams", "payload", "samples", "version_2"),
+        *("datagrams", "payload", "samples", "version_2", *(["frames"] if pictures else [])),
     ]
     return Contents(
         **{name: once(refuse) for name in of_one_board},
-        **{name: getattr(first, name) for name in ("path", "name", "kind", "array", "source")},
+        **{name: getattr(first, name) for name in ("path", "kind", "array", "source")},
+        # A source is named after its file and itself.
+        name=first.name.removesuffix(f" {first.label}"),
         label="",
+        untimed=first.untimed,
         notes=once(lambda: first.notes),
         detections=once(lambda: first.detections),
         counts=once(lambda: {name: one.counts for name, one in sources.items()}),
@@ -259,9 +266,14 @@ def several(sources: Mapping[str, Contents]) -> Contents:
     )
 
 
+def together(sources: Mapping[str, Contents]) -> bool:
+    """Return whether sources share one clock: pictures without arrival times, as those of two feet."""
+    return all(not one.has_events and one.samples is None and not one.holds("clock") for one in sources.values())
+
+
 def alone(sources: Mapping[str, Contents]) -> Contents:
-    """Return the contents of a file: those of its only source or its only board; else those of `several`."""
-    boards = [one for one in sources.values() if one.has_events]
+    """Return the contents of a file: those of its only source or its only sensor; else those of `several`."""
+    boards = [one for one in sources.values() if vars(one)["columns"] is None]
     if len(sources) == 1:
         return next(iter(sources.values()))
     return boards[0] if len(boards) == 1 else several(sources)

@@ -49,7 +49,7 @@ def convert(
     source : Recording, Events, Frames or path
     target : path ending in .mcap, .lsa, .npz, .csv or .h5
     frames_hz : float, Hz, optional
-        Write pictures at this rate (.npz, .csv, .h5) instead of events.
+        Write pictures at this rate (.mcap, .npz, .csv, .h5) instead of events.
     compression : {"none", "lz4", "zstd"}
         Of a .mcap.
     overwrite : bool
@@ -63,7 +63,7 @@ def convert(
 
     Raises
     ------
-    ProblemError : another ending, or something that the target cannot hold at all (pictures in a .mcap)
+    ProblemError : another ending, or something that the target cannot hold at all (pictures in a .lsa)
     FormatError : a source that is not a recording
     OSError : a target that exists, a folder that does not, a full disk ...
 
@@ -108,7 +108,10 @@ def convert(
                 write_h5(part, written)
         case _:
             with whole_file(place, overwrite=overwrite) as part:
-                write_mcap(part, written, compression, _counts(whole, written))
+                sources = {written.label: (whole, written)}
+                if written.is_several:
+                    sources = {name: (whole.sources[name], one) for name, one in written.sources.items()}
+                write_mcap(part, written, compression, {name: _counts(*both) for name, both in sources.items()})
                 lost += _read_otherwise(part, whole)
     return lost
 
@@ -128,6 +131,11 @@ def _counts(of: Contents, written: Contents) -> dict[str, Any]:
     """Return the counts of a recording under the names of the live format."""
     if of.samples is not None:
         return {"received": len(of.samples), "converted": str(written.verdict).partition(": ")[2]}
+    if not written.has_events:
+        pictures = len(written.table)
+        if of.kind == "events":
+            return {"received": pictures, "missing": 0}
+        return {"received": pictures, "converted": str(written.verdict).partition(": ")[2]}
     if of.kind == "events":
         # The datagrams are made of the events, so none is missing.
         return {"received": len(written.datagrams or ()), "missing": 0}
@@ -140,9 +148,10 @@ def _counts(of: Contents, written: Contents) -> dict[str, Any]:
 
 def _read_otherwise(part: Path, of: Contents) -> list[str]:
     """Return a line if copied datagrams decode to other events than the recording's."""
-    events = of.events
-    if of.samples is not None or events is None or is_made(of):
+    if not of.has_events or is_made(of):
         return []
+    events = of.events
+    assert events is not None  # it has events
     again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
         return [f"the pairing of intensities ({counted(len(again), 'event')} when paired directly)"]

@@ -30,8 +30,8 @@ kind                 =      =      ~      =         =          =         =      
 array                =      ~      ~      =         =          =         =       ~      =     ~    =    ~   =
 label                =      =      ~      =         =          =         =       ~      ~     ~    ~    ~   ~
 source               =      =      ~      =         =          =         =       ~      ~     -    ~    -   ~
-side                 =      =      ~      =         =          =         =       ~      -     -    =    -   =
-heel                 =      =      ~      =         =          =         =       ~      -     -    =    -   =
+side                 =      =      ~      =         =          =         =       ~      =     -    =    -   =
+heel                 =      =      ~      =         =          =         =       ~      =     -    =    -   =
 events               ~      ~      ~      ~         =          ~         ~       ~      ~     ~    =    ~   =
 frames               ~      ~      ~      ~         =          ~         ~       ~      ~     ~    =    ~   =
 stretch              ~      =      -      =         =          =         =       ~      -     -    -    -   -
@@ -55,6 +55,7 @@ origin_us            =      -      -      =         =          =         =      
 unmarked             =      -      -      =         =          =         =       ~      ~     -    -    -   -
 samples              ~      -      -      ~         =          -         =       ~      =     -    -    -   -
 columns              =      ~      ~      =         =          =         =       ~      =     -    =    -   =
+untimed              =      =      ~      =         =          =         =       ~      =     -    =    -   =
 truncated            =      =      ~      =         =          =         =       ~      ~     -    =    -   =
 rebuilt              =      =      ~      =         =          =         =       ~      ~     -    =    -   =
 sources              ~      -      -      ~         ~          =         =       =      -     -    -    -   -
@@ -126,6 +127,7 @@ LINES: dict[str, Callable[[Contents, str], str | list[str]] | None] = {
     "unmarked": None,
     "samples": lambda _, __: "the lines of the stream as they came",
     "columns": lambda of, _: f"the names of the columns ({', '.join(of.columns or ())})",
+    "untimed": lambda _, __: "that its pictures have no times",
     "truncated": lambda _, __: "that its end is missing",
     "rebuilt": lambda _, __: "what reading had to put up with",
     "sources": _sources,

@@ -60,7 +60,8 @@ def laid_out(of: Contents, layout: Layout) -> Contents:
     if not same.has_events and same.frames is not None:
         # Read at once, so that a layout that contradicts the file is refused where the file is opened.
         same = same.but(frames=_read(same.frames, layout, of.name))
-    return same.but(side=of.side or layout.side, heel=layout.heel or of.heel)
+    untimed = same.untimed and layout.rate_hz is None
+    return same.but(side=of.side or layout.side, heel=layout.heel or of.heel, untimed=untimed)
 
 
 def _array(of: Contents, layout: Layout) -> Array:

@@ -103,6 +103,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
     fields["columns"] = None if beside else common("columns", None, "the names of the columns (the recordings differ)")
     if beside and any(part.columns is not None for part in parts):
         fields["columns"] = tuple(name for part in parts for name in part.columns or ())
+    fields["untimed"] = all(part.untimed for part in parts)
     fields["clock_of"] = common("clock_of", None, "by whose clock times are (the recordings differ)")
     clocks = [part.clock for part in parts]
     moved = len(set(shifts)) > 1

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from taxel import formats
+from taxel import _core, formats
 from taxel._base import arguments
 from taxel._base.arguments import flag, instance, text
 from taxel._core import FormatError, ProblemError
@@ -18,7 +18,7 @@ from taxel.formats import Trial
 from taxel.formats.layout import Layout
 from taxel.formats.ros import is_bag
 from taxel.labels import Labels, Note
-from taxel.recording.contents import Contents
+from taxel.recording.contents import Contents, several
 from taxel.recording.csv import read_csv
 from taxel.recording.h5 import is_ours, read_h5
 from taxel.recording.kinds import ENDINGS, kind_of
@@ -31,7 +31,10 @@ from taxel.recording.read_ros import Topics, read_ros
 from taxel.recording.recording import Recording
 from taxel.recording.sidecars import with_sidecars
 
-__all__ = ["open_any", "open_recording"]
+__all__ = ["check_recording", "joined", "open_any", "open_joined", "open_recording", "recordings_in", "sensors"]
+
+#: The sources of a trial of both feet.
+FEET = ("left", "right")
 
 #: The file name of a folder's reference events.
 LABELS = "labels.csv"
@@ -233,7 +236,7 @@ def _labelled(table: Path, pairs: list[tuple[Path, Recording]]) -> list[Recordin
 
 def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
     clock = recording.clock if recording.clock is not None and len(recording.clock.board_us) else None
-    times = labels._of(name, lambda: clock)
+    times = labels._of(name, lambda: clock, recording.label)
     return sorted(
         (
             Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
@@ -265,9 +268,72 @@ def _of(trial: Trial, place: Path, kind: str, layout: str | os.PathLike[str] | N
     events, frames = (table, None) if isinstance(table, Events) else (None, table)
     path = place if place.is_file() else place / trial.name
     held: dict[str, Any] = {"events": events, "frames": frames, "source": trial.source, "notes": tuple(notes)}
+    label = trial.foot if trial.foot and trial.name.endswith(f" {trial.foot}") else "board"
+    held |= {"untimed": not trial.timed, "label": label}
     contents = Contents(path, trial.name, kind, table.array, side=trial.foot, **held)
     said = _layout(place, layout)
     return Recording(with_sidecars(contents if said is None else laid_out(contents, said)))
+
+
+def recordings_in(folder: Path) -> list[Path]:
+    """Return the files of a folder that are recordings, in the order of their names: 2 before 10."""
+    own = [file for file in folder.iterdir() if file.is_file() and file.name != LABELS and _is_own(file)]
+    others = [file for kind in formats.FORMATS.values() for file in kind.files(folder)]
+    return sorted(own or others, key=_order)
+
+
+def check_recording(file: Path) -> None:
+    """Refuse a file that is no recording by its name and its first bytes.
+
+    Raises
+    ------
+    FormatError : no recording (names the kind of file if it is known)
+    """
+    if not _formats(file) and kind_of(file) == "mcap":
+        _core.RecordingReader(file)
+
+
+def joined(opened: Sequence[Recording]) -> list[Recording]:
+    """Return recordings with the feet of each trial joined as its sources, `left` and `right`.
+
+    Parameters
+    ----------
+    opened : sequence of Recording
+        As `open_any` returns them, where each foot is a trial.
+
+    Returns
+    -------
+    list of Recording
+        In their order; all others unchanged.
+    """
+    groups: dict[tuple[str, str], dict[str, Contents]] = {}
+    for recording in opened:
+        own = recording._contents
+        # In a folder the path of a trial ends with its name, and so with its foot.
+        key = (str(own.path).removesuffix(f" {own.label}"), own.name.removesuffix(f" {own.label}"))
+        groups.setdefault(key, {})[own.label or own.name] = own
+    together: list[Recording] = []
+    for (path, _), sources in groups.items():
+        if set(sources) == set(FEET):
+            both: dict[str, Contents] = {}
+            both.update({foot: sources[foot].but(path=Path(path), sources=both) for foot in FEET})
+            together.append(Recording(several(both)))
+        else:
+            together += [Recording(one) for one in sources.values()]
+    return together
+
+
+def sensors(recording: Recording) -> list[Recording]:
+    """Return each sensor of a file with several as a recording; any other recording itself."""
+    if not recording._contents.is_several:
+        return [recording]
+    return [one for one in recording.sources.values() if not one.is_stream]
+
+
+def open_joined(path: str | os.PathLike[str], **how: Any) -> list[Recording]:
+    """Open a file or a folder as `open_any` does, with the feet of each trial joined."""
+    opened = open_any(path, **how)
+    return joined(opened if isinstance(opened, list) else [opened])
 
 
 def _formats(place: Path) -> list[str]:

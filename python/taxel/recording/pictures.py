@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
 from taxel._base.arguments import number
+from taxel._base.columns import frozen
 from taxel._core import ProblemError
 from taxel.frames import Frames
 from taxel.recording.contents import UNKNOWN, Contents, once
 from taxel.recording.fates import after
 from taxel.tare import Tare
 
-__all__ = ["FRAMES_HZ", "calibrated", "period_us", "pictures"]
+__all__ = ["FRAMES_HZ", "at_rate", "calibrated", "period_us", "pictures"]
 
 #: The default rate of pictures of a recording of events, Hz.
 FRAMES_HZ = 100.0
@@ -54,6 +58,8 @@ def pictures(of: Contents, rate_hz: float | None = None, *, name: str = "rate_hz
     ProblemError : an invalid rate; when the pictures are read, events without intensities
     """
     period = None if rate_hz is None else period_us(name, rate_hz)
+    if period is not None and of.untimed:
+        raise ProblemError(f"{of.path}: its pictures have no times, so they have no rate; see recording.at_rate")
     return after(
         "pictures",
         of,
@@ -81,6 +87,38 @@ def _resampled(of: Contents, period: int | None) -> Frames:
         return own
     t = np.arange(own.t[0], own.t[-1] + 1, period, dtype=np.int64)
     return Frames(own.values[np.searchsorted(own.t, t, side="right") - 1], t, unit=own.unit, array=own.array)
+
+
+def at_rate(of: Contents, rate_hz: float) -> Contents:
+    """Return numbered pictures with times: picture k at k / rate.
+
+    Raises
+    ------
+    ProblemError : pictures that have times, or an invalid rate
+    """
+    period_us("rate_hz", rate_hz)
+    if not of.untimed:
+        raise ProblemError(f"{of.path}: has times of its own; a rate is of pictures without times")
+
+    def time(t: int) -> int:
+        return round(t * 1e6 / rate_hz)
+
+    def frames() -> Frames | None:
+        own = of.frames
+        if own is None:
+            return None
+        t = np.rint(own.t * (1e6 / rate_hz)).astype(np.int64)
+        return Frames(own.values, frozen(t), unit=own.unit, array=own.array)
+
+    def sources() -> Mapping[str, Contents]:
+        every: dict[str, Contents] = {}
+        for label, one in of.sources.items():
+            every[label] = at_rate(one.but(sources={}), rate_hz).but(sources=every)
+        return every
+
+    notes = once(lambda: tuple(replace(n, t=None if n.t is None else time(n.t)) for n in of.notes))
+    # Not a row of the table of fates: nothing else changes, and nothing is lost.
+    return of.but(frames=once(frames), notes=notes, untimed=False, sources=once(sources))
 
 
 def calibrated(of: Contents, rate_hz: float | None = None, rest: Tare | None = None) -> Contents:

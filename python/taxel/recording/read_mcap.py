@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._base.columns import frozen
 from taxel._base.messages import counted
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.clock import Clock
 from taxel.events import Events
@@ -35,7 +37,14 @@ def read_mcap(path: Path, pairing: str) -> Contents:
     sources: dict[str, Contents] = {}
     for name in reader.sources():
         one = _Source(path, reader.of_source(name), sources)
-        sources[name] = one.board(pairing) if one.header.get("stream") is None else one.stream()
+        if one.header.get("pictures") is not None:
+            sources[name] = one.pictures()
+        else:
+            sources[name] = one.board(pairing) if one.header.get("stream") is None else one.stream()
+    sensors = [name for name, one in sources.items() if not one.has_events and vars(one)["columns"] is None]
+    if len(sensors) > 1:
+        for name in sensors:
+            sources[name] = sources[name].but(name=f"{path.name} {name}")
     return alone(sources)
 
 
@@ -60,6 +69,8 @@ class _Source:
             "rebuilt": once(self.rebuilt),
             "sources": sources,
             "lost": tuple(self.header.get("lost", ())),
+            "side": self.header.get("side", ""),
+            "heel": self.header.get("heel", ""),
         }
 
     def board(self, pairing: str) -> Contents:
@@ -68,14 +79,8 @@ class _Source:
         arrived = lambda: self.remarks()["datagrams"] > 0  # noqa: E731  the same for two fields
         return Contents(
             **self.common,
+            **self.remarked(),
             events=once(lambda: Events._from_parts(decoded()[0], self.array)),
-            held=once(self.held),
-            registers=once(self.registers),
-            register_changes=once(self.register_changes),
-            board_changes=once(lambda: board_changes_of(self.remarks()["board"])),
-            notes=once(lambda: notes_of(self.remarks()["notes"])),
-            detections=once(lambda: detections_of(self.remarks()["detections"])),
-            zeroings=once(lambda: zeroings_of([one for _, one in self.remarks()["zeroings"]])),
             clock=once(lambda: _clock(decoded()), arrived),
             counts=once(lambda: self.counts_of_board(decoded()), lambda: True),
             datagrams=once(lambda: Datagrams(*self.reader.datagrams()), arrived),
@@ -83,6 +88,47 @@ class _Source:
             differences=bool(self.header["difference"]),
             origin_us=int(self.header["origin_us"]),
             unmarked=tuple(self.header.get("repaired", ())),
+        )
+
+    def remarked(self) -> dict[str, Any]:
+        """Return the fields that a board and pictures share."""
+        return {
+            "held": once(self.held),
+            "registers": once(self.registers),
+            "register_changes": once(self.register_changes),
+            "board_changes": once(lambda: board_changes_of(self.remarks()["board"])),
+            "notes": once(lambda: notes_of(self.remarks()["notes"])),
+            "detections": once(lambda: detections_of(self.remarks()["detections"])),
+            "zeroings": once(lambda: zeroings_of([one for _, one in self.remarks()["zeroings"]])),
+        }
+
+    def pictures(self) -> Contents:
+        """Return the contents of a source of pictures."""
+        about, place = self.header["pictures"], self.common["path"]
+        read = Once(self.reader.pictures)
+
+        def frames() -> Frames:
+            t, values, _ = read()
+            shaped = frozen(values.reshape(len(t), *self.array.shape))
+            try:
+                return Frames(shaped, frozen(t), unit=about["unit"], array=self.array)
+            except ProblemError as error:
+                raise FormatError(f"{place}, source {self.common['label']}: {error}") from None
+
+        def counts() -> dict[str, Any]:
+            t, _, bad = read()
+            received = (self.ending.get("finished", {}).get("counts") or {}).get("received")
+            damage = {"pictures": len(t), "pictures_that_could_not_be_read": bad}
+            return {**damage, "received": received, **self.rebuilt()}
+
+        names = about.get("columns")
+        return Contents(
+            **self.common,
+            **self.remarked(),
+            frames=once(frames),
+            counts=once(counts, lambda: True),
+            columns=tuple(names) if names else None,
+            untimed=not about.get("clock", True),
         )
 
     def stream(self) -> Contents:

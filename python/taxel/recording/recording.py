@@ -26,7 +26,7 @@ from taxel.recording.fates import after
 from taxel.recording.kinds import kind_of_file, verdict_of
 from taxel.recording.notes import BoardChange, Datagrams, Zeroing
 from taxel.recording.on_clock import on_clock
-from taxel.recording.pictures import calibrated, pictures
+from taxel.recording.pictures import at_rate, calibrated, pictures
 from taxel.tare import Tare
 from taxel.wire import Registers
 
@@ -225,6 +225,24 @@ class Recording:
         return self._contents.has_events
 
     @property
+    def timed(self) -> bool:
+        """Whether it has times; else its pictures are numbered: the time of picture k is k us (`at_rate`)."""
+        return not self._contents.untimed
+
+    @property
+    def label(self) -> str:
+        """The name of the source within its file, as "left"; "" for a file of several sensors as a whole."""
+        return self._contents.label
+
+    @property
+    def title(self) -> str:
+        """The path, with the name of the source or of the trial where the file holds several."""
+        own, place = self._contents, str(self.path)
+        if own.label and len([one for one in own.sources.values() if vars(one)["columns"] is None]) > 1:
+            return f"{place} {own.label}"
+        return place if place.endswith(self.name) else f"{place}, {self.name}"
+
+    @property
     def notes(self) -> tuple[Note, ...]:
         """The notes of the file in its order, followed by the labels of its folder and of `NAME.notes.csv`.
 
@@ -374,6 +392,28 @@ class Recording:
         """
         return Recording(between(self._contents, *window("us", start, stop)))
 
+    def at_rate(self, rate_hz: float) -> Recording:
+        """Return the same recording of numbered pictures with times: so many pictures a second, the first at 0.
+
+        Parameters
+        ----------
+        rate_hz : float, Hz, above 0, at most 1 000 000
+
+        Raises
+        ------
+        ProblemError : it has times of its own (`timed`), or a rate that is invalid
+
+        Examples
+        --------
+        >>> import pathlib, tempfile, taxel
+        >>> from taxel.recording.contents import Contents
+        >>> frames = taxel.Frames([[[1.0]], [[2.0]]], [0, 1])
+        >>> numbered = Contents(pathlib.Path("grasp"), "grasp", "icub", frames.array, frames=frames, untimed=True)
+        >>> taxel.Recording(numbered).at_rate(50).frames().t
+        array([    0, 20000])
+        """
+        return Recording(at_rate(self._contents, rate_hz))
+
     def with_notes(self, notes: Iterable[Note]) -> Recording:
         """Return the same recording with further notes.
 
@@ -401,7 +441,7 @@ class Recording:
             return f"Recording({self.name}: {len(own.sources)} sources: {', '.join(own.sources)})"
         what = own.table if own.has_events else self.frames()
         noun = "event" if self.has_events else "picture"
-        time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) else "no time"
+        time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) and self.timed else "no time"
         more = [counted(len(self.notes), "note")] * bool(self.notes)
         more += [counted(len(self.detections), "detection")] * bool(len(self.detections))
         more += [counted(len(self.zeroings), "zeroed taxel")] * bool(self.zeroings)

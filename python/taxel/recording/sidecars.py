@@ -7,8 +7,7 @@ from pathlib import Path
 from taxel._core import ProblemError
 from taxel.calibration import Calibration
 from taxel.labels import Labels, Note, beside
-from taxel.recording.contents import Contents, alone, once
-from taxel.recording.kinds import ENDINGS
+from taxel.recording.contents import Contents, alone, once, together
 
 __all__ = ["calibration_beside", "has_calibration", "with_sidecars"]
 
@@ -16,9 +15,11 @@ __all__ = ["calibration_beside", "has_calibration", "with_sidecars"]
 def with_sidecars(of: Contents) -> Contents:
     """Return the contents of a file with the labels of `NAME.notes.csv` and the calibration in its folder."""
     sources: dict[str, Contents] = {}
-    for name, one in (of.sources or {of.label: of}).items():
-        # Labels are by the clock of the file's first source.
-        sources[name] = _of_one(one, first=not sources)
+    every = of.sources or {of.label: of}
+    one_clock = together(every)
+    for name, one in every.items():
+        # Labels are by the clock of the file's first source, or of all.
+        sources[name] = _of_one(one, labelled=one_clock or not sources)
     if not of.sources:
         return sources[of.label]
     for name, one in sources.items():
@@ -26,20 +27,20 @@ def with_sidecars(of: Contents) -> Contents:
     return alone(sources)
 
 
-def _of_one(of: Contents, *, first: bool) -> Contents:
+def _of_one(of: Contents, *, labelled: bool) -> Contents:
     changed = {}
-    if first and of.kind in (*ENDINGS.values(), "ros") and beside(of.path).is_file():
-        changed["notes"] = once(lambda: of.notes + _labels(of.path))
+    if labelled and of.path.is_file() and beside(of.path).is_file():
+        changed["notes"] = once(lambda: of.notes + _labels(of))
     calibration = once(lambda: calibration_beside(of.path, of), lambda: has_calibration(of.path))
     return of.but(calibration=calibration, **changed)
 
 
-def _labels(path: Path) -> tuple[Note, ...]:
-    """Return the labels that people set on a finished recording."""
-    labels = Labels(beside(path))
-    name = labels.named(path)
-    rows = sorted((row for row in labels.rows if row.recording == name), key=lambda row: row.t or 0)
-    return tuple(Note(row.text, row.t, row.at_ns) for row in rows)
+def _labels(of: Contents) -> tuple[Note, ...]:
+    """Return the labels that people set on a finished recording: those of its source, and those of all."""
+    labels = Labels(beside(of.path))
+    name = labels.named(of.path)
+    chosen = (row for row in labels.rows if row.recording == name and row.source in ("", of.label))
+    return tuple(Note(row.text, row.t, row.at_ns) for row in sorted(chosen, key=lambda row: row.t or 0))
 
 
 def has_calibration(path: Path) -> bool:

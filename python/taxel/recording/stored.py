@@ -13,7 +13,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording.contents import Contents, once
+from taxel.recording.contents import Contents, once, several, together
 from taxel.recording.csv import array_in_csv
 from taxel.recording.fates import after, sensor
 from taxel.recording.kinds import ENDINGS, verdict_of
@@ -37,9 +37,13 @@ def stored(of: Contents, place: Path) -> Contents:
 
     Raises
     ------
-    ProblemError : contents that the kind of file cannot hold at all (pictures in a .mcap)
+    ProblemError : contents that the kind of file cannot hold at all (pictures in a .lsa)
     """
     ending = place.suffix.lower()
+    if of.is_several and ending == ".mcap" and together(of.sources):
+        parts = {name: stored(one.but(sources={}), place) for name, one in of.sources.items()}
+        parts.update({name: one.but(name=f"{place.name} {name}", sources=parts) for name, one in parts.items()})
+        return several(parts)
     common: dict[str, Any] = {"path": place, "name": place.name, "kind": ENDINGS[ending], "label": "board"}
     lines = {".mcap": _mcap, ".lsa": _lsa, ".csv": _csv, ".npz": _table, ".h5": _table}[ending]
     return lines(of, ending, common | _calibration(of, place))
@@ -110,7 +114,7 @@ def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
     """Return the contents of a .mcap: all; events without datagrams of exactly these events get new datagrams."""
     place, verdict = common["path"], verdict_of(of)
     changed: dict[str, Any] = {
-        "source": of.source or of.name or "events",
+        "source": of.source or of.name or ("events" if of.has_events else "pictures"),
         "rebuilt": {},
         "truncated": False,
         "counts": once(lambda: of.counts),
@@ -124,6 +128,16 @@ def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
         outside = of.clock is not None and len(of.clock.board_us) > len(of.samples)
         lines += ["arrival times of lines outside the part"] * outside
         return after(ending, of, lambda: [*lines, *_mended(of), *_left_beside(of, place)], **(common | changed))
+    if not of.has_events:
+        # Pictures have the times of the board alone.
+        whole = "raw datagrams with their arrival times"
+        lines = [whole] if of.holds("datagrams") else ["arrival times"] * of.holds("clock")
+        lines += ["raw bytes (words that are no events)"] * of.holds("payload")
+        same = {name: vars(of)[name] for name in ("frames", "label")}
+        none = {"events": None, "clock": None, "datagrams": None, "payload": None}
+        made = {"version_2": False, "differences": False, "origin_us": 0, "unmarked": ()}
+        changed = common | changed | same | none | made
+        return after(ending, of, lambda: [*lines, *_mended(of), *_left_beside(of, place)], **changed)
     events = _events(of, place)
     changed |= {"events": once(lambda: events), "frames": None, "payload": None}
     if not is_made(of):
@@ -150,6 +164,6 @@ def _events(of: Contents, place: Path) -> Events:
     events = of.events
     if events is None:
         raise ProblemError(
-            f"{place}: a {place.suffix.lower()} holds events and no pictures; write pictures to .npz, .csv or .h5"
+            f"{place}: a {place.suffix.lower()} holds events and no pictures; write those to .mcap, .npz, .csv or .h5"
         )
     return events

@@ -30,16 +30,17 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
     """
     array = recording.array
     table = recording.events if recording.has_events else recording.frames()
-    span = (int(table.t.min()), int(table.t.max())) if len(table) else None
+    span = (int(table.t.min()), int(table.t.max())) if len(table) and recording.timed else None
     seconds = (span[1] - span[0]) / 1e6 if span else 0.0
     facts: dict[str, Any] = {
-        "file": _file_name(recording),
+        "file": recording.title,
         "kind": recording.kind,
         "source": recording.source,
         "array": {name: value for name, value in array._geometry().items() if name != "exists"},
         "side": recording.side,
         "heel": recording.heel,
         "array_assumed": recording.kind in ("csv", "lsa") and recording.has_events,
+        "timed": recording.timed,
         "from_us": span[0] if span else None,
         "to_us": span[1] if span else None,
         "seconds": seconds,
@@ -83,12 +84,6 @@ def summary(recording: Recording, pressed: Series | None) -> dict[str, Any]:
         "lost": list(recording.lost),
         "verdict": recording.verdict,
     }
-
-
-def _file_name(recording: Recording) -> str:
-    """Return the name of the file, and that of the trial if a file of another format holds several."""
-    place = str(recording.path)
-    return place if place.endswith(recording.name) else f"{place}, {recording.name}"
 
 
 def _pressure(pressed: Series) -> dict[str, Any] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,17 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel.clock import Clock
 from taxel.events import Events
+from taxel.frames import Frames
 from taxel.recording.contents import Contents
 from taxel.recording.notes import Datagrams
 
 __all__ = ["cut_raw", "encoded", "write_mcap"]
 
+#: Number of values of a block of pictures: a chunk of the file.
+_BLOCK = 1 << 18
 
-def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[str, Any]) -> None:
+
+def write_mcap(part: Path, contents: Contents, compression: str, counts: Mapping[str, dict[str, Any]]) -> None:
     """Write a .mcap of contents as it can hold them (`taxel.recording.stored`).
 
     Parameters
@@ -27,36 +32,33 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
     contents : Contents
         With datagrams, or the lines of a stream.
     compression : {"none", "lz4", "zstd"}
-    counts : dict
-        The numbers of what was received and lost, under the names of the live format.
+    counts : mapping from str to dict
+        For each source the numbers of what was received and lost, under the names of the live format.
 
     Raises
     ------
     OSError : the disk is full ...
     """
+    if contents.is_several or (not contents.has_events and contents.samples is None):
+        _write_pictures(part, contents.sources or {contents.label: contents}, compression, counts)
+        return
     samples = contents.samples
     if samples is not None:
         header = {**samples.about, "sources": [], "lost": contents.lost}
         writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
         writer.samples(samples.arrived_ns, samples.number, np.ascontiguousarray(samples.values).reshape(-1))
-        writer.finish(json.dumps(counts))
+        writer.finish(json.dumps(counts[contents.label]))
         return
     datagrams, events = contents.datagrams, contents.events
     assert datagrams is not None and events is not None  # noqa: PT018  `stored` sets both
     # Host times before 1970 are not possible, so all board times are shifted together.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)
-    registers = contents.registers
-    driven = contents.array if registers is None else registers.array
     header = {
-        "array": contents.array._geometry(),
-        "registers": None if registers is None else json.loads(registers._json()),
-        **({} if driven == contents.array else {"driven": driven._geometry()}),
-        "lost": contents.lost,
+        **_header(contents),
         "repaired": contents.unmarked,
         "difference": contents.differences,
         "origin_us": contents.origin_us,
-        "source": contents.source,
         "started_ns": int(arrived[0]) if len(arrived) else 0,
     }
     writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
@@ -72,7 +74,77 @@ def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[st
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
     _add_remarks(writer, events, contents)
-    writer.finish(json.dumps(counts))
+    writer.finish(json.dumps(counts[contents.label]))
+
+
+def _header(contents: Contents) -> dict[str, Any]:
+    """Return what a header states of a sensor."""
+    registers = contents.registers
+    driven = contents.array if registers is None else registers.array
+    return {
+        "array": contents.array._geometry(),
+        "registers": None if registers is None else json.loads(registers._json()),
+        **({} if driven == contents.array else {"driven": driven._geometry()}),
+        "lost": contents.lost,
+        "source": contents.source,
+        "side": contents.side,
+        "heel": contents.heel,
+    }
+
+
+def _write_pictures(
+    part: Path, sources: Mapping[str, Contents], compression: str, counts: Mapping[str, dict[str, Any]]
+) -> None:
+    """Write sources of pictures, all by one clock; times in the file are those of the board, from 0 on."""
+    tables = {name: one.frames for name, one in sources.items()}
+    begins = [int(one.t[0]) for one in tables.values() if one is not None and len(one)]
+    origin_us = min([0, *begins])
+    headers = [
+        {
+            **_header(one),
+            "name": name,
+            "pictures": {"unit": frames.unit, "clock": not one.untimed, "columns": one.columns or ()},
+        }
+        for (name, one), frames in zip(sources.items(), tables.values(), strict=True)
+        if frames is not None
+    ]
+    header = {**headers[0], "sources": headers[1:], "started_ns": 0}
+    writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+    tracks = {name: writer.track(name) for name in sources}
+
+    def at_ns(t: int) -> int:
+        return max(0, (t - origin_us) * 1000)
+
+    for name, one in sources.items():
+        if one.held is not None:
+            tracks[name].held(0, None, np.ascontiguousarray(one.held).reshape(-1))
+        for change in one.board_changes:
+            tracks[name].board_change(max(0, change.at_ns), json.dumps(change._described()))
+    for name, first, block, whole in _blocks({name: one for name, one in tables.items() if one is not None}):
+        t = np.ascontiguousarray(block.t)
+        values = np.ascontiguousarray(block.values).reshape(-1)
+        tracks[name].pictures(first, (t - origin_us) * 1000, t, values, whole)
+    for name, one in sources.items():
+        _add_small(tracks[name], one, at_ns)
+    for name in [*sources][1:]:
+        tracks[name].end(json.dumps(counts[name]))
+    writer.finish(json.dumps(counts[next(iter(sources))]))
+
+
+def _blocks(tables: Mapping[str, Frames]) -> Iterator[tuple[str, int, Frames, bool]]:
+    """Yield name, number of the first picture, pictures, and whether 16 bits hold them, of all sources by time."""
+    whole = {name: _core.whole_pictures(np.ascontiguousarray(one.values).reshape(-1)) for name, one in tables.items()}
+    done = dict.fromkeys(tables, 0)
+    each = {name: max(1, _BLOCK // max(1, one.array.rows * one.array.columns)) for name, one in tables.items()}
+    while left := {name: one for name, one in tables.items() if done[name] < len(one)}:
+        # The block of the source that comes first, and what the others have until its end.
+        first = min(left, key=lambda name: left[name].t[done[name]])
+        end = left[first].t[min(done[first] + each[first], len(left[first])) - 1]
+        for name, one in left.items():
+            stop = min(int(np.searchsorted(one.t, end, side="right")), done[name] + each[name])
+            if stop > done[name]:
+                yield name, done[name], one[done[name] : stop], whole[name]
+                done[name] = stop
 
 
 def encoded(
@@ -131,13 +203,18 @@ def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
         writer.marker(at_ns(t), t, start)
     for t, ticks in _core.RecordingPictures(events._parts(), around):
         writer.picture(at_ns(t), t, events.array.columns, ticks)
+    _add_small(writer, contents, at_ns)
+
+
+def _add_small(writer: Any, contents: Contents, at_ns: Callable[[int], int]) -> None:
+    """Write notes, zeroed taxels, registers and detections."""
     for note in contents.notes:
         writer.note(note.at_ns, note.t, note.text)
     for zeroing in contents.zeroings:
         writer.zeroing(at_ns(zeroing.t), zeroing.t, zeroing.x, zeroing.y, zeroing.rest, zeroing.before)
     for at, values in contents.register_changes:
         writer.registers(at, values._json())
-    for d in detections:
+    for d in contents.detections:
         writer.detection(at_ns(d.known), d.label, d.t, d.known, d.slope, d.repaired)
 
 

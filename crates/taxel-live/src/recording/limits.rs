@@ -17,6 +17,9 @@ pub(super) const COLUMNS: usize = 1024;
 /// Largest number of taxels in a sensor: 2048 x 2048.
 pub(super) const TAXELS: usize = 1 << 22;
 
+/// Largest number of values in the pictures of a source: 4 GiB in memory.
+pub(super) const VALUES: usize = 1 << 30;
+
 /// Largest distance from 0 at which a converted file's time may begin, us: 142 years, so that ns fit in 64 bits too.
 pub(super) const TIME_US: i64 = 1 << 52;
 

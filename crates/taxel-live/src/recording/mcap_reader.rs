@@ -20,7 +20,7 @@ use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Events, Stop, problem};
 
 use super::stream::Sampling;
-use super::{BoardChange, Change, Counts, Header, Samples, Topic, limits};
+use super::{BoardChange, Change, Counts, Header, Pictures, Samples, Topic, limits};
 use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
@@ -312,6 +312,31 @@ impl Reader {
             Ok(())
         })?;
         Ok(sampling.finish())
+    }
+
+    /// All pictures of a source of pictures.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` if the source is another; `Core` (format) if there are more than can be read; otherwise as
+    /// [`Reader::messages`].
+    pub fn pictures(&self, stop: Stop<'_>) -> Result<Pictures> {
+        let Header { name, array, pictures, .. } = self.header();
+        if pictures.is_none() {
+            return Err(problem!("source {name}: holds no pictures").into());
+        }
+        let mut all = Pictures::default();
+        self.messages(stop, |message| {
+            if message.topic == Topic::Pictures {
+                if all.values.len() + array.len() > limits::VALUES {
+                    let most = limits::VALUES;
+                    return Err(Error::format(&self.blocks.path, &format!("pictures of more than {most} values")));
+                }
+                all.push(message.data, array.rows, array.columns);
+            }
+            Ok(())
+        })?;
+        Ok(all)
     }
 
     /// Decodes all datagrams.

@@ -20,6 +20,7 @@ use taxel_core::{Marker, problem};
 
 use super::base64::base64;
 use super::grey_picture::GreyScale;
+use super::pictures::{Encoding, write_message};
 use super::{BoardChange, Compression, Counts, Header, OutputFile, Stream, Topic, WriterOptions};
 use crate::Result;
 use crate::locked::lock;
@@ -51,9 +52,12 @@ pub struct Track {
     queue: Arc<WriteQueue>,
     /// Index of the source in the file.
     source: usize,
+    name: String,
     stream: Option<Stream>,
     /// Number of columns of the array.
     columns: usize,
+    /// Number of places in the array.
+    taxels: usize,
     grey_scale: Mutex<GreyScale>,
 }
 
@@ -82,14 +86,7 @@ impl Writer {
     /// the first datagram or sample or, with `for_clock`, by [`Writer::begin`]; data accepted before wait in memory.
     pub(crate) fn plan(file: OutputFile, header: &Header, compression: Compression, for_clock: bool) -> Self {
         let queue = Arc::new(WriteQueue::new(Plan { file, header: header.clone(), compression }, for_clock));
-        let track = Track {
-            queue,
-            source: 0,
-            stream: header.stream.clone(),
-            columns: header.array.columns.into(),
-            grey_scale: Mutex::new(GreyScale::new(header.array.len())),
-        };
-        Self { track, header: header.clone() }
+        Self { track: Track::new(queue, 0, header), header: header.clone() }
     }
 
     /// Begins the file of `Writer::plan` with the offset of decoded times, us ([`Header::origin_us`]); returns whether
@@ -115,23 +112,17 @@ impl Writer {
         }
     }
 
-    /// The writer of another source.
+    /// The writer of a source.
     ///
     /// # Errors
     ///
     /// `Core(Problem)` if the header contains no source of that name.
     pub fn track(&self, name: &str) -> Result<Track> {
-        let named = self.header.sources.iter().position(|source| source.name == name);
-        let Some(k) = named else {
+        let mut sources = std::iter::once(&self.header).chain(&self.header.sources).enumerate();
+        let Some((k, source)) = sources.find(|(_, source)| source.name == name) else {
             return Err(problem!("source {name:?}: the recording has none of that name").into());
         };
-        Ok(Track {
-            queue: Arc::clone(&self.track.queue),
-            source: k + 1,
-            stream: self.header.sources[k].stream.clone(),
-            columns: self.header.sources[k].array.columns.into(),
-            grey_scale: Mutex::new(GreyScale::new(self.header.sources[k].array.len())),
-        })
+        Ok(Track::new(Arc::clone(&self.track.queue), k, source))
     }
 
     /// Whether any source has passed data.
@@ -166,6 +157,39 @@ impl Writer {
 }
 
 impl Track {
+    /// The writer of the source with this index in the file.
+    fn new(queue: Arc<WriteQueue>, source: usize, header: &Header) -> Self {
+        Self {
+            queue,
+            source,
+            name: header.name.clone(),
+            stream: header.stream.clone(),
+            columns: header.array.columns.into(),
+            taxels: header.array.len(),
+            grey_scale: Mutex::new(GreyScale::new(header.array.len())),
+        }
+    }
+
+    /// Writes pictures, each with its time in the file (ns), its time by the board's clock (us) and the values of all
+    /// taxels; `first` is the number of the first of them.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the columns do not fit each other or the array; else as [`Track::datagram`].
+    pub fn pictures(&self, first: u64, at_ns: &[i64], t_us: &[i64], values: &[f32], encoding: Encoding) -> Result<()> {
+        if at_ns.len() != t_us.len() || values.len() != t_us.len() * self.taxels {
+            let (n, taxels) = (values.len(), self.taxels);
+            return Err(problem!("{} pictures of {taxels} taxels: {n} values", t_us.len()).into());
+        }
+        let mut message = vec![];
+        let pictures = values.chunks_exact(self.taxels).zip(at_ns.iter().zip(t_us)).zip(first..);
+        for ((picture, (&at_ns, &t_us)), number) in pictures {
+            write_message(&mut message, &self.name, t_us, self.columns, picture, encoding);
+            self.queue.push(self.source, Topic::Pictures, (at_ns, number), &message, BULK_BYTES)?;
+        }
+        Ok(())
+    }
+
     /// Writes one line of a stream, with a number for each of its columns, the arrival time by the host's clock (ns
     /// since 1970) and the arrival number.
     ///

@@ -1,5 +1,7 @@
 //! The channels of a recording, with their schemas.
 
+use super::Header;
+
 /// A channel of a recording. Its number is the same in every file, so that a file is readable even if its first chunk,
 /// which contains the channel records, is damaged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -25,6 +27,8 @@ pub enum Topic {
     Board = 9,
     /// Lines of numbers of a source that is not a board.
     Samples = 10,
+    /// Pictures of the whole array at full rate.
+    Pictures = 11,
 }
 
 /// Difference of the channel numbers of one source from those of the source before it in the file.
@@ -32,7 +36,7 @@ const NEXT_SOURCE: u16 = 16;
 
 impl Topic {
     /// All channels, by number.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Datagrams,
         Self::Registers,
         Self::Markers,
@@ -43,12 +47,16 @@ impl Topic {
         Self::Held,
         Self::Board,
         Self::Samples,
+        Self::Pictures,
     ];
 
-    /// The channels of a source: those of a board, or those of a stream of numbers.
-    pub(super) fn of_source(stream: bool) -> impl Iterator<Item = Self> {
+    /// The channels of a source: a board, a stream of numbers, or pictures.
+    pub(super) fn of_source(source: &Header) -> impl Iterator<Item = Self> {
+        let (stream, pictures) = (source.stream.is_some(), source.pictures.is_some());
         let belongs = move |topic: &Self| match topic {
             Self::Samples => stream,
+            Self::Pictures => pictures,
+            Self::Datagrams | Self::Pressure => !stream && !pictures,
             Self::Counts => true,
             _ => !stream,
         };
@@ -69,6 +77,7 @@ impl Topic {
             Self::Held => "/held",
             Self::Board => "/board",
             Self::Samples => "/samples",
+            Self::Pictures => "/pictures",
         }
     }
 
@@ -76,14 +85,18 @@ impl Topic {
     pub(super) fn encoding(self) -> &'static str {
         match self {
             Self::Datagrams => "taxel.wire.v1",
+            Self::Pictures => "protobuf",
             _ => "json",
         }
     }
 
-    /// Name and JSON schema of the channel's messages; datagrams have none, because they are the board's own bytes.
-    pub(super) fn schema(self) -> Option<(&'static str, &'static str)> {
-        Some(match self {
+    /// Name, encoding and text of the schema of the channel's messages; datagrams have none, because they are the board's
+    /// own bytes.
+    pub(super) fn schema(self) -> Option<(&'static str, &'static str, &'static [u8])> {
+        let (name, text) = match self {
             Self::Datagrams => return None,
+            // A `FileDescriptorSet` of protobuf: foxglove/RawImage.proto and the time stamp that it uses.
+            Self::Pictures => return Some(("foxglove.RawImage", "protobuf", include_bytes!("schemas/RawImage.bin"))),
             Self::Registers => ("taxel.Registers", include_str!("schemas/Registers.json")),
             Self::Markers => ("taxel.Marker", include_str!("schemas/Marker.json")),
             Self::Notes => ("foxglove.Log", include_str!("schemas/Log.json")),
@@ -93,7 +106,8 @@ impl Topic {
             Self::Held => ("taxel.Held", include_str!("schemas/Held.json")),
             Self::Board => ("taxel.Board", include_str!("schemas/Board.json")),
             Self::Samples => ("taxel.Sample", include_str!("schemas/Sample.json")),
-        })
+        };
+        Some((name, "jsonschema", text.as_bytes()))
     }
 
     /// The number of the channel in a file; `source` is the index of the source.
@@ -101,8 +115,11 @@ impl Topic {
         u16::try_from(source).unwrap_or(u16::MAX).saturating_mul(NEXT_SOURCE).saturating_add(self as u16)
     }
 
-    /// The name of the channel in a file; for the first source it is the topic's name alone.
+    /// The name of the channel in a file; for the first source it is the topic's name alone, but for pictures.
     pub(super) fn channel_name(self, source: usize, named: &str) -> String {
+        if self == Self::Pictures {
+            return format!("{}/{named}", self.name());
+        }
         if source == 0 { self.name().to_owned() } else { format!("/{named}{}", self.name()) }
     }
 

@@ -66,8 +66,6 @@ pub struct RecordingIndex {
     keys: Vec<Key>,
     time_columns: Option<TimeColumns>,
     range: Option<(i64, i64)>,
-    /// Size of the file, bytes.
-    pub bytes: u64,
     /// Number of events.
     pub events: u64,
     /// Number of events over time: start and width of a bin (us), counts.
@@ -122,7 +120,6 @@ impl RecordingIndex {
             keys: vec![],
             time_columns: None,
             range: None,
-            bytes,
             events: 0,
             event_rate: (0, COLUMN_US, vec![]),
             activity: Activity::new(&header_array),

@@ -7,7 +7,7 @@ use tokio::sync::{Semaphore, mpsc};
 
 use crate::hub::Hub;
 use crate::request::{Refusal, Request};
-use crate::requests::carry_out;
+use crate::requests::{Shown, carry_out};
 
 /// Maximum number of pending requests.
 const MOST_PENDING: usize = 8;
@@ -36,7 +36,7 @@ impl PendingRequests {
         id: Value,
         what: String,
         message: Map<String, Value>,
-        shown: Option<String>,
+        shown: Option<Shown>,
     ) -> Option<Value> {
         let Ok(permit) = Arc::clone(&self.permits).try_acquire_owned() else {
             let refusal = Refusal::from("too many requests at a time: wait for their answers");
@@ -44,7 +44,7 @@ impl PendingRequests {
         };
         let (hub, answers) = (Arc::clone(hub), self.answers.clone());
         tokio::spawn(async move {
-            let last = match carry_out(hub, &what, shown.as_deref(), Request(&message)).await {
+            let last = match carry_out(hub, &what, shown.as_ref(), Request(&message)).await {
                 Ok(answer) => {
                     if let Some(answer) = answer {
                         // The client may have left in the meantime, here and below.

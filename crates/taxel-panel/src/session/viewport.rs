@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 use taxel_core::encode::Encoder;
+use taxel_core::problem;
 use taxel_live::locked::lock;
 
 use super::delivered::Delivered;
@@ -12,17 +13,14 @@ use super::following::Following;
 use super::playback::Playback;
 use crate::hub::Hub;
 use crate::keyframe_index::KeyframeIndex;
-use crate::keyframe_index::recording::RecordingIndex;
 use crate::live_source::LiveSource;
 use crate::messages;
+use crate::opening;
 use crate::picture::{self, About, FOLLOWS, LIVE, MOVES, RESTART};
 use crate::player::{Player, ViewOptions};
 use crate::request::{Answer, Refusal, Request, taxel};
-use crate::requests::read_labels;
-use crate::time_columns::{COLUMN_US, COLUMNS_US, TimeColumns, is_column};
-
-/// Maximum number of detections of a recording in a message.
-const MOST_DETECTIONS: usize = 10_000;
+use crate::requests::{Shown, read_labels};
+use crate::time_columns::{COLUMN_US, COLUMNS_US, is_column};
 
 /// Maximum number of time stamps in a `step`.
 const MOST_STEPS: i64 = 1000;
@@ -46,7 +44,7 @@ struct Place {
 pub(super) struct Viewport {
     live: Option<Arc<LiveSource>>,
     /// The recording that is shown, in place of the live source.
-    recording: Option<(String, Arc<RecordingIndex>)>,
+    recording: Option<Shown>,
     position: Position,
     playback: Playback,
     options: ViewOptions,
@@ -77,7 +75,12 @@ impl Viewport {
     }
 
     pub(super) fn recording_name(&self) -> Option<&str> {
-        self.recording.as_ref().map(|(name, _)| name.as_str())
+        self.recording.as_ref().map(|shown| shown.name.as_str())
+    }
+
+    /// The recording that is shown.
+    pub(super) fn shown(&self) -> Option<Shown> {
+        self.recording.clone()
     }
 
     pub(super) fn is_playing(&self) -> bool {
@@ -123,25 +126,17 @@ impl Viewport {
 
     /// The `overview` message.
     pub(super) fn overview_message(&self) -> Answer<Value> {
-        let force = |columns: &TimeColumns, (start, step, events): &(i64, i64, Vec<u64>)| {
-            columns.greatest_sums(*start, *step, events.len(), COLUMN_US)
-        };
-        let (source, rate, force) = match (&self.recording, &self.live) {
-            (Some((name, index)), _) => {
-                let rate = index.event_rate.clone();
-                let force = index.time_columns().map_or_else(Vec::new, |columns| force(columns, &rate));
-                (Some(name), rate, force)
-            }
+        let (start, step, events, force) = match (&self.recording, &self.live) {
+            (Some(shown), _) => return Ok(shown.indexed.overview(&shown.name)),
             (None, Some(live)) => {
-                let rate = live.index.event_rate();
-                let force = force(lock(&live.state).time_columns(), &rate);
-                (None, rate, force)
+                let (start, step, events) = live.index.event_rate();
+                let force = lock(&live.state).time_columns().greatest_sums(start, step, events.len(), COLUMN_US);
+                (start, step, events, force)
             }
             (None, None) => return Err("nothing is shown".into()),
         };
-        let (start, step, events) = rate;
         Ok(json!({
-            "type": "overview", "source": source, "start_us": start, "step_us": step, "events": events, "force": force,
+            "type": "overview", "source": null, "start_us": start, "step_us": step, "events": events, "force": force,
         }))
     }
 
@@ -156,7 +151,7 @@ impl Viewport {
 
     fn index(&self) -> Answer<Arc<dyn KeyframeIndex>> {
         match (&self.recording, &self.live) {
-            (Some((_, index)), _) => Ok(Arc::new(Arc::clone(index))),
+            (Some(shown), _) => Ok(shown.indexed.index()),
             (None, Some(live)) => Ok(Arc::new(live.index.clone())),
             (None, None) => Err("nothing is shown: open a recording first".into()),
         }
@@ -283,7 +278,7 @@ impl Viewport {
     /// Moves the view to a time.
     async fn seek(&mut self, t: i64) -> Answer {
         let index = self.index()?;
-        if let Some(Err(error)) = self.options.encoder.as_ref().map(|encoder| encoder.stream(index.array())) {
+        if let Some(Err(error)) = self.options.encoder.as_ref().map(|encoder| encodes(&index, encoder)) {
             self.options.encoder = None;
             self.warnings.push(error.to_string());
         }
@@ -393,7 +388,7 @@ impl Viewport {
             let refused =
                 |error: taxel_core::Error| Refusal { reason: error.to_string(), field: Some("encoder".to_owned()) };
             let encoder = Encoder::from_json(&wanted.to_string()).map_err(refused)?;
-            encoder.stream(self.index()?.array()).map_err(refused)?;
+            encodes(&self.index()?, &encoder).map_err(refused)?;
             self.options.encoder = Some(encoder);
         }
         self.reopen().await
@@ -477,19 +472,43 @@ impl Viewport {
     }
 
     /// Opens a recording at its beginning; returns the messages about it.
-    pub(super) async fn open(&mut self, hub: &Hub, request: &Request<'_>) -> Answer<Vec<Value>> {
+    pub(super) async fn open(&mut self, hub: &Arc<Hub>, request: &Request<'_>) -> Answer<Vec<Value>> {
         let name = request.text("name", 110)?.to_owned();
+        let trial = request.optional_text("trial", 255)?.map(str::to_owned);
+        self.show(hub, name, trial, None).await
+    }
+
+    /// Shows the whole of a recording where its beginning is shown, at the same time; returns the messages about it.
+    pub(super) async fn reopen_whole(&mut self, hub: &Arc<Hub>, name: &str) -> Option<Vec<Value>> {
+        let shown = self.recording.clone().filter(|shown| shown.name == name)?;
+        let (t, playing) = (self.t(), self.playback.is_playing());
+        let messages = self.show(hub, shown.name, shown.trial, t).await;
+        if let (true, Some(t)) = (playing, t) {
+            self.playback.start(self.playback.speed(), t);
+        }
+        messages.map_err(|refusal| self.warnings.push(refusal.reason)).ok()
+    }
+
+    /// Shows a recording at a time, or at its beginning; returns the messages about it.
+    async fn show(
+        &mut self,
+        hub: &Arc<Hub>,
+        name: String,
+        trial: Option<String>,
+        t: Option<i64>,
+    ) -> Answer<Vec<Value>> {
         let begun = Instant::now();
-        let index = hub.folder.index(&name).await.map_err(|error| Refusal::of("name", error))?;
-        let labels = read_labels(hub, &name).await;
-        let mut answer = vec![opened_message(&name, &index, begun)];
-        let taxels = index.header().array.len();
-        self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < taxels);
-        let range = index.range();
-        (self.recording, self.window_us) = (Some((name.clone(), index)), None);
+        let refused = |error: taxel_live::Error| Refusal::of("name", error);
+        let indexed = opening::index(hub, &name, trial.as_deref()).await.map_err(refused)?;
+        let labels = read_labels(hub, &name, indexed.us()).await;
+        let bytes = std::fs::metadata(hub.folder.file(&name).map_err(refused)?).map_or(0, |about| about.len());
+        let mut answer = vec![indexed.opened(&name, bytes, begun)];
+        let index = indexed.index();
+        self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < index.array().len());
+        (self.recording, self.window_us) = (Some(Shown { name: name.clone(), trial, indexed }), None);
         self.playback.pause();
-        match range {
-            Some((first, _)) => self.seek(first).await?,
+        match index.range() {
+            Some((first, _)) => self.seek(t.unwrap_or(first)).await?,
             None => self.position = Position::At(None),
         }
         answer.push(hub.labels.message(&name));
@@ -501,33 +520,12 @@ impl Viewport {
     }
 }
 
-/// The `opened` message.
-fn opened_message(name: &str, index: &Arc<RecordingIndex>, begun: Instant) -> Value {
-    let (header, remarks, range) = (index.header(), &index.remarks, index.range());
-    let notes = remarks.notes.iter().map(|n| json!({ "t_us": n.t_us, "text": n.text }));
-    let markers = remarks.markers.iter().map(|m| json!({ "t_us": m.t, "start": m.start }));
-    // The end of the column, which has all of its force.
-    let touch = index.time_columns().and_then(TimeColumns::first_touch);
-    let touch_us = touch.zip(range).map(|(column, (first, last))| ((column + 1) * COLUMN_US - 1).clamp(first, last));
-    let detections = remarks.detections.iter().take(MOST_DETECTIONS);
-    let detections = detections.map(|(_, d)| json!({ "label": d.label, "t_us": d.t, "known_us": d.known }));
-    json!({
-        "type": "opened",
-        "name": name,
-        "array": messages::array(&header.array),
-        "start_us": range.map(|(first, _)| first),
-        "stop_us": range.map(|(_, last)| last),
-        "touch_us": touch_us,
-        "events": index.events,
-        "bytes": index.bytes,
-        "verdict": index.verdict,
-        "unfinished": index.unfinished,
-        "registers": header.registers,
-        "frame_us": header.registers.map(|registers| registers.frame_us()),
-        "markers": markers.collect::<Vec<_>>(),
-        "notes": notes.collect::<Vec<_>>(),
-        "zeroed": remarks.zeroings.iter().map(|(_, one)| messages::zeroing(one)).collect::<Vec<_>>(),
-        "detections": detections.collect::<Vec<_>>(),
-        "index_ms": begun.elapsed().as_secs_f64() * 1e3,
-    })
+/// Whether an encoder encodes what an index holds.
+fn encodes(index: &Arc<dyn KeyframeIndex>, encoder: &Encoder) -> taxel_core::Result<()> {
+    if index.holds_pictures() {
+        return Err(problem!(
+            "the panel shows the spikes of events, and this recording holds pictures: see taxel encode"
+        ));
+    }
+    encoder.stream(index.array()).map(drop)
 }

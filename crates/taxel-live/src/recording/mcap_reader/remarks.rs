@@ -53,7 +53,7 @@ impl Remarks {
                 let (first, last) = self.arrivals.unwrap_or((message.at_ns, message.at_ns));
                 self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
             }
-            Topic::Pressure => self.pictures += 1,
+            Topic::Pressure | Topic::Pictures => self.pictures += 1,
             // The checksum of a message that does not parse is valid, so another program wrote the message; it is
             // ignored.
             Topic::Registers => {

@@ -57,13 +57,23 @@ impl ChunkWriter {
         let opening = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
         writer.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: opening.clone() })?;
         for (k, source) in std::iter::once(header).chain(&header.sources).enumerate() {
-            for topic in Topic::of_source(source.stream.is_some()) {
+            for topic in Topic::of_source(source) {
                 let schema = match topic.schema() {
                     None => 0,
-                    Some((name, text)) => writer.mcap.add_schema(name, "jsonschema", text.as_bytes())?,
+                    Some((name, encoding, text)) => writer.mcap.add_schema(name, encoding, text)?,
                 };
                 // The header is stored a second time in a channel record, which a chunk's checksum protects.
-                let more = if k == 0 && topic == Topic::Datagrams { opening.clone() } else { BTreeMap::new() };
+                let first = k == 0 && matches!(topic, Topic::Datagrams | Topic::Pictures);
+                let mut more = if first { opening.clone() } else { BTreeMap::new() };
+                if let Some(pictures) = source.pictures.as_ref().filter(|_| topic == Topic::Pictures) {
+                    let about = [
+                        ("unit", pictures.unit.clone()),
+                        ("array", json!(source.array).to_string()),
+                        ("source", source.name.clone()),
+                        ("clock", pictures.clock.to_string()),
+                    ];
+                    more.extend(about.map(|(key, value)| (key.to_owned(), value)));
+                }
                 let (number, name) = (topic.channel(k), topic.channel_name(k, &source.name));
                 writer.mcap.add_channel_with_id(number, schema, &name, topic.encoding(), &more)?;
             }

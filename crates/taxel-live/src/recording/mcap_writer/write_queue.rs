@@ -126,7 +126,7 @@ impl WriteQueue {
         let at_ns = u64::try_from(at_ns).unwrap_or(0);
         state.queue.messages.push(Queued { channel: topic.channel(source), number, at_ns, bytes: bytes.len() });
         state.queue.since.get_or_insert_with(Instant::now);
-        let data = matches!(topic, Topic::Datagrams | Topic::Samples);
+        let data = matches!(topic, Topic::Datagrams | Topic::Samples | Topic::Pictures);
         state.recorded[source] += u64::from(data);
         if !state.begun {
             if data && (!state.for_clock || state.queue.bytes.len() > WAITING_BYTES) {

@@ -1,0 +1,431 @@
+//! The index of a recording of pictures: all of them in memory, their values in whole steps of the unit.
+//!
+//! Views show changes of ticks. Pictures are shown by the same code: a tick is then a step of their unit, and the changes
+//! at a time are the cells that differ from the picture before.
+
+use std::sync::Arc;
+
+use taxel_core::Array;
+use taxel_core::held::UNKNOWN;
+use taxel_live::Result;
+use taxel_live::pipeline::Change;
+use taxel_live::recording::Remarks;
+
+use super::{ChangeReader, KeyframeIndex, Read};
+use crate::array_state::Keyframe;
+use crate::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
+
+/// Memory that the curves may take, bytes.
+const TIME_COLUMN_BYTES: usize = 256 << 20;
+
+/// Most steps from the least value to the greatest.
+const MOST_STEPS: usize = 65_533;
+
+/// Bins of the overview.
+const BINS: i64 = 1000;
+
+/// Number of changes that are read at once.
+const AT_ONCE: usize = 4096;
+
+/// Where a source's pictures are in the array of the recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PicturePlace {
+    /// Name of the source.
+    pub name: String,
+    /// Its first column in the array of the recording.
+    pub left: u16,
+    /// Its rows.
+    pub rows: u16,
+    /// Its columns.
+    pub columns: u16,
+}
+
+/// The pictures of a source, in steps.
+#[derive(Debug, Clone)]
+struct Source {
+    place: PicturePlace,
+    t: Vec<i64>,
+    /// Row by row, picture after picture; [`UNKNOWN`] where a value is missing.
+    ticks: Vec<u16>,
+}
+
+impl Source {
+    fn cells(&self) -> usize {
+        usize::from(self.place.rows) * usize::from(self.place.columns)
+    }
+
+    fn picture(&self, k: usize) -> &[u16] {
+        &self.ticks[k * self.cells()..(k + 1) * self.cells()]
+    }
+
+    /// Number of pictures up to a time.
+    fn until(&self, t: i64) -> usize {
+        self.t.partition_point(|&at| at <= t)
+    }
+
+    /// The taxels of its cells in an array of `columns` columns, row by row.
+    fn taxels(&self, columns: u16) -> impl Iterator<Item = usize> + use<> {
+        let (left, width, columns) = (self.place.left, self.place.columns, usize::from(columns));
+        (0..usize::from(self.place.rows))
+            .flat_map(move |y| (0..usize::from(width)).map(move |x| y * columns + usize::from(left) + x))
+    }
+}
+
+/// The steps in which values are shown: a value is `(ticks - zero) * size`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Steps {
+    size: f64,
+    zero: u16,
+}
+
+impl Steps {
+    /// Steps for these values: of 1 where all are whole and not too far apart, else as small as 16 bits allow.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn of<'a>(values: impl Iterator<Item = &'a [f32]>, taxels: usize) -> Self {
+        let (mut least, mut most, mut whole) = (0.0_f32, 0.0_f32, true);
+        for &value in values.flatten().filter(|value| value.is_finite()) {
+            (least, most) = (least.min(value), most.max(value));
+            whole &= value.fract() == 0.0;
+        }
+        let (least, range) = (f64::from(least), f64::from(most) - f64::from(least));
+        // The sum over the array has 32 bits.
+        let steps = MOST_STEPS.min(u32::MAX as usize / taxels.max(1)) as f64;
+        let size = if whole && range <= MOST_STEPS as f64 { 1.0 } else { range / steps };
+        Self { size, zero: (-least / size).ceil() as u16 }
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn ticks(self, values: &[f32]) -> Vec<u16> {
+        let (scale, zero) = (1.0 / self.size, f64::from(self.zero) + 0.5);
+        let tick = |&value: &f32| match value.is_nan() {
+            true => UNKNOWN,
+            false => (f64::from(value) * scale + zero).min(f64::from(UNKNOWN - 1)) as u16,
+        };
+        values.iter().map(tick).collect()
+    }
+}
+
+/// What a file of pictures states beside them.
+#[derive(Debug, Clone, Default)]
+pub struct PictureFile {
+    /// Unit of the values.
+    pub unit: String,
+    /// Time from one picture to the next in the index, where the pictures are numbered, us; `None` where they have times.
+    pub picture_us: Option<i64>,
+    /// Notes, markers, detections.
+    pub remarks: Remarks,
+    /// One line that states what was lost.
+    pub verdict: String,
+    /// The trial of its file that is shown, and all of them, where there are several.
+    pub trial: Option<String>,
+    /// See `trial`.
+    pub trials: Vec<String>,
+    /// How long the whole takes to read, s, where these pictures are only those at the beginning of the file.
+    pub left_s: Option<f64>,
+}
+
+/// An indexed recording of pictures.
+#[derive(Debug)]
+pub struct PictureIndex {
+    /// What the file states.
+    pub file: PictureFile,
+    /// Size of a step of the shown values, in the unit.
+    pub step: f64,
+    /// Ticks of the value 0.
+    pub zero: u16,
+    /// Number of pictures.
+    pub pictures: u64,
+    array: Array,
+    sources: Vec<Source>,
+    time_columns: Option<TimeColumns>,
+    range: Option<(i64, i64)>,
+}
+
+/// Number of the next picture of each source.
+type Cursor = Vec<usize>;
+
+impl PictureIndex {
+    /// Indexes pictures: for each source its place in `array`, the times (us, ascending) and the values of its pictures.
+    #[must_use]
+    pub fn new(array: Array, file: PictureFile, sources: Vec<(PicturePlace, Vec<i64>, &[f32])>) -> Self {
+        let steps = Steps::of(sources.iter().map(|(_, _, values)| *values), array.len());
+        let source =
+            |(place, t, values): (PicturePlace, Vec<i64>, &[f32])| Source { place, t, ticks: steps.ticks(values) };
+        let sources: Vec<Source> = sources.into_iter().map(source).collect();
+        let first = sources.iter().filter_map(|source| source.t.first()).min();
+        let last = sources.iter().filter_map(|source| source.t.last()).max();
+        let mut index = Self {
+            file,
+            step: steps.size,
+            zero: steps.zero,
+            pictures: sources.iter().map(|source| source.t.len() as u64).sum(),
+            range: first.copied().zip(last.copied()),
+            array,
+            sources,
+            time_columns: None,
+        };
+        index.measure();
+        index
+    }
+
+    /// The places of its sources.
+    pub fn places(&self) -> impl Iterator<Item = &PicturePlace> {
+        self.sources.iter().map(|source| &source.place)
+    }
+
+    /// The source and the number of the next picture, with its time.
+    fn next(&self, cursor: &Cursor) -> Option<(usize, usize, i64)> {
+        let ahead = self.sources.iter().zip(cursor).enumerate();
+        let ahead = ahead.filter_map(|(source, (of, &k))| of.t.get(k).map(|&t| (source, k, t)));
+        ahead.min_by_key(|&(_, _, t)| t)
+    }
+
+    /// Start and width of a bin of the overview, us, and the number of bins.
+    #[must_use]
+    pub fn bins(&self) -> (i64, i64, usize) {
+        let Some((first, last)) = self.range else { return (0, COLUMN_US, 0) };
+        let step = COLUMN_US.max((last - first) / BINS + 1);
+        (first, step, usize::try_from((last - first) / step).unwrap_or(0) + 1)
+    }
+
+    /// Computes the curves of the whole recording.
+    fn measure(&mut self) {
+        let Some((first, _)) = self.range else { return };
+        let mut columns = TimeColumns::new(self.array.rows.into(), TIME_COLUMN_BYTES);
+        let mut cursor = vec![0; self.sources.len()];
+        let mut loads = vec![Load::default(); self.sources.len()];
+        while let Some((source, k, t)) = self.next(&cursor) {
+            cursor[source] += 1;
+            loads[source] = Load::of(&self.sources[source], k, self.zero);
+            let column = column_of(t, COLUMN_US);
+            columns.extend_to(column);
+            columns.set_curve(column, loads.iter().fold(Load::default(), Load::plus).curve());
+        }
+        let whole = columns.reach().is_none_or(|(begin, _)| begin <= column_of(first, COLUMN_US));
+        self.time_columns = whole.then_some(columns);
+    }
+}
+
+/// The load of a source's picture.
+#[derive(Debug, Clone, Copy, Default)]
+struct Load {
+    sum: u64,
+    sum_x: u64,
+    sum_y: u64,
+    area: u32,
+}
+
+impl Load {
+    fn of(source: &Source, k: usize, zero: u16) -> Self {
+        let (mut all, columns) = (Self::default(), usize::from(source.place.columns));
+        for (y, row) in (0..).zip(source.picture(k).chunks_exact(columns)) {
+            let (mut sum, mut moment) = (0_u64, 0_u64);
+            for (x, &ticks) in (0..).zip(row) {
+                let above = if ticks == UNKNOWN { 0 } else { u64::from(ticks.saturating_sub(zero)) };
+                sum += above;
+                moment += above * x;
+                all.area += u32::from(above > 0);
+            }
+            all.sum += sum;
+            all.sum_x += moment + sum * u64::from(source.place.left);
+            all.sum_y += sum * y;
+        }
+        all
+    }
+
+    fn plus(self, other: &Self) -> Self {
+        Self {
+            sum: self.sum + other.sum,
+            sum_x: self.sum_x + other.sum_x,
+            sum_y: self.sum_y + other.sum_y,
+            area: self.area + other.area,
+        }
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
+    fn curve(self) -> Curve {
+        if self.sum == 0 {
+            return NOTHING;
+        }
+        let (x, y) = (self.sum_x as f64 / self.sum as f64, self.sum_y as f64 / self.sum as f64);
+        Curve { sum: self.sum.min(u32::MAX.into()) as u32, area: self.area, x: x as f32, y: y as f32 }
+    }
+}
+
+struct PictureChanges {
+    index: Arc<PictureIndex>,
+    cursor: Cursor,
+    held: Vec<u16>,
+}
+
+impl ChangeReader for PictureChanges {
+    fn read(&mut self, out: &mut Vec<Change>) -> Result<Read> {
+        let begun = out.len();
+        while out.len() - begun < AT_ONCE {
+            let Some((number, k, t)) = self.index.next(&self.cursor) else { break };
+            self.cursor[number] += 1;
+            let (source, before) = (&self.index.sources[number], out.len());
+            let mut put = |taxel: usize, ticks: u16, up: bool| {
+                // A sensor has 2^22 taxels at most (the limits of recordings).
+                #[allow(clippy::cast_possible_truncation)]
+                out.push(Change { t, taxel: taxel as u32, ticks, up, repaired: false });
+            };
+            for (taxel, &ticks) in source.taxels(self.index.array.columns).zip(source.picture(k)) {
+                let held = std::mem::replace(&mut self.held[taxel], ticks);
+                if held != ticks {
+                    put(taxel, ticks, ticks > held);
+                }
+            }
+            if out.len() == before {
+                // A picture equal to the one before has a time of its own.
+                let same = source.taxels(self.index.array.columns).zip(source.picture(k)).next();
+                out.extend(same.map(|(taxel, &ticks)| {
+                    #[allow(clippy::cast_possible_truncation)]
+                    Change { t, taxel: taxel as u32, ticks, up: true, repaired: false }
+                }));
+            }
+        }
+        Ok(if out.len() == begun { Read::End } else { Read::Changes })
+    }
+}
+
+impl KeyframeIndex for Arc<PictureIndex> {
+    fn array(&self) -> &Array {
+        &self.array
+    }
+
+    fn noise_floor(&self) -> u16 {
+        0
+    }
+
+    fn holds_pictures(&self) -> bool {
+        true
+    }
+
+    fn range(&self) -> Option<(i64, i64)> {
+        self.range
+    }
+
+    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn ChangeReader>)> {
+        let mut held = vec![UNKNOWN; self.array.len()];
+        let cursor: Cursor = self.sources.iter().map(|source| source.until(t)).collect();
+        for (source, &next) in self.sources.iter().zip(&cursor).filter(|(_, next)| **next > 0) {
+            source.taxels(self.array.columns).zip(source.picture(next - 1)).for_each(|(k, &ticks)| held[k] = ticks);
+        }
+        let keyframe = Keyframe {
+            latest: self.keyframe_before(t.saturating_add(1)),
+            events: cursor.iter().map(|&next| next as u64).sum(),
+            held: held.clone(),
+            rest: vec![self.zero; self.array.len()],
+        };
+        Ok((keyframe, Box::new(PictureChanges { index: Arc::clone(self), cursor, held })))
+    }
+
+    fn keyframe_before(&self, t: i64) -> Option<i64> {
+        let before = |source: &Source| source.until(t.saturating_sub(1)).checked_sub(1).map(|k| source.t[k]);
+        self.sources.iter().filter_map(before).max()
+    }
+
+    fn time_columns(&self) -> Option<&TimeColumns> {
+        self.time_columns.as_ref()
+    }
+
+    fn events_before(&self, t: i64) -> u64 {
+        // In a step a quarter of the cells changes.
+        self.sources.iter().map(|source| (source.until(t) * source.cells() / 4) as u64).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::player::{Player, ViewOptions};
+    use rand::{Rng, SeedableRng, rngs::StdRng};
+
+    fn place(name: &str, left: u16) -> PicturePlace {
+        PicturePlace { name: name.to_owned(), left, rows: 2, columns: 3 }
+    }
+
+    fn index(left: &(Vec<i64>, Vec<f32>), right: &(Vec<i64>, Vec<f32>)) -> Arc<PictureIndex> {
+        let array = Array::new(2, 7, 1.0, "feet").unwrap();
+        let sources =
+            vec![(place("left", 0), left.0.clone(), &*left.1), (place("right", 4), right.0.clone(), &*right.1)];
+        Arc::new(PictureIndex::new(array, PictureFile::default(), sources))
+    }
+
+    fn drawn(random: &mut StdRng, fractions: bool) -> (Vec<i64>, Vec<f32>) {
+        let mut t = random.random_range(-50_000..50_000_i64);
+        let (mut times, mut values) = (vec![], vec![]);
+        for _ in 0..random.random_range(1..200) {
+            times.push(t);
+            t += if random.random_range(0..20) == 0 { 5_000_000 } else { random.random_range(1..20_000) };
+            for _ in 0..6 {
+                let value = random.random_range(-20..200_i16);
+                values.push(match random.random_range(0..12) {
+                    0 => f32::NAN,
+                    _ if fractions => f32::from(value) * 0.37,
+                    _ => f32::from(value),
+                });
+            }
+        }
+        (times, values)
+    }
+
+    #[test]
+    fn at_any_time_the_last_picture_of_each_source_is_shown_with_its_load() {
+        let mut random = StdRng::seed_from_u64(7);
+        for round in 0..40 {
+            let (left, right) = (drawn(&mut random, round % 2 == 0), drawn(&mut random, round % 2 == 0));
+            let index = index(&left, &right);
+            let shared: Arc<dyn KeyframeIndex> = Arc::new(Arc::clone(&index));
+            let (first, last) = shared.range().unwrap();
+            let mut player = Player::open(Arc::clone(&shared), first, ViewOptions::plain(COLUMN_US)).unwrap();
+            for _ in 0..10 {
+                let t = random.random_range(first..=last);
+                let mut sought = Player::open(Arc::clone(&shared), t, ViewOptions::plain(COLUMN_US)).unwrap();
+                if t >= player.t() {
+                    player.advance(t).unwrap();
+                }
+                let (mut expected, mut sum) = (vec![f32::NAN; 14], 0.0);
+                for ((times, values), offset) in [(&left, 0), (&right, 4)] {
+                    let Some(k) = times.partition_point(|&at| at <= t).checked_sub(1) else { continue };
+                    for cell in 0..6 {
+                        expected[cell / 3 * 7 + offset + cell % 3] = values[6 * k + cell];
+                        sum += values[6 * k + cell].max(0.0);
+                    }
+                }
+                let shown = |player: &Player| -> Vec<f64> {
+                    let value = |ticks: u16| (f64::from(ticks) - f64::from(index.zero)) * index.step;
+                    let held = player.state().held().iter();
+                    held.map(|&ticks| if ticks == UNKNOWN { f64::NAN } else { value(ticks) }).collect()
+                };
+                for one in [&sought].into_iter().chain((player.t() == t).then_some(&player)) {
+                    for (ours, theirs) in shown(one).iter().zip(&expected) {
+                        let near = (ours - f64::from(*theirs)).abs() <= 0.51 * index.step;
+                        assert!(near || ours.is_nan() && theirs.is_nan(), "{ours} {theirs}");
+                    }
+                }
+                sought.state_mut().update_curve();
+                let column = column_of(t, COLUMN_US);
+                let curve = sought.state().time_columns().curve(column);
+                let load = f64::from(curve.sum) * index.step;
+                assert!((load - f64::from(sum)).abs() < 12.0 * index.step, "{load} {sum}");
+                if sought.t() == last {
+                    assert_eq!(shared.time_columns().unwrap().curve(column).sum, curve.sum);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn steps_go_from_picture_to_picture_both_ways() {
+        let left = ((0..9).map(|k| 10_000 * k).collect::<Vec<i64>>(), vec![1.0; 54]);
+        let index = index(&left, &(vec![], vec![]));
+        let shared: Arc<dyn KeyframeIndex> = Arc::new(index);
+        let mut player = Player::open(Arc::clone(&shared), 30_000, ViewOptions::plain(COLUMN_US)).unwrap();
+        assert_eq!((player.last_stamp().unwrap(), player.next_stamp().unwrap()), (Some(20_000), Some(40_000)));
+        assert_eq!(player.state().events(), 4);
+        player.advance(80_000).unwrap();
+        assert_eq!((player.next_stamp().unwrap(), player.state().events()), (None, 9));
+    }
+}

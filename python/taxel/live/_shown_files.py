@@ -1,0 +1,225 @@
+"""The recordings that the panel shows and that are no files of a board's events: read, and handed to its server."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError, ProblemError
+from taxel.array import Array, Places
+from taxel.frames import Frames
+from taxel.recording import Recording
+from taxel.recording.convert import convert
+from taxel.recording.health import health
+from taxel.recording.opening import open_joined
+
+__all__ = ["ReadPictures", "ShownFiles", "side_by_side"]
+
+#: Of a text table of more bytes than this the beginning is shown first, of so many bytes.
+_LARGE, _BEGINNING = 8 << 20, 1 << 19
+_TEXTS = {".csv", ".txt", ".asc", ".asf", ".lst"}
+
+#: Time from one picture to the next, us, where pictures are numbered: a view shows them as 100 a second.
+_PICTURE_US = 10_000
+
+#: Pictures as `_core.PanelRequests.read` returns them.
+ReadPictures = tuple[Any, ...]
+
+_Taxels = list[tuple[int, int]]
+
+
+class ShownFiles:
+    """Read recordings for the panel; the events of tables are written to temporary .mcap files, until `close`."""
+
+    def __init__(self) -> None:
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._lock = threading.Lock()
+        #: The trials of the file with several that was read last, by its path and the time of its last change.
+        self._trials: tuple[tuple[Path, int], list[Recording]] | None = None
+
+    def close(self) -> None:
+        """Remove the temporary files."""
+        with self._lock:
+            if self._folder is not None:
+                self._folder.cleanup()
+                self._folder = None
+
+    def opened(self, path: Path, trial: str | None) -> tuple[Recording, list[str]]:
+        """Return a recording of a file, and the names of its trials if it has several.
+
+        Raises
+        ------
+        FormatError : no recording
+        ProblemError : no trial of that name
+        """
+        key = path, path.stat().st_mtime_ns
+        with self._lock:
+            known = self._trials
+        every = known[1] if known is not None and known[0] == key else open_joined(path)
+        if not every:
+            raise FormatError(f"{path.name}: holds no recording")
+        if len(every) == 1:
+            return every[0], []
+        with self._lock:
+            self._trials = key, every
+        names = [one.name for one in every]
+        if trial is not None and trial not in names:
+            raise ProblemError(f"{path.name}: holds no trial {trial}")
+        return every[0 if trial is None else names.index(trial)], names
+
+    def read(self, path: Path, trial: str | None, *, whole: bool) -> tuple[Path | None, ReadPictures | None]:
+        """Return events as a .mcap, or pictures; arguments are those of `RequestHandler.read`."""
+        beginning = None if whole else self._beginning(path)
+        if beginning is not None:
+            recording, names, left_s = beginning
+        else:
+            (recording, names), left_s = self.opened(path, trial), None
+        if not recording._contents.is_several and recording.has_events:
+            return self._converted(recording), None
+        return None, (*_pictures(recording), recording.name if names else None, names, left_s)
+
+    def health(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
+        """Return the taxels that are dead, stuck and noisy, in the array that is shown, and the number not touched enough."""
+        recording, _ = self.opened(path, trial)
+        frames = {name: one.frames() for name, one in _sources(recording).items()}
+        _, lefts = side_by_side([one.array for one in frames.values()])
+        found: dict[str, _Taxels] = {"dead": [], "stuck": [], "noisy": []}
+        untold = 0
+        for left, one in zip(lefts, frames.values(), strict=True):
+            judged = health(one)
+            untold += int(np.count_nonzero(judged.untold))
+            for kind, places in judged.named().items():
+                if kind in found:
+                    found[kind] += [(x + left, y) for x, y in places]
+        return found["dead"], found["stuck"], found["noisy"], untold
+
+    def _temporary(self) -> Path:
+        with self._lock:
+            if self._folder is None:
+                self._folder = tempfile.TemporaryDirectory(prefix="taxel-panel-")
+            return Path(tempfile.mkdtemp(dir=self._folder.name))
+
+    def _converted(self, recording: Recording) -> Path:
+        place = self._temporary() / f"{recording.path.stem}.mcap"
+        convert(recording, place)
+        return place
+
+    def _beginning(self, path: Path) -> tuple[Recording, list[str], float] | None:
+        """Return the beginning of a large text table, and how long the rest takes to read (s); None of any other file.
+
+        Reading takes as long for each line, so the time of the beginning tells that of all.
+        """
+        size = path.stat().st_size
+        if path.suffix.lower() not in _TEXTS or size <= _LARGE:
+            return None
+        with path.open("rb") as file:
+            head = file.read(_BEGINNING)
+        place = self._temporary() / path.name
+        place.write_bytes(head[: head.rfind(b"\n") + 1])
+        begun = time.perf_counter()
+        try:
+            every = open_joined(place)
+        except (FormatError, OSError):
+            # A format whose files have no beginning of their own.
+            return None
+        finally:
+            os.unlink(place)
+        if len(every) != 1:
+            return None
+        taken = time.perf_counter() - begun
+        return every[0], [], taken * size / max(1, len(head))
+
+
+def _sources(recording: Recording) -> dict[str, Recording]:
+    """Return the sensors of a recording of pictures: its sources, or itself."""
+    several = recording._contents.is_several
+    every = recording.sources if several else {recording.label or "board": recording}
+    return {name: one for name, one in every.items() if not one.has_events and not one.is_stream} if several else every
+
+
+def _pictures(recording: Recording) -> tuple[Any, ...]:
+    """Return array, sources, unit, distance of numbered pictures, remarks and verdict for the panel's server."""
+    sources = _sources(recording)
+    frames = {name: _in_its_unit(one) for name, one in sources.items()}
+    units = {one.unit for one in frames.values()}
+    if len(units) > 1:
+        raise ProblemError(f"{recording.path}: its sources are in {', '.join(sorted(units))}; must be in one unit")
+    array, lefts = side_by_side([one.array for one in frames.values()])
+    us = 1 if recording.timed else _PICTURE_US
+    parts = [
+        (name, left, one.array.rows, one.array.columns, _times(one.t, us), _values(one))
+        for (name, one), left in zip(frames.items(), lefts, strict=True)
+    ]
+    notes = {(note.t, note.text) for one in sources.values() for note in one.notes}
+    notes -= {(row.t, row.text) for row in _labels_beside(recording)}
+    found = [(d.label, d.t, d.known) for one in sources.values() for d in one.detections]
+    remarks = json.dumps([sorted(notes, key=lambda note: (note[0] or 0, note[1])), found])
+    return array._parts(), parts, units.pop(), None if us == 1 else us, remarks, recording.verdict
+
+
+def _labels_beside(recording: Recording) -> tuple[Any, ...]:
+    """Return the labels of the table beside a file, which the panel shows as such and not as notes."""
+    from taxel.labels import Labels, beside  # noqa: PLC0415  only here
+
+    table = beside(recording.path)
+    return Labels(table).rows if table.is_file() else ()
+
+
+def _in_its_unit(recording: Recording) -> Frames:
+    """Return pictures in N or kPa where a calibration gives it, else in the file's unit."""
+    return recording.frames() if recording.calibration is None else recording.calibrated()
+
+
+def _times(t: NDArray[np.int64], us: int) -> NDArray[np.int64]:
+    return np.ascontiguousarray(t * us)
+
+
+def _values(frames: Frames) -> NDArray[np.float32]:
+    return np.ascontiguousarray(frames.values).reshape(-1)
+
+
+def side_by_side(arrays: list[Array]) -> tuple[Array, list[int]]:
+    """Return one array that holds arrays side by side, with an empty column between, and the first column of each."""
+    if len(arrays) == 1:
+        return arrays[0], [0]
+    rows, lefts, columns = max(one.rows for one in arrays), [], 0
+    for one in arrays:
+        lefts.append(columns)
+        columns += one.columns + 1
+    exists = np.zeros((rows, columns - 1), bool)
+    for left, one in zip(lefts, arrays, strict=True):
+        exists[: one.rows, left : left + one.columns] = True if one.exists is None else one.exists
+    pitches = {one.pitch_mm for one in arrays}
+    name = arrays[0].name if len({one.name for one in arrays}) == 1 else ", ".join(one.name for one in arrays)
+    more: dict[str, Any] = {"pitch_mm": pitches.pop()} if len(pitches) == 1 else {}
+    more |= {"places": _places_beside(arrays, lefts, exists)}
+    return Array(rows, columns - 1, exists=exists, name=name, **more), lefts
+
+
+def _places_beside(arrays: list[Array], lefts: list[int], exists: NDArray[np.bool_]) -> Places | None:
+    """Return the places of arrays side by side, a fifth of a width apart; None unless all have them in one unit."""
+    every = [one.places for one in arrays]
+    places = [one for one in every if one is not None]
+    if len(places) < len(arrays) or len({one.unit for one in places}) > 1:
+        return None
+    x, y, area = np.zeros(exists.shape), np.zeros(exists.shape), np.ones(exists.shape)
+    right = 0.0
+    for array, left, one in zip(arrays, lefts, places, strict=True):
+        at = np.s_[: array.rows, left : left + array.columns]
+        there = exists[at]
+        own = one.x.reshape(array.shape)
+        least, most = float(own[there].min()), float(own[there].max())
+        x[at], y[at] = own - least + right, one.y.reshape(array.shape)
+        right += 1.2 * (most - least)
+        if one.area is not None:
+            area[at] = one.area.reshape(array.shape)
+    known = all(one.area is not None for one in places)
+    return Places(x, y, area if known else None, places[0].unit)

@@ -1,0 +1,279 @@
+"""Pictures in a .mcap: to the last bit, by the official reader, of one sensor and of two feet; and without times."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats.making import write_gaitpdb, write_icub, write_moticon, write_pedar
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from shell import call
+
+import taxel
+from taxel import Array, Frames, Note, ProblemError, SpikeTrains
+from taxel.detect import Example, Part, Recipe, judge
+from taxel.detect.folds import _split
+from taxel.encode import LevelCrossing
+from taxel.recording.contents import Contents
+from taxel.recording.opening import joined, open_joined
+
+WHOLE = st.integers(0, 65_535).map(float)
+ANY = st.one_of(WHOLE, st.floats(width=32, allow_nan=True), st.sampled_from([-0.0, 65_536.0, float("inf")]))
+
+
+@st.composite
+def pictures(draw: st.DrawFn) -> Frames:
+    rows, columns, n = draw(st.integers(1, 4)), draw(st.integers(1, 5)), draw(st.integers(0, 6))
+    cells = draw(
+        st.lists(draw(st.sampled_from([WHOLE, ANY])), min_size=n * rows * columns, max_size=n * rows * columns)
+    )
+    t = sorted(draw(st.sets(st.integers(-(2**52), 2**52), min_size=n, max_size=n)))
+    exists = draw(st.none() | st.just(np.arange(rows * columns).reshape(rows, columns) % 3 > 0))
+    array = Array(rows, columns, 2.5, None if exists is None or not exists.any() else exists, name="mat")
+    return Frames(
+        np.array(cells, np.float32).reshape(n, rows, columns),
+        t,
+        unit=draw(st.sampled_from(["kPa", "a.u."])),
+        array=array,
+    )
+
+
+def bits(frames: Frames) -> np.ndarray:
+    return frames.values.view(np.uint32)
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@given(frames=pictures())
+def test_a_mcap_gives_pictures_back_to_the_last_bit(tmp_path: Path, frames: Frames) -> None:
+    place = tmp_path / "a.mcap"
+    assert taxel.convert(frames, place, overwrite=True) == []
+    recording = taxel.open(place)
+    back = recording.frames()
+    assert (back.unit, back.array.name, back.array.shape) == (frames.unit, "mat", frames.array.shape)
+    assert (back.array.exists is None) == (frames.array.exists is None)
+    assert np.array_equal(back.t, frames.t)
+    assert np.array_equal(bits(back), bits(frames))
+    assert recording.timed
+    assert recording.verdict == "nothing lost"
+
+
+def decoded(place: Path) -> list[tuple[str, dict[str, str], int, object]]:
+    """Return topic, metadata of the channel, time in the file and message of all pictures, by the official reader."""
+    found = []
+    with place.open("rb") as file:
+        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+            if not channel.topic.startswith("/pictures/"):
+                continue
+            assert (schema.name, schema.encoding, channel.message_encoding) == (
+                "foxglove.RawImage",
+                "protobuf",
+                "protobuf",
+            )
+            files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
+            pool = descriptor_pool.DescriptorPool()
+            for one in files.file:
+                pool.Add(one)
+            image = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name)).FromString(message.data)
+            found.append((channel.topic, channel.metadata, message.log_time, image))
+    return found
+
+
+def test_the_official_reader_decodes_every_picture(tmp_path: Path) -> None:
+    cases = {
+        "whole": ("16UC1", "<u2", [[0, 1, 2], [3, 65_535, 5]]),
+        "gone": ("32FC1", "<f4", [[0, np.nan, 2.5], [3, 4, -5]]),
+    }
+    for name, (encoding, dtype, values) in cases.items():
+        place, t = tmp_path / f"{name}.mcap", [-1_500_001, 7, 20_000_000]
+        frames = Frames(np.array([values] * 3), t, unit="kPa", array=Array(2, 3, 5.0, name="mat"))
+        taxel.convert(frames, place)
+        found = decoded(place)
+        assert [log for _, _, log, _ in found] == [0, 1_500_008_000, 21_500_001_000]
+        for (topic, metadata, _, image), at in zip(found, t, strict=True):
+            assert topic == "/pictures/board"
+            assert (metadata["unit"], metadata["source"], metadata["clock"]) == ("kPa", "board", "true")
+            assert json.loads(metadata["array"])["columns"] == 3
+            assert (image.width, image.height, image.encoding, image.step) == (
+                3,
+                2,
+                encoding,
+                3 * np.dtype(dtype).itemsize,
+            )
+            assert image.timestamp.seconds * 1_000_000 + image.timestamp.nanos // 1000 == at
+            cells = np.frombuffer(image.data, dtype).reshape(2, 3)
+            assert np.array_equal(cells, values, equal_nan=True)
+
+
+def test_everything_beside_the_pictures_is_kept(tmp_path: Path) -> None:
+    array = Array(1, 2, name="channels")
+    frames = Frames([[[1.0, 2.5]], [[3.0, 4.0]]], [0, 10_000], unit="N", array=array)
+    of = Contents(
+        tmp_path / "a", "a", "npz", array, source="an amplifier", frames=frames,
+        notes=(Note("heel", 5000), Note("bare")), detections=taxel.Detections(["lift"], [100], [200]),
+        columns=("hip", "knee"), lost=("something",),
+    )  # fmt: skip
+    lost = taxel.convert(taxel.Recording(of), tmp_path / "a.mcap")
+    assert lost == ["something"]
+    back = taxel.open(tmp_path / "a.mcap")
+    assert back.frames() == frames
+    assert [(note.text, note.t) for note in back.notes] == [("heel", 5000), ("bare", None)]
+    assert (back.detections, back.columns, back.lost) == (of.detections, ["hip", "knee"], ("something",))
+    assert (back.source, back.verdict) == (
+        "an amplifier",
+        "converted from a recording that says: the .npz does not say what was lost",
+    )
+    assert not back.truncated
+
+
+def test_pictures_of_events_say_that_the_datagrams_are_left(tmp_path: Path) -> None:
+    events = taxel.Events([0, 30_000], [1, 2], [0, 0], [True, True], array=Array(1, 4), intensity=[10, 40])
+    taxel.convert(events, tmp_path / "events.mcap")
+    lost = taxel.convert(tmp_path / "events.mcap", tmp_path / "pictures.mcap", frames_hz=100)
+    assert lost == ["raw datagrams with their arrival times"]
+    back = taxel.open(tmp_path / "pictures.mcap")
+    assert back.frames() == taxel.open(tmp_path / "events.mcap").frames(100)
+
+
+def test_encoders_find_the_same_in_a_mcap_as_in_its_source(tmp_path: Path) -> None:
+    draw = np.random.default_rng(3)
+    frames = Frames(
+        draw.random((80, 2, 3)).astype(np.float32) * 9, np.arange(80) * 10_000 + 3, unit="kPa", array=Array(2, 3)
+    )
+    taxel.convert(frames, tmp_path / "a.mcap")
+    encoder = LevelCrossing([2.0, 5.0])
+    assert encoder.encode(taxel.open(tmp_path / "a.mcap")) == encoder.encode(frames)
+
+
+@pytest.mark.parametrize("make", [write_pedar, write_gaitpdb, write_moticon])
+def test_both_feet_of_a_file_become_sources_left_and_right(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], make: Callable[[Path], Path]
+) -> None:
+    file = make(tmp_path)
+    file = next(tmp_path.iterdir()) if file.is_dir() else file
+    trials = taxel.open(file)
+    assert [one.name.rsplit(" ")[-1] for one in trials] == ["left", "right"]
+    assert call(capsys, "convert", file, tmp_path / "both.mcap")[0] == 0
+    both = taxel.open(tmp_path / "both.mcap")
+    assert list(both.sources) == ["left", "right"]
+    with pytest.raises(ProblemError, match="holds 2 sources \\(left, right\\)"):
+        both.frames()
+    for one, label in zip(trials, ("left", "right"), strict=True):
+        source = both.sources[label]
+        assert source.frames() == one.frames()
+        assert np.array_equal(bits(source.frames()), bits(one.frames()))
+        assert [(note.text, note.t) for note in source.notes] == [(note.text, note.t) for note in one.notes]
+        assert (source.name, source.title) == (f"both.mcap {label}", f"{tmp_path / 'both.mcap'} {label}")
+        assert not source.truncated
+    # The feet are interleaved by time in the file, and a cut of both is one of each.
+    topics = [topic for topic, _, _, _ in decoded(tmp_path / "both.mcap")]
+    assert set(topics) == {"/pictures/left", "/pictures/right"}
+    stop = int(trials[0].frames().t[len(trials[0].frames()) // 2])
+    [half] = taxel.cut(both, stop_us=stop)
+    taxel.convert(half, tmp_path / "half.mcap")
+    left = taxel.open(tmp_path / "half.mcap").sources["left"]
+    assert left.frames() == trials[0].frames().between(-np.inf, stop)
+
+
+def test_labels_are_of_one_source_or_of_all(tmp_path: Path) -> None:
+    array = Array(1, 2)
+    frames = Frames(np.ones((5, 1, 2)), np.arange(5) * 10_000, unit="N", array=array)
+    sources: dict[str, Contents] = {}
+    for foot in ("left", "right"):
+        sources[foot] = Contents(tmp_path / "walk.asc", f"walk {foot}", "pedar", array, label=foot, frames=frames)
+    [both] = joined([taxel.Recording(one) for one in sources.values()])
+    taxel.convert(both, tmp_path / "walk.mcap")
+    (tmp_path / "walk.notes.csv").write_text("label,t_us,source\nheel,10000,left\nturn,20000,\ntoe,30000,right\n")
+    back = taxel.open(tmp_path / "walk.mcap")
+    said = {name: [note.text for note in one.notes] for name, one in back.sources.items()}
+    assert said == {"left": ["heel", "turn"], "right": ["turn", "toe"]}
+    labels = taxel.Labels(tmp_path / "walk.notes.csv")
+    assert sorted(labels.of(back.sources["right"])) == ["toe", "turn"]
+
+
+def test_labels_of_a_source_that_is_not_there_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    frames = Frames(np.ones((50, 1, 2)), np.arange(50) * 10_000, unit="N", array=Array(1, 2))
+    taxel.convert(frames, tmp_path / "a.mcap")
+    (tmp_path / "labels.csv").write_text("label,t_us,source\nheel,10000,left\n")
+    labels = tmp_path / "labels.csv"
+    code, _, said = call(capsys, "train", tmp_path / "a.mcap", "--labels", labels, "-o", tmp_path / "r.json")
+    assert code == 2
+    assert "heel at 10000 us is of source left; there is board" in said
+
+
+# without times
+
+
+def test_pictures_without_times_say_so_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = write_icub(tmp_path)
+    file = file if file.is_file() else next(tmp_path.iterdir())
+    opened = taxel.open(file)
+    assert not any(one.timed for one in opened)
+    assert call(capsys, "convert", file, tmp_path / "out")[0] == 0
+    for ending in (".npz", ".h5", ".mcap"):
+        taxel.convert(opened[0], tmp_path / f"one{ending}")
+        assert not taxel.open(tmp_path / f"one{ending}").timed
+    assert "that its pictures have no times" in taxel.convert(opened[0], tmp_path / "one.csv")
+    one = taxel.open(tmp_path / "one.mcap")
+    assert decoded(tmp_path / "one.mcap")[0][1]["clock"] == "false"
+    with pytest.raises(ProblemError, match="its pictures have no times; say how many there are a second: --rate-hz"):
+        LevelCrossing([100.0]).encode(one)
+    with pytest.raises(ProblemError, match="have no rate"):
+        one.frames(50)
+    code, said, _ = call(capsys, "info", tmp_path / "one.mcap")
+    assert code == 0
+    assert "pictures are numbered" in said
+    assert " s)" not in said
+    assert "pictures/s" not in said
+    timed = one.at_rate(40)
+    assert timed.timed
+    assert timed.frames().t.tolist() == [25_000 * k for k in range(len(one.frames()))]
+    assert len(LevelCrossing([100.0]).encode(timed))
+    with pytest.raises(ProblemError, match="has times of its own"):
+        timed.at_rate(40)
+    spikes = tmp_path / "spikes.npz"
+    encode = ["encode", tmp_path / "one.mcap", spikes, "--encoder", "level_crossing", "--set", "levels=[100]"]
+    assert "--rate-hz" in call(capsys, *encode)[2]
+    assert call(capsys, *encode, "--rate-hz", "40")[0] == 0
+
+
+def test_a_folder_of_many_trials_becomes_a_folder_of_recordings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, out = tmp_path / "source", tmp_path / "out"
+    source.mkdir()
+    write_pedar(source)
+    write_pedar(source).rename(source / "again.asc")
+    write_pedar(source)
+    assert call(capsys, "convert", source, out)[0] == 0
+    names = sorted(file.name for file in out.iterdir())
+    assert len(names) == len(open_joined(source)) == 2
+    assert "again.mcap" in names
+    assert list(taxel.open(out / "again.mcap").sources) == ["left", "right"]
+
+
+def test_the_feet_of_one_recording_share_a_fold() -> None:
+    def example(group: str, shift: int) -> Example:
+        times = [100_000 * k + shift for k in range(1, 9)]
+        spikes = SpikeTrains.from_lists([[t / 1000 - 2 for t in times]], stop=1000.0)
+        return Example(spikes, {"contact": times}, None, group)
+
+    walks = [example(group, shift) for group in ("a", "b", "") for shift in (0, 30_000)]
+    recipe = Recipe(LevelCrossing([1.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
+    found = judge(walks, recipe, 4)
+    assert found.how == "whole recordings, 4 folds"
+    with pytest.raises(ProblemError, match="must be 2 to 4, the number of recordings"):
+        judge(walks, recipe, 5)
+    for fold in _split(walks, [Part(n) for n in range(6)], 4):
+        train, test = ({walks[one.example].group for one in parts} - {""} for parts in (fold.train, fold.test))
+        assert not train & test
+    # The two feet of one walk: the same stretches of time of both.
+    for fold in _split(walks[:2], [Part(0), Part(1)], 3):
+        assert len(fold.test) == 2
+        assert fold.test[0][1:] == fold.test[1][1:]
+        assert {one.example for one in fold.train} == {0, 1}
