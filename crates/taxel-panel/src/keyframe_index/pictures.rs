@@ -317,6 +317,7 @@ impl KeyframeIndex for Arc<PictureIndex> {
             events: cursor.iter().map(|&next| next as u64).sum(),
             held: held.clone(),
             rest: vec![self.zero; self.array.len()],
+            tracked: None,
         };
         Ok((keyframe, Box::new(PictureChanges { index: Arc::clone(self), cursor, held })))
     }
