@@ -228,7 +228,7 @@ def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int] 
     >>> place.read_text()
     'label,t_us\ncontact,400\nlift,900\n'
     """
-    rows = sorted((tuple(row) for row in labels), key=lambda row: row[1])
+    rows: list[tuple[Any, ...]] = sorted(labels, key=lambda row: row[1])
     of_sources = any(row[2:] > ("",) for row in rows)
     columns = (*_WANTED, "source") if of_sources else _WANTED
     with whole_file(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:

@@ -184,10 +184,13 @@ type SourceIn<'py> = (String, u16, u16, u16, PyReadonlyArray1<'py, i64>, PyReado
 type PicturesIn<'py> =
     (ArrayParts, Vec<SourceIn<'py>>, String, Option<i64>, String, String, Option<String>, Vec<String>, Option<f64>);
 
+/// Notes (time, text) and detections (label, time, known) of pictures.
+type RemarksIn = (Vec<(Option<i64>, String)>, Vec<(String, i64, i64)>);
+
 fn to_index(py: Python<'_>, pictures: PicturesIn<'_>) -> PyResult<PictureIndex> {
     let (array, sources, unit, picture_us, remarks, verdict, trial, trials, left_s) = pictures;
     let array = to_array(array)?;
-    let (notes, detections): (Vec<(Option<i64>, String)>, Vec<(String, i64, i64)>) = parsed("remarks", &remarks)?;
+    let (notes, detections): RemarksIn = parsed("remarks", &remarks)?;
     let remarks = Remarks {
         notes: notes.into_iter().map(|(t_us, text)| Note { at_ns: 0, t_us, text }).collect(),
         detections: detections

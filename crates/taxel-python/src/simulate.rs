@@ -150,6 +150,7 @@ fn play<'py>(
 }
 
 /// The touch of an emulated board, as Python passes it.
+#[expect(clippy::large_enum_variant, reason = "there is one by call")]
 #[derive(FromPyObject)]
 enum TouchIn<'py> {
     /// Events and the speed at which they are played.

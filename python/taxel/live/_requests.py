@@ -23,6 +23,7 @@ from taxel._base.files import whole_file
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import load, run
+from taxel.detections import Detection
 from taxel.device import Cable
 from taxel.labels import Labels, write_labels
 from taxel.live._shown_files import ReadPictures, ShownFiles
@@ -273,7 +274,7 @@ class RequestHandler:
         with _reasons():
             loaded = load(readout)
             opened, _ = self._files.opened(recording, None)
-            found = []
+            found: list[Detection] = []
             for one in sensors(opened):
                 registers = one.registers
                 frame_us = None if registers is None else registers.frame_us

@@ -87,7 +87,7 @@ class ShownFiles:
         return None, (*_pictures(recording), recording.name if names else None, names, left_s)
 
     def health(self, path: Path, trial: str | None) -> tuple[_Taxels, _Taxels, _Taxels, int]:
-        """Return the taxels that are dead, stuck and noisy, in the array that is shown, and the number not touched enough."""
+        """Return the taxels that are dead, stuck, noisy, in the array that is shown, and how many cannot be judged."""
         recording, _ = self.opened(path, trial)
         frames = {name: one.frames() for name, one in _sources(recording).items()}
         _, lefts = side_by_side([one.array for one in frames.values()])

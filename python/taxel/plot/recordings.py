@@ -14,6 +14,7 @@ from taxel.frames import Frames
 from taxel.plot.nouns import axes
 from taxel.recording import Health, Recording, health
 from taxel.recording.pressure import Series
+from taxel.recording.rest import Rest
 
 __all__ = ["health_map", "overview", "pressure"]
 
@@ -118,7 +119,8 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
     >>> [ax.get_ylabel() for ax in pressure(frames).axes]
     ['contact area (mm2)', 'peak (kPa)', 'sum (kPa)', 'centre (mm)']
     """
-    of = Series.of(instance("frames", frames, Frames), above)
+    nowhere = np.full(instance("frames", frames, Frames).array.rows * frames.array.columns, np.nan)
+    of = Series.of(frames, above, Rest("none", nowhere))
     if figure is None:
         figure = plt.figure(figsize=(11, 6), layout="constrained")
     curves = [(f"peak ({of.unit})", of.peak), (f"sum ({of.unit})", of.total)]

@@ -262,16 +262,16 @@ def above_rest(recording: Recording, tare: Tare | None = None) -> tuple[Frames, 
         return Frames(of._values(frames.values, values), frames.t, unit=of.unit, array=frames.array), 0.0, rest
     if recording.has_events:
         drawn = _Drawn.of(recording)
-        values = np.zeros((len(frames), frames.array.rows * frames.array.columns), np.float32)
+        shown = np.zeros((len(frames), frames.array.rows * frames.array.columns), np.float32)
         for first, over in drawn.above(replace(rest, values=rest.values.reshape(-1)[drawn.taxels])):
-            values[first : first + len(over), drawn.taxels] = over
+            shown[first : first + len(over), drawn.taxels] = over
     elif rest.source in ("unit", "none"):
         return frames, 0.0, rest
     else:
         pictures = [(frames.t, frames.values.reshape(len(frames), -1))]
-        [(_, values)] = _above(rest, pictures, frames.array.columns, ticks_by_unit(frames))
+        [(_, shown)] = _above(rest, pictures, frames.array.columns, ticks_by_unit(frames))
     shape = len(frames), *frames.array.shape
-    return Frames(values.reshape(shape), frames.t, unit=frames.unit, array=frames.array), floor, rest
+    return Frames(shown.reshape(shape), frames.t, unit=frames.unit, array=frames.array), floor, rest
 
 
 def readings(recording: Recording, tare: Tare | None = None) -> tuple[Frames, Rest, float] | None:

@@ -133,10 +133,10 @@ def _mcap(of: Contents, ending: str, common: dict[str, Any]) -> Contents:
         whole = "raw datagrams with their arrival times"
         lines = [whole] if of.holds("datagrams") else ["arrival times"] * of.holds("clock")
         lines += ["raw bytes (words that are no events)"] * of.holds("payload")
-        same = {name: vars(of)[name] for name in ("frames", "label")}
+        held = {name: vars(of)[name] for name in ("frames", "label")}
         none = {"events": None, "clock": None, "datagrams": None, "payload": None}
         made = {"version_2": False, "differences": False, "origin_us": 0, "unmarked": ()}
-        changed = common | changed | same | none | made
+        changed = common | changed | held | none | made
         return after(ending, of, lambda: [*lines, *_mended(of), *_left_beside(of, place)], **changed)
     events = _events(of, place)
     changed |= {"events": once(lambda: events), "frames": None, "payload": None}

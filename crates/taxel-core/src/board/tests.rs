@@ -108,10 +108,10 @@ fn drawn(word: &mut u16, lines: u16) -> Vec<u16> {
     for k in 0..usize::from(lines) - 1 {
         for _ in 0..16 {
             let taps = [0, 2, 3, 5].map(|bit| *word >> bit & 1);
-            *word = *word >> 1 | taps.iter().sum::<u16>() % 2 << 15;
+            *word = (*word >> 1) | ((taps.iter().sum::<u16>() % 2) << 15);
         }
         let left = usize::from(lines) - k;
-        order.swap(k, k + (usize::from(*word) * left >> 16));
+        order.swap(k, k + ((usize::from(*word) * left) >> 16));
     }
     order
 }

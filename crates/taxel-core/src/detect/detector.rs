@@ -9,6 +9,7 @@ use crate::{Array, EventsView, FramesView, Result, Stop, problem};
 pub(super) const SILENCE_US: i64 = 1_000_000;
 
 /// A readout or a plain rule.
+#[expect(clippy::large_enum_variant, reason = "there is one by pipeline, moved once")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Detector {
     /// Trained neurons.

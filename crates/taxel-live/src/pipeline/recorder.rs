@@ -55,7 +55,7 @@ enum Clock {
 enum RecordingFile {
     Mcap(Box<Writer>),
     /// A part of another pipeline's recording.
-    Track(Track),
+    Track(Box<Track>),
     /// The lock is needed for the borrow only: one thread writes.
     Lsa(Mutex<LsaWriter>),
 }
@@ -123,7 +123,7 @@ impl Recorder {
         let track = self.track_of(&host.name)?;
         let part = Self::join(host, &self.record, options, place);
         Ok(Self {
-            file: OnceLock::from(RecordingFile::Track(track)),
+            file: OnceLock::from(RecordingFile::Track(Box::new(track))),
             since: Some(Box::default()),
             clock: Mutex::new(Clock::Unknown),
             ..part
@@ -262,7 +262,7 @@ impl Recorder {
     /// Begins the file that was reserved, or this part in the file of the host.
     fn create_file(&self, reserved: Option<OutputFile>) -> Result<RecordingFile> {
         if let Some(host) = &self.host {
-            return Ok(RecordingFile::Track(host.open()?));
+            return Ok(RecordingFile::Track(Box::new(host.open()?)));
         }
         let path = &self.record.path;
         let file = reserved.ok_or_else(|| problem!("{}: could not be begun", path.display()))?;

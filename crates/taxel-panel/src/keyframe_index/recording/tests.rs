@@ -93,7 +93,7 @@ fn decode_all(index: &Arc<RecordingIndex>) -> Vec<Change> {
 /// Raster and curves of a picture, and of which columns they are.
 fn shown(player: &mut Player, us: i64) -> (std::ops::Range<i64>, Vec<u8>, Vec<u8>) {
     let about = About { flags: 0, number: 0, from: i64::MIN, with_rest: false, watched: Some(WATCHED), column_us: us };
-    let (bytes, _) = of_player(player, about);
+    let (bytes, _) = of_player(player, None, about);
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let section = |k: usize| bytes[word(64 + 8 * k)..][..word(68 + 8 * k)].to_vec();
     let first = i64::from_le_bytes(bytes[48..56].try_into().unwrap());
