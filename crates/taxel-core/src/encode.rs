@@ -4,7 +4,6 @@ mod blocks;
 mod bracket;
 mod by_stamp;
 mod channels;
-mod composite;
 mod fields;
 mod law;
 mod loaded;
@@ -17,14 +16,16 @@ mod recent;
 mod receptor;
 mod running_range;
 mod sampled;
+mod side_by_side;
 mod slow;
 mod stream;
 mod tare;
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-pub use composite::Composite;
 pub use local_load::LargestSum;
 pub use pieces::Pieces;
 pub use quantity::Quantity;
@@ -33,6 +34,7 @@ pub use stream::Stream;
 pub use tare::{Tare, TareBuilder, Zeroing};
 
 use law::Law;
+use side_by_side::SideBySide;
 use stream::{spikes_of_events, spikes_of_frames};
 
 use crate::parameters::Described;
@@ -224,4 +226,102 @@ impl Encoder {
 fn collect(stream: &dyn Stream, out: &[Spike], first: Option<i64>, end: Option<f64>) -> Result<SpikeTrains> {
     let start = first.map_or(0.0, ms);
     SpikeTrains::from_spikes(out, stream.trains(), stream.kind(), start, end.unwrap_or(start))
+}
+
+/// Encoders side by side: first all trains of the part whose name comes first, then those of the next.
+///
+/// Signed trains of a part are split by sign, all ON, then all OFF. If a part is graded, the whole is, and the spikes of
+/// the others have the value 1. The latency is the largest of a part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Composite {
+    /// The encoders by name.
+    pub parts: BTreeMap<String, Encoder>,
+}
+
+impl Composite {
+    /// The parts with these names, in the order of all parts; no name stands for all of them.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` if there is no such part, or if a name comes twice.
+    pub fn named(&self, names: &[String]) -> Result<Vec<(&str, &Encoder)>> {
+        for (n, name) in names.iter().enumerate() {
+            if !self.parts.contains_key(name) {
+                let known: Vec<&str> = self.parts.keys().map(String::as_str).collect();
+                return Err(problem!("inputs: no encoder {name:?}: there are {}", known.join(", ")));
+            }
+            if names[..n].contains(name) {
+                return Err(problem!("inputs: {name:?} comes twice"));
+            }
+        }
+        let chosen = |name: &str| names.is_empty() || names.iter().any(|one| one == name);
+        Ok(self.parts.iter().map(|(name, part)| (name.as_str(), part)).filter(|(name, _)| chosen(name)).collect())
+    }
+
+    /// Whether each train of the whole is one of the parts with these names.
+    ///
+    /// # Errors
+    ///
+    /// As [`Composite::named`].
+    pub fn of_parts(&self, names: &[String], array: &Array) -> Result<Vec<bool>> {
+        let named = self.named(names)?;
+        let chosen = |name: &str| named.iter().any(|(one, _)| *one == name);
+        let parts = self.parts.iter();
+        Ok(parts.flat_map(|(name, part)| std::iter::repeat_n(chosen(name), inputs(part, array))).collect())
+    }
+}
+
+/// The inputs of a neuron that a part's trains are.
+fn inputs(part: &Encoder, array: &Array) -> usize {
+    part.trains(array) * part.kind().inputs_per_train()
+}
+
+impl Law for Composite {
+    fn described() -> Described {
+        Described::by(&Self { parts: BTreeMap::new() }, &["parts"], &[])
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.parts.is_empty() {
+            return Err(problem!("composite: parts is empty: must be encoders by name, one or more"));
+        }
+        for (name, part) in &self.parts {
+            if name.trim().is_empty() {
+                return Err(problem!("composite: a part without a name: must have one"));
+            }
+            if matches!(part, Encoder::Composite(_)) {
+                return Err(problem!("composite: {name} is a composite itself: must be another encoder"));
+            }
+            part.check().map_err(|error| error.of(name))?;
+        }
+        Ok(())
+    }
+
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let mut trains = 0;
+        let mut parts = vec![];
+        for (name, part) in &self.parts {
+            parts.push((trains, part.stream(array).map_err(|error| error.of(name))?));
+            trains += inputs(part, array);
+        }
+        Ok(Box::new(SideBySide::new(parts, trains, self.kind())))
+    }
+
+    fn trains(&self, array: &Array) -> usize {
+        self.parts.values().map(|part| inputs(part, array)).sum()
+    }
+
+    fn kind(&self) -> SpikeKind {
+        let graded = self.parts.values().any(|part| part.kind() == SpikeKind::Graded);
+        if graded { SpikeKind::Graded } else { SpikeKind::Unsigned }
+    }
+
+    fn latency_ms(&self) -> f64 {
+        self.parts.values().map(Encoder::latency_ms).fold(0.0, f64::max)
+    }
+
+    fn set_tare(&mut self, tare: &Tare) {
+        self.parts.values_mut().for_each(|part| part.law_mut().set_tare(tare));
+    }
 }

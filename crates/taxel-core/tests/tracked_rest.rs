@@ -90,7 +90,8 @@ fn a_taxel_without_a_value_has_no_rest_and_its_first_value_is_one() {
     let above = sampled(&mut rest, 21, 2, |_, taxel| if touched(taxel) { 94.0 } else { 50.0 });
     assert!((39.0..=40.0).contains(&above[28]), "{}", above[28]);
     // A value that is missing for a while is none of a load.
-    assert_eq!(sampled(&mut rest, 23, 2, |_, _| f32::NAN)[28], 0.0);
+    let above = sampled(&mut rest, 23, 2, |_, _| f32::NAN)[28];
+    assert!(above.abs() < 0.05, "{above}");
 }
 
 #[test]

@@ -9,9 +9,9 @@ use taxel_core::problem;
 use taxel_live::Result;
 use taxel_live::locked::lock;
 
+use super::indexed::Indexed;
 use super::keyframe_index::pictures::PictureIndex;
 use super::keyframe_index::recording::RecordingIndex;
-use super::opening::Indexed;
 
 /// Maximum number of recordings in a list.
 const MOST_LISTED: usize = 1000;

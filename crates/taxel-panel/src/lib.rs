@@ -13,6 +13,7 @@ mod encoded_spikes;
 mod folder;
 mod handler;
 mod hub;
+mod indexed;
 mod keyframe_index;
 mod labels;
 mod limits;

@@ -21,9 +21,9 @@ export class Lanes {
     /** @type {Map<Name, uPlot>} */
     this.plots = new Map();
     this.limits = { rows: 64, columns: 64 };
-    /** Times from the left edge of the window, s, and curves at them. @type {Record<Name, [number[], ...Curve[]]>} */
     /** Size of a tick in the unit of the values, and ticks of the value 0. */
     this.values = { step: 1, zero: 0 };
+    /** Times from the left edge of the window, s, and curves at them. @type {Record<Name, [number[], ...Curve[]]>} */
     this.data = { taxel: [[], [], [], []], force: [[], [], []], centre: [[], [], []] };
     /** The length of the window, s, and where the axis has numbers, s from its left edge. */
     this.span_s = 1;
