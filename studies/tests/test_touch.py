@@ -62,7 +62,7 @@ def test_the_best_rule_is_the_feature_that_differs() -> None:
     def felt(peak: float) -> taxel.Frames:
         values = np.full((1, 4, 4), 10.0)
         values[0, 0, 0] = peak
-        return taxel.Frames(values, [0], unit="ticks")
+        return taxel.Frames(values, [0], unit="ticks", array=taxel.Array(4, 4, 1.0))
 
     rng = np.random.default_rng(2)
     kinds = np.arange(40) % 2

@@ -5,7 +5,7 @@ import numpy as np
 from taxel import Array, Events, Frames, Tare
 
 #: The array for the laws that every encoder must satisfy.
-ARRAY = Array(3, 4)
+ARRAY = Array(3, 4, pitch_mm=1.0)
 
 
 def spikes_of(trains):

@@ -284,14 +284,14 @@ def test_permuted_taxels_give_permuted_trains(encoder):
 def test_an_array_that_is_turned_gives_the_same_trains_as_they_stand_then(encoder):
     rng = np.random.default_rng(13)
     pictures, t = wander(rng, 200, 12).reshape(200, 3, 4), np.arange(200) * 200
-    plain, turned = encoder.encode(Frames(pictures, t)), encoder.encode(Frames(pictures[:, ::-1, ::-1], t))
+    plain, turned = (encoder.encode(Frames(p, t, array=ARRAY)) for p in (pictures, pictures[:, ::-1, ::-1]))
     assert spikes_of(plain)
     assert spikes_of(turned) == spikes_of(plain.select(FILES[encoder.name].turned(encoder)))
 
 
 @pytest.mark.parametrize("encoder", PLACED.values(), ids=PLACED)
 def test_a_train_with_a_place_hears_what_is_near_it_and_not_what_is_far(encoder):
-    array = Array(20, 20)
+    array = Array(20, 20, pitch_mm=1.0)
     t = np.arange(200) * round(encoder.period_ms * 1000)
     pictures = np.zeros((200, 20, 20))
     pictures[20:60, 3, 4] = 150
@@ -308,7 +308,7 @@ def test_a_train_with_a_place_hears_what_is_near_it_and_not_what_is_far(encoder)
 def test_taxels_that_do_not_exist_have_no_train_and_are_not_heard(encoder):
     rng = np.random.default_rng(14)
     exists = rng.random((3, 4)) < 0.6
-    masked = Array(3, 4, exists=exists)
+    masked = Array(3, 4, pitch_mm=1.0, exists=exists)
     events = touch(rng, ARRAY)
     some = Events(
         events.t, events.x, events.y, events.p, array=masked, intensity=events.intensity, present=events.present
@@ -374,7 +374,7 @@ def test_the_defaults_of_the_running_range_are_those_of_the_compiled_part():
 def test_nothing_in_gives_nothing_out():
     empty = Events([], [], [], [], array=ARRAY, intensity=[])
     for encoder in ENCODERS.values():
-        for nothing in (empty, Frames(np.empty((0, 3, 4)), [])):
+        for nothing in (empty, Frames(np.empty((0, 3, 4)), [], array=ARRAY)):
             spikes = encoder.encode(nothing)
             assert (len(spikes), len(spikes.times)) == (encoder.trains(ARRAY), 0)
         stream = encoder.stream()

@@ -180,23 +180,22 @@ def spikes_of(events: taxel.Events) -> list[tuple[int, int, float]]:
 
 
 def above_rest(events: taxel.Events) -> np.ndarray:
-    """What the taxels hold at last above the lowest that they held (more than the noise floor of 3)."""
-    held, low = np.zeros(SMALL.shape, int), np.full(SMALL.shape, 65_535)
+    """What the taxels hold at last above their first values, the rest until it is tracked (more than the noise floor of 3)."""
+    held, rest = np.zeros(SMALL.shape, int), np.zeros(SMALL.shape, int)
     for x, y, ticks in zip(events.x, events.y, events.intensity, strict=True):
+        rest[y, x] = rest[y, x] or ticks
         held[y, x] = ticks
-        low[y, x] = min(low[y, x], ticks)
-    above = np.where(low == 65_535, 0, held - low)
+    above = held - rest
     return np.where(above > 3, above, 0)
 
 
 def force(events: taxel.Events, times: np.ndarray) -> list[int]:
-    """Ticks above rest over all taxels just before times: what one taxel of `presses` holds above its lowest so far."""
-    found, low, n = [], 65_535, 0
+    """Ticks above rest over all taxels just before times: what one taxel of `presses` holds above its first value."""
+    found, n = [], 0
     for t in times:
         while n < len(events) and events.t[n] < t:
-            low = min(low, int(events.intensity[n]))
             n += 1
-        above = int(events.intensity[n - 1]) - low if n else 0
+        above = int(events.intensity[n - 1]) - int(events.intensity[0]) if n else 0
         found.append(above if above > 3 else 0)
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 import numpy as np
@@ -41,6 +42,11 @@ def picture_at(page, t_us):
     return page.pictures[-1]
 
 
+def near(force, of):
+    """Whether a force is that of a touch of half a second, of which the tracked rest (20 s) may take its part."""
+    return math.floor(of * math.exp(-0.5 / 20)) <= force <= of
+
+
 def columns_of(pictures):
     """Sum of ticks above rest by column of time, from the last restart on."""
     sums = {}
@@ -76,7 +82,7 @@ def test_the_window_ends_where_it_is_asked_to_and_the_time_moves_in_it(steps, co
         for column, force in sums.items():
             last = min((column + 1) * column_us - 1, end)
             inside = next((f for s, f in ((2, 30), (5, 60), (8, 90)) if 0 <= last - 1_000_000 * s < 500_000), 0)
-            assert force == inside, column
+            assert near(force, inside), (column, force, inside)
         assert page.ask("zoom", column_us=column_us, end_us="soon")["field"] == "end_us"
 
 
@@ -105,7 +111,8 @@ def test_a_recording_says_where_its_first_touch_is_and_how_strong_touches_are(st
         overview = next(m for m in page.said if m["type"] == "overview")
         force = np.array(overview["force"])
         at = (np.array([2.2, 3, 5.2, 8.2]) * 1e6 - overview["start_us"]) // overview["step_us"]
-        assert force[at.astype(int)].tolist() == [30, 0, 60, 90]
+        for found, touch in zip(force[at.astype(int)].tolist(), [30, 0, 60, 90], strict=True):
+            assert near(found, touch), (found, touch)
 
 
 def test_what_is_not_known_of_registers_is_not_shown_as_a_rate(tmp_path):

@@ -140,6 +140,7 @@ SOUND: dict[str, Sound] = {
         source=EXAMPLE.source,
         labels={"a": [9000]},
         tare=None,
+        group="walk",
     ),
     "taxel.detect.PlainScore.better": method(PLAIN, "better", than=SCORE),
     "taxel.detect.PlainScore.to_dict": method(PLAIN, "to_dict", than=SCORE),

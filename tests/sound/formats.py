@@ -23,6 +23,7 @@ SOUND: dict[str, Sound] = {
         scored=(0, 400),
         series={"force": np.ones(3)},
         about={"speed": 1.2},
+        timed=True,
     ),
 }
 

@@ -1,10 +1,15 @@
 """Sound calls of recordings."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import taxel
-from sound.things import ARRAY, EVENTS, TARE, Sound, plain
+from sound.things import ARRAY, EVENTS, FRAMES, TARE, Sound, plain
+from taxel.recording.contents import Contents
+
+#: A recording of numbered pictures, without times.
+NUMBERED = Contents(Path("grasp"), "grasp", "icub", ARRAY, frames=FRAMES, untimed=True)
 
 #: A valid call of every public function and class with arguments, by its full name.
 SOUND: dict[str, Sound] = {
@@ -19,6 +24,10 @@ SOUND: dict[str, Sound] = {
         field=None,
         types=None,
         ros=None,
+    ),
+    "taxel.Recording.at_rate": plain(
+        lambda **given: taxel.Recording(NUMBERED).at_rate(**given).frames(),
+        rate_hz=50.0,
     ),
     "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
     "taxel.Recording.frames": lambda: (taxel.open("here_events.npz").frames, {"rate_hz": 1000.0}),
@@ -53,7 +62,7 @@ SOUND: dict[str, Sound] = {
     "taxel.health": plain(taxel.health, recorded=EVENTS),
     "taxel.Note": lambda: (
         lambda **given: taxel.open("here_events.npz").with_notes([taxel.Note(**given)]),
-        {"text": "heel", "t": 100, "at_ns": 0, "recording": ""},
+        {"text": "heel", "t": 100, "at_ns": 0, "recording": "", "source": ""},
     ),
     "taxel.Recording": lambda: (taxel.Recording, {"contents": taxel.open("here_events.npz")._contents}),
     "taxel.Recording.on_clock": lambda: (taxel.open("here_clock.mcap").on_clock, {"name": "host"}),

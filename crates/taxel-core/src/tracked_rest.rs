@@ -147,11 +147,7 @@ impl TrackedRest {
             }
             self.values[taxel] = value;
             if !self.known[taxel] {
-                self.known[taxel] = true;
-                self.baseline.begin(taxel, value.into());
-                if let Some(stretch) = &mut self.stretch {
-                    stretch.begin(taxel, value);
-                }
+                self.begin(taxel, value);
             }
         }
         match &mut self.stretch {
@@ -163,6 +159,15 @@ impl TrackedRest {
             self.end_stretch(t);
         }
         self.baseline.above()
+    }
+
+    /// Makes a taxel's first value its rest; [`TrackedRest::take`] does so where nobody did before.
+    pub fn begin(&mut self, taxel: usize, value: f32) {
+        self.known[taxel] = true;
+        self.baseline.begin(taxel, value.into());
+        if let Some(stretch) = &mut self.stretch {
+            stretch.begin(taxel, value);
+        }
     }
 
     /// Ends the stretch at `t`: a quiet one sets rests.

@@ -239,8 +239,19 @@ impl ArrayState {
         let size = moved.clamp(-127, 127) as i8;
         let largest = self.change[taxel];
         self.change[taxel] = if size.unsigned_abs() >= largest.unsigned_abs() { size } else { largest };
-        self.rests += u64::from(self.rest.follow(taxel, change.ticks));
+        self.begin_rest(taxel, change.ticks);
         self.change_above_rest(taxel, above, self.above(taxel));
+    }
+
+    /// Makes the first value of a taxel its rest, which is tracked from there.
+    #[inline]
+    fn begin_rest(&mut self, taxel: usize, ticks: u16) {
+        if self.rest.follow(taxel, ticks) {
+            self.rests += 1;
+            if let Some(tracked) = &mut self.tracked {
+                tracked.begin(taxel, ticks.into());
+            }
+        }
     }
 
     /// Moves time forward, with the rest that is tracked; an earlier time does nothing.
@@ -350,7 +361,7 @@ impl ArrayState {
         self.held.values_mut().copy_from_slice(held);
         self.events = events;
         for (taxel, &held) in held.iter().enumerate().filter(|(_, held)| **held != UNKNOWN) {
-            self.rests += u64::from(self.rest.follow(taxel, held));
+            self.begin_rest(taxel, held);
         }
         self.sum_above_rest();
     }
@@ -583,6 +594,17 @@ mod tests {
         state.set_rest(vec![40, 40, 40, UNKNOWN]);
         state.advance(19_000_000);
         assert_eq!((state.rest_source(), state.rest()), (RestSource::Given, &[40, 40, 40, UNKNOWN][..]));
+    }
+
+    #[test]
+    fn a_taxel_s_first_value_is_its_rest_however_soon_it_changes() {
+        let mut state = ArrayState::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        (0..4).for_each(|taxel| state.apply_one(&change(4000, taxel, 48)));
+        state.apply_one(&change(9000, 1, 90));
+        // The rest is tracked every 64 ms; what is far is followed slowly.
+        state.advance(400_000);
+        assert_eq!((state.rest_source(), state.rest()), (RestSource::None, &[48, 49, 48, 48][..]));
+        assert_eq!(state.above(1), 41);
     }
 
     #[test]

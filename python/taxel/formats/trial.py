@@ -52,7 +52,8 @@ class Trial:
 
     Raises
     ------
-    ProblemError : reference times that do not ascend, or a column of another length than the recording
+    ProblemError : reference times that do not ascend, or a column of another length than the recording, or
+        `timed` that is not a boolean
 
     Examples
     --------
@@ -79,6 +80,7 @@ class Trial:
             raise ProblemError(f"recorded is {arguments.shown(self.recorded)}: must be taxel.Frames or taxel.Events")
         for name in ("name", "person", "source", "foot", "group"):
             arguments.text(name, getattr(self, name))
+        arguments.flag("timed", self.timed)
         for name in ("truth", "series", "about"):
             arguments.mapping(name, getattr(self, name))
         for event, times in self.truth.items():

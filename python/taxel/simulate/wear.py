@@ -20,6 +20,8 @@ _FLICKER_US = 20_000
 #: The largest value of an event, ticks; one more means unknown.
 _MOST = 65_534
 _MINUTE_US = 60_000_000
+#: The oldest tare, min: a year.
+_OLDEST_MIN = 525_600
 
 
 class _Added(NamedTuple):
@@ -55,9 +57,9 @@ def worn(
         When the tare ends.
     seed : int, 0 or more
         Draws drifts, taxels and values.
-    drift : float, ticks a minute, 0 or more
+    drift : float, ticks a minute, from 0 to 65 534
         Standard deviation over taxels.
-    age_min : float, min, 0 or more
+    age_min : float, min, from 0 to 525 600, a year
         How old the tare is at `since_us`: for so long taxels have drifted.
     stuck, flickering, pairs : int, 0 or more
         How many taxels hold one value, drawn from 0 to the largest of the recording; how many are at random now at
@@ -81,7 +83,8 @@ def worn(
     array([50, 60, 57, 76, 87], dtype=uint16)
     """
     since, seed = whole("since_us", since_us), whole("seed", seed, 0)
-    per_minute, age = finite("drift", drift, least=0.0), finite("age_min", age_min, "min", least=0.0)
+    per_minute = finite("drift", drift, least=0.0, most=_MOST)
+    age = finite("age_min", age_min, "min", least=0.0, most=_OLDEST_MIN)
     counts = [whole(name, n, 0) for name, n in (("stuck", stuck), ("flickering", flickering), ("pairs", pairs))]
     if instance("events", events, Events).intensity is None:
         raise ProblemError("events without intensities: nothing says which values their taxels hold")

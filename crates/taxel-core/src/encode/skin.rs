@@ -155,9 +155,9 @@ impl Skin {
     /// Number of afferents on an array at this density.
     fn count(array: &Array, density: f64) -> usize {
         // Without a pitch, which `afferents` refuses, there are none.
-        let area_cm2 = array.pitch_mm.map_or(0.0, |Pitch { rows, columns }| {
-            Channels::new(array).len() as f64 * columns * rows / 100.0
-        });
+        let area_cm2 = array
+            .pitch_mm
+            .map_or(0.0, |Pitch { rows, columns }| Channels::new(array).len() as f64 * columns * rows / 100.0);
         (density * area_cm2).round() as usize
     }
 

@@ -191,7 +191,8 @@ impl Kernel {
             for column in 0..2 * columns - 1 {
                 let (dy, dx) = (row.abs_diff(rows - 1) as f64, column.abs_diff(columns - 1) as f64);
                 let own = row + 1 == rows && column + 1 == columns && smoothing.own_train == OwnTrain::Twice;
-                by_offset.push((-dx.hypot(dy * down) * pitch.columns / smoothing.sigma).exp() + f64::from(u8::from(own)));
+                by_offset
+                    .push((-dx.hypot(dy * down) * pitch.columns / smoothing.sigma).exp() + f64::from(u8::from(own)));
             }
         }
         Ok(Self { rows, columns, exists: array.exists.clone(), by_offset })
