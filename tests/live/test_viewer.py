@@ -180,7 +180,7 @@ def spikes_of(events: taxel.Events) -> list[tuple[int, int, float]]:
 
 
 def above_rest(events: taxel.Events) -> np.ndarray:
-    """What the taxels hold at last above their first values, the rest until it is tracked (more than the noise floor of 3)."""
+    """What the taxels hold at last above their first values, which are the rest (more than the noise floor of 3)."""
     held, rest = np.zeros(SMALL.shape, int), np.zeros(SMALL.shape, int)
     for x, y, ticks in zip(events.x, events.y, events.intensity, strict=True):
         rest[y, x] = rest[y, x] or ticks

@@ -77,6 +77,13 @@ def still(page: Any) -> float:
     return at
 
 
+def settled(page: Any, name: str) -> Any:
+    """Return the pixels of a map that is drawn to its end: a busy machine draws it in steps."""
+    while (seen := page.evaluate(PIXELS, name)) != (page.wait_for_timeout(400), page.evaluate(PIXELS, name))[1]:
+        pass
+    return seen
+
+
 @pytest.fixture(scope="module")
 def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
     """An emulated board with a control line, and a panel that listens to it."""
@@ -551,8 +558,8 @@ def pixel(page: Any, t_s: float) -> float:
 
 
 def test_a_recording_opens_on_all_of_its_time_and_its_first_touch(replay: Any) -> None:
-    # The force of the first fall is less than a quarter of the greatest, as no taxel is released.
-    until(lambda: 1.2 < clock(replay) < 1.212, "the first touch, where its force is greatest")
+    # The rest is that of the taxels' first values, so the first fall has nearly half of the greatest force.
+    until(lambda: 0.2 < clock(replay) < 0.212, "the first touch, where its force is greatest")
     start, stop = span(replay)
     assert (start, stop) == (pytest.approx(0.1, abs=0.15), pytest.approx(9.3, abs=0.15))
     drawn = "document.getElementById('pressure-map').getContext('2d').getImageData(0, 0, 24, 16).data.buffer"
@@ -618,7 +625,7 @@ def test_spikes_of_an_encoder_are_shown_in_a_recording(replay: Any) -> None:
     press(replay, "End", "4")
     until(lambda: clock(replay) > 9, "the end")
     still(replay)
-    changes = replay.evaluate(PIXELS, "raster")
+    changes = settled(replay, "raster")
     replay.locator("#encoder").select_option("change_events")
     shows(replay, "spikes-info", "change events, latency")
     until(lambda: replay.evaluate(PIXELS, "raster") != changes, "the raster is of spikes")

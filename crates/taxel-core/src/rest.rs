@@ -2,6 +2,9 @@
 
 use std::collections::BTreeSet;
 
+/// The noise floor of the board's fast presets, ticks: by it a rest is found that nobody measured.
+pub const NOISE_FLOOR: f64 = 3.0;
+
 /// Half a tick, which is added to the noise floor as a threshold: the rest is a mean, and values are whole ticks.
 const HALF_TICK: f64 = 0.5;
 

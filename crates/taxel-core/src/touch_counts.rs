@@ -7,6 +7,7 @@
 
 use crate::Array;
 use crate::held::UNKNOWN;
+use crate::rest::NOISE_FLOOR;
 use crate::tracked_rest::TrackedRest;
 
 /// Width of a bin, us.
@@ -23,9 +24,6 @@ pub const BY_ITSELF: u32 = 8;
 
 /// A taxel changes by itself so often in a bin: the value of a sound one that lies between two ticks changes about once.
 pub const OFTEN: u32 = 3;
-
-/// Noise floor of the board's fast presets, ticks.
-const NOISE_FLOOR: f64 = 3.0;
 
 /// What a taxel did in the present bin.
 #[derive(Debug, Clone, Copy)]

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::time_columns::{COLUMN_US, Curve, NOTHING, TimeColumns, column_of};
 use taxel_core::held::{Held, UNKNOWN};
-use taxel_core::rest::{Rest, Value};
+use taxel_core::rest::{NOISE_FLOOR, Rest, Value};
 use taxel_core::tracked_rest::TrackedRest;
 use taxel_live::pipeline::Change;
 
@@ -63,9 +63,9 @@ fn next_track(t: i64) -> i64 {
 }
 
 /// A rest that is tracked from these values on.
-fn tracked_from(columns: usize, floor: u16, values: &[u16]) -> TrackedRest {
+fn tracked_from(columns: usize, values: &[u16]) -> TrackedRest {
     let rest = |&value: &u16| if value == UNKNOWN { f64::NO_REST } else { value.into() };
-    TrackedRest::new(columns, floor.into(), values.iter().map(rest).collect())
+    TrackedRest::new(columns, NOISE_FLOOR, values.iter().map(rest).collect())
 }
 
 /// Held values, rest and recent changes of every taxel, with raster and curves by column of time.
@@ -119,7 +119,7 @@ impl ArrayState {
             pictures: false,
             held: from.held.clone().into(),
             rest: Rest::measured(from.rest.clone()),
-            tracked: Some(from.tracked.clone().unwrap_or_else(|| Box::new(tracked_from(columns, floor, &from.rest)))),
+            tracked: Some(from.tracked.clone().unwrap_or_else(|| Box::new(tracked_from(columns, &from.rest)))),
             track_at: from.latest.map(next_track),
             rests: 1,
             change: vec![0; from.held.len()],
@@ -385,7 +385,7 @@ impl ArrayState {
     /// Tracks the rest of all taxels from their held values on.
     pub fn track_rest(&mut self) {
         let held = self.held().to_vec();
-        self.tracked = Some(Box::new(tracked_from(self.columns, self.floor, &held)));
+        self.tracked = Some(Box::new(tracked_from(self.columns, &held)));
         self.rest = Rest::measured(held);
         self.rests += 1;
         self.sum_above_rest();

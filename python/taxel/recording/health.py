@@ -130,7 +130,7 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     >>> values = np.concatenate([touch] * 3) + 50
     >>> values[:, 1, 1] = 0
     >>> health(Frames(values, np.arange(15) * 100_000, unit="ticks"))
-    Health(9 taxels: 1 dead, 0 stuck, 0 noisy, 8 not touched enough to say)
+    Health(9 taxels: 1 dead, 0 stuck, 0 noisy)
     """
     held = held_by(recorded)
     if isinstance(held, Events):
@@ -157,15 +157,15 @@ def health(recorded: Events | Frames | Recorded) -> Health:
 class Touches(NamedTuple):
     """Counts of each taxel's touches; whole numbers, shape (rows, columns)."""
 
-    touches: NDArray[np.int64]
+    touches: NDArray[np.uint32]
     """Number of touches of its place, as its neighbours show them."""
-    missed: NDArray[np.int64]
+    missed: NDArray[np.uint32]
     """Those in which it did not change."""
-    pressed: NDArray[np.int64]
+    pressed: NDArray[np.uint32]
     """Number of bins in which it was touched itself."""
-    changed: NDArray[np.int64]
+    changed: NDArray[np.uint32]
     """Number of bins in which it changed."""
-    by_itself: NDArray[np.int64]
+    by_itself: NDArray[np.uint32]
     """Those in which hardly any taxel around it did."""
 
 
@@ -221,7 +221,7 @@ def judged(array: Array, statistics: TaxelStatistics, *, loud: bool = True) -> H
 
 def by_taxel(counts: NDArray[np.uint32], array: Array) -> Touches:
     """Return the counts of touches that the core gives, as grids."""
-    return Touches(*counts.astype(np.int64).reshape(array.rows, array.columns, 5).transpose(2, 0, 1))
+    return Touches(*counts.reshape(array.rows, array.columns, 5).transpose(2, 0, 1))
 
 
 def _statistics_of_events(events: Events) -> TaxelStatistics:

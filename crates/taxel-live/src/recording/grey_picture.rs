@@ -3,11 +3,8 @@
 use std::collections::VecDeque;
 
 use taxel_core::encode::Tare;
-use taxel_core::rest::{Rest, Value};
+use taxel_core::rest::{NOISE_FLOOR, Rest, Value};
 use taxel_core::tracked_rest::TrackedRest;
-
-/// The noise floor of the board's fast presets, ticks.
-const NOISE_FLOOR: f64 = 3.0;
 
 /// White is the largest value of this period, us.
 const SCALE_US: i64 = 10_000_000;
