@@ -258,7 +258,9 @@ def several(sources: Mapping[str, Contents]) -> Contents:
         notes=once(lambda: first.notes),
         detections=once(lambda: first.detections),
         counts=once(lambda: {name: one.counts for name, one in sources.items()}),
-        verdict=once(lambda: "; ".join(f"{name}: {one.verdict}" for name, one in sources.items())),
+        verdict=once(
+            lambda: "; ".join(f"{name}: {one.verdict}" for name, one in sources.items() if one.verdict) or None
+        ),
         truncated=once(lambda: any(one.truncated for one in sources.values())),
         lost=once(lambda: tuple(dict.fromkeys(line for one in sources.values() for line in one.lost))),
         clock_of=first.clock_of,
