@@ -154,6 +154,14 @@ def live(typed: _Typed) -> None:
             at_rest.enter_context(at_rest.enter_context(Cable(typed.control)).floor(0))
         lossless = typed.record is not None or trained is not None
         board = at_rest.enter_context(remote(typed.address, typed.congestion, lossless=lossless))
+        if trained is not None and registers is None and board is None:
+            array = trained.array if typed.array is None else geometry(typed.array)
+            frame_us = Registers(array=Array._of(array)).frame_us
+            console.print(
+                f"the readout assumes frames of {frame_us:g} us, as of a board at reset; state others by "
+                "--preset, or by --rate-hz and --bits",
+                soft_wrap=True,
+            )
         with Live(
             typed.port,
             host=typed.host,
@@ -168,13 +176,6 @@ def live(typed: _Typed) -> None:
             lines=typed.as_json,
             send=typed.send or (),
         ) as pipeline:
-            if trained is not None and registers is None and board is None:
-                frame_us = Registers(array=pipeline.array).frame_us
-                console.print(
-                    f"the readout assumes frames of {frame_us:g} us, as of a board at reset; state others by "
-                    "--preset, or by --rate-hz and --bits",
-                    soft_wrap=True,
-                )
             if spikes is not None and isinstance(rest, Tare):
                 spikes = spikes.with_tare(rest)
             last, external = _shown(typed, pipeline, spikes, console, at_rest, fresh=isinstance(rest, float))
